@@ -1,0 +1,221 @@
+"""Frozen, validated parameter objects: one definition serves Python, TOML and JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import numbers
+import typing
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
+
+import numpy as np
+import pydantic
+from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
+from pydantic.dataclasses import dataclass as pydantic_dataclass
+
+from stiction.errors import InputError, unknown_name
+
+T = TypeVar("T")
+
+
+def _number(value: Any) -> Any:
+    """Numbers of any library, but no strings and no booleans, which pydantic would convert."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise ValueError("must be a number")
+    return float(value)
+
+
+def _count(value: Any) -> Any:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+        raise ValueError("must be a whole number")
+    return int(value)
+
+
+def _read_profile(path: Path) -> Any:
+    if path.suffix == ".npy":
+        return np.load(path, allow_pickle=False)
+    if path.suffix == ".csv":
+        return np.loadtxt(path, delimiter=",", ndmin=1)
+    raise ValueError("a profile file must end in .npy or .csv")
+
+
+def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
+    """A number, or a read-only float64 array of shape (nodes,); in TOML also a path to one."""
+    if isinstance(value, str | Path):
+        folder = (info.context or {}).get("folder")
+        if folder is None:
+            raise ValueError("must be a number or an array (file names belong in a study file)")
+        try:
+            value = _read_profile(Path(folder) / value)
+        except OSError as error:
+            raise ValueError(f"cannot read the file: {error}") from None
+    if isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        number = _number(value)
+        if not np.isfinite(number):
+            raise ValueError("must be finite")
+        return number
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":
+            raise TypeError
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("must be a number or an array of numbers, one for each node") from None
+    if array.ndim != 1 or array.size == 0:
+        raise ValueError(f"must have shape (nodes,), got shape {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"must be finite; entry {int(np.argmin(np.isfinite(array)))} is not")
+    array.flags.writeable = False
+    return array
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
+Profile: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_profile),
+    PlainSerializer(_plain),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number"},
+                {"type": "array", "items": {"type": "number"}},
+                {"type": "string", "description": "path to a .npy or .csv file"},
+            ]
+        }
+    ),
+]
+"""A number, or a read-only array of shape (nodes,)."""
+
+
+def describe(value: Any) -> str:
+    """Short form of what was given, for messages."""
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _models_in(annotation: Any) -> list[type]:
+    """The model classes that an annotation mentions: X, X | Y, Annotated[X | Y, ...]."""
+    if dataclasses.is_dataclass(annotation):
+        return [annotation] if isinstance(annotation, type) else []
+    return [cls for part in typing.get_args(annotation) for cls in _models_in(part)]
+
+
+def _walk(cls: type, location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
+    """Path as the user wrote it, and the keys valid in its last-but-one step.
+
+    Pydantic numbers positional arguments and puts the chosen member of a union into the path.
+    """
+    path: list[str] = []
+    classes = [cls]
+    for step in location:
+        members = {getattr(c, "type", None): c for c in classes}
+        if len(classes) > 1 and step in members:
+            classes = [members[step]]
+            continue
+        fields = {f.name: f for c in classes for f in dataclasses.fields(c) if f.init}
+        valid = list(fields)
+        if isinstance(step, int) and step < len(valid):
+            step = valid[step]
+        path.append(str(step))
+        if step in fields and step is not location[-1]:
+            owner = next(c for c in classes if str(step) in {f.name for f in dataclasses.fields(c)})
+            hints = typing.get_type_hints(owner, include_extras=True)
+            classes = _models_in(hints[str(step)])
+    valid = [f.name for c in classes for f in dataclasses.fields(c) if f.init]
+    return path, valid
+
+
+def explain(error: pydantic.ValidationError, cls: type, root: str = "") -> list[str]:
+    """The mistakes that pydantic found in a `cls`, one text each, with the path to the key."""
+    texts = []
+    for item in error.errors():
+        steps, valid = _walk(cls, item["loc"])
+        path = ".".join([root, *steps] if root else steps)
+        kind, message, given = item["type"], item["msg"], item.get("input")
+        message = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
+        if kind in ("missing", "missing_argument"):
+            texts.append(f"{path}: missing")
+        elif kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_argument"):
+            owner, _, key = path.rpartition(".")
+            texts.append(unknown_name(owner or cls.__name__, key, valid))
+        elif kind == "value_error":
+            nested = (item.get("ctx") or {}).get("error")
+            if isinstance(nested, InputError):
+                texts.extend(f"{path}: {text}" if path else text for text in nested.problems)
+            else:
+                texts.append(f"{path}: {message}, got {describe(given)}")
+        else:
+            message = message.removeprefix("Input should be ")
+            texts.append(f"{path}: must be {message}, got {describe(given)}")
+    return texts
+
+
+def _same(left: Any, right: Any) -> bool:
+    if isinstance(left, np.ndarray) or isinstance(right, np.ndarray):
+        return np.array_equal(left, right)
+    return bool(left == right)
+
+
+def _equal(self: Any, other: object) -> bool:
+    if type(self) is not type(other):
+        return NotImplemented
+    fields = dataclasses.fields(self)
+    return all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields)
+
+
+def _hash(self: Any) -> int:
+    values = (getattr(self, field.name) for field in dataclasses.fields(self))
+    return hash(tuple(v.tobytes() if isinstance(v, np.ndarray) else v for v in values))
+
+
+@overload
+def model(cls: type[T]) -> type[T]: ...
+@overload
+def model(*, kw_only: bool = ...) -> Any: ...
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
+def model(cls: Any = None, *, kw_only: bool = False) -> Any:
+    """Class decorator: a frozen pydantic dataclass whose mistakes come as `InputError`.
+
+    Objects compare by value (arrays too) and hash by value. Consistency checks go into a method
+    decorated with ``pydantic.model_validator(mode="after")`` that raises `InputError`.
+    """
+    if cls is None:
+        return functools.partial(model, kw_only=kw_only)
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
+    validated_init = wrapped.__init__
+
+    @functools.wraps(validated_init)
+    def init(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            validated_init(self, *args, **kwargs)
+        except pydantic.ValidationError as error:
+            raise InputError(explain(error, wrapped, cls.__name__)) from None
+        except TypeError as error:  # too many positional arguments, for example
+            raise InputError(f"{cls.__name__}: {error}") from None
+
+    # Validation inside another model must keep calling pydantic's own path, not this wrapper.
+    init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
+    wrapped.__init__ = init
+    wrapped.__eq__ = _equal
+    wrapped.__hash__ = _hash
+    return wrapped
+
+
+def to_plain(value: Any) -> Any:
+    """The object as plain dicts, lists and numbers: what TOML and JSON hold."""
+    return pydantic.TypeAdapter(type(value)).dump_python(value, mode="json", exclude_none=True)
+
+
+Mode: TypeAlias = Literal["II", "III"]

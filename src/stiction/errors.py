@@ -1,0 +1,40 @@
+"""What a user can get wrong, said once and clearly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """Everything wrong with what was given, in one message.
+
+    Parameters
+    ----------
+    problems : str or iterable of str
+        One text for each mistake; each names the key or argument, what was given and what is valid.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        The same texts, one by one.
+    """
+
+    def __init__(self, problems: str | Iterable[str]) -> None:
+        self.problems = (problems,) if isinstance(problems, str) else tuple(problems)
+        super().__init__("\n".join(self.problems))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[str, ...]]]:
+        return type(self), (self.problems,)
+
+
+class AccuracyWarning(UserWarning):
+    """A result is valid but less accurate than it could be; the message says by how much."""
+
+
+def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
+    """Text that refuses a name and offers the nearest valid one."""
+    names = list(valid)
+    near = get_close_matches(given, names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{what}: unknown {given!r}{hint} (valid: {', '.join(names)})"

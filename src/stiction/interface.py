@@ -1,0 +1,47 @@
+"""The interface: a periodic line of nodes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field
+
+from stiction._model import Positive, _count, model
+
+
+@model
+class Interface:
+    """Periodic interface with equally spaced nodes.
+
+    Parameters
+    ----------
+    length : float
+        Period L, m.
+    nodes : int
+        Number of nodes n, even and at least 8. Powers of two are fastest.
+
+    Raises
+    ------
+    InputError
+        If the length is not positive or the number of nodes is odd or below 8.
+    """
+
+    length: Positive
+    nodes: Annotated[int, BeforeValidator(_count), Field(ge=8, multiple_of=2)]
+
+    @property
+    def spacing(self) -> float:
+        """Distance between nodes, m."""
+        return self.length / self.nodes
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Node positions in [0, L), shape (nodes,), m."""
+        return np.arange(self.nodes) * self.spacing
+
+    @property
+    def wavenumbers(self) -> NDArray[np.float64]:
+        """Angular wavenumbers of a real transform, shape (nodes//2 + 1,), rad/m."""
+        return 2.0 * np.pi / self.length * np.arange(self.nodes // 2 + 1)

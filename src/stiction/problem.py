@@ -1,0 +1,189 @@
+"""The physical problem: two solids, an interface, a friction law and a load."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from pydantic import model_validator
+
+from stiction._model import Mode, describe, model
+from stiction.errors import AccuracyWarning, InputError
+from stiction.friction import SlipWeakening
+from stiction.interface import Interface
+from stiction.load import Load
+from stiction.rows import Rows, as_rows
+from stiction.solid import Solid
+
+# Half the smallest eigenvalue-to-length factor: h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
+SMALLEST_EIGENVALUE = 0.5788869418506
+FEWEST_NODES = 4
+
+
+@model
+class Problem:
+    """Everything about the interface that is not random.
+
+    Parameters
+    ----------
+    solid : Solid
+    interface : Interface
+    friction : SlipWeakening
+    load : Load, optional
+        Uniform and without initial stress if left out.
+    mode : {"II", "III"}
+        In-plane or anti-plane shear.
+
+    Raises
+    ------
+    InputError
+        If an array does not have one entry for each node, or the nucleation length spans fewer
+        than four nodes.
+    """
+
+    solid: Solid
+    interface: Interface
+    friction: SlipWeakening
+    load: Load = Load()  # noqa: RUF009 - frozen, so one default instance may be shared
+    mode: Mode = "II"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Problem:
+        nodes = self.interface.nodes
+        arrays = {
+            "friction.weakening_rate": self.friction.weakening_rate,
+            "friction.critical_slip": self.friction.critical_slip,
+            "friction.residual_strength": self.friction.residual_strength,
+            "load.profile": self.load.profile,
+            "load.initial_stress": self.load.initial_stress,
+            "load.normal_pressure": self.load.normal_pressure,
+        }
+        problems = [
+            f"{name}: must have one entry for each of the {nodes} nodes, got {describe(value)}"
+            for name, value in arrays.items()
+            if isinstance(value, np.ndarray) and value.shape != (nodes,)
+        ]
+        rate = self.friction.weakening_rate
+        if rate is not None and not problems:
+            problems += self._too_few_nodes(float(np.max(rate)))
+        if problems:
+            raise InputError(problems)
+        return self
+
+    @property
+    def effective_modulus(self) -> float:
+        """Static modulus G* of the plane state and mode, Pa."""
+        return self.solid.effective_modulus(self.mode)
+
+    @property
+    def nucleation_length(self) -> float:
+        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
+
+        Raises
+        ------
+        InputError
+            If the weakening rate varies along the interface or follows from `critical_slip`.
+        """
+        rate = self.friction.weakening_rate
+        if rate is None or np.ptp(rate) > 0.0:
+            raise InputError(
+                "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
+                " rate; where it varies, use st.Equilibrium() or st.Rupture()"
+            )
+        return self._nucleation_length(float(np.max(rate)))
+
+    def _nucleation_length(self, rate: float) -> float:
+        return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
+
+    def _too_few_nodes(self, steepest_rate: float) -> list[str]:
+        length = self._nucleation_length(steepest_rate)
+        resolution = length / self.interface.spacing
+        if resolution >= FEWEST_NODES:
+            return []
+        enough = int(np.ceil(FEWEST_NODES * self.interface.length / length / 2.0)) * 2
+        return [
+            f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
+            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough},"
+            f" got {self.interface.nodes}"
+        ]
+
+    def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
+        """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
+        resolution = self._nucleation_length(float(rows.weakening_rate.max())) / rows.spacing
+        if resolution < enough:
+            warnings.warn(
+                f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
+                f" {cost}",
+                AccuracyWarning,
+                stacklevel=3,
+            )
+
+    def rows(
+        self,
+        tau_p: Any,
+        *,
+        residual_strength: Any = None,
+        initial_stress: Any = None,
+        weakening_rate: Any = None,
+    ) -> Rows:
+        """Strength profiles and what else varies between samples, validated and broadcast.
+
+        Parameters
+        ----------
+        tau_p : (samples, nodes) or (nodes,) array
+            Peak strength, Pa.
+        residual_strength, initial_stress, weakening_rate : array, optional
+            Where given, replaces the problem's own: (samples, nodes), (nodes,), (samples, 1) or a
+            number.
+
+        Raises
+        ------
+        InputError
+            Naming all that is wrong: shapes, values that are not finite, strength not above the
+            residual strength, a weakening rate that is not positive.
+        """
+        nodes = self.interface.nodes
+        strength = as_rows("tau_p", tau_p, nodes)
+        count = strength.shape[0]
+        problems: list[str] = []
+        defaults = {
+            "residual_strength": (residual_strength, self.friction.residual_strength),
+            "initial_stress": (initial_stress, self.load.initial_stress),
+        }
+        varying = {}
+        for name, (given, own) in defaults.items():
+            try:
+                varying[name] = as_rows(name, own if given is None else given, nodes, count)
+            except InputError as error:
+                problems += error.problems
+        rate = self.friction.weakening_rate if weakening_rate is None else weakening_rate
+        rates = None
+        if rate is not None:
+            try:
+                rates = as_rows("weakening_rate", rate, nodes, count)
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems)
+        residual, initial = varying["residual_strength"], varying["initial_stress"]
+        if residual.min() < 0.0:
+            problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
+        excess = strength - residual
+        if excess.min() <= 0.0:
+            sample, node = np.unravel_index(int(np.argmin(excess)), excess.shape)
+            problems.append(
+                f"tau_p: must be above residual_strength everywhere; sample {sample}, node {node}:"
+                f" {strength[sample, node]:g} against {residual[sample, node]:g} Pa"
+            )
+        if rates is None:
+            rates = excess / np.asarray(self.friction.critical_slip)
+        if problems:
+            raise InputError(problems)
+        if rates.min() <= 0.0:
+            raise InputError(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
+        problems += self._too_few_nodes(float(rates.max()))
+        if problems:
+            raise InputError(problems)
+        profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)
+        return Rows(strength, residual, rates, initial, profile, self.interface.spacing)

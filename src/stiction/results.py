@@ -1,0 +1,80 @@
+"""Results: labelled datasets with units and all it takes to run them again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What a number in a result means.
+
+    Attributes
+    ----------
+    units : str
+        SI; "1" for a pure number.
+    long_name : str
+    dims : tuple of str
+        The first is 'sample' for everything a method returns.
+    """
+
+    units: str
+    long_name: str
+    dims: tuple[str, ...] = ("sample",)
+
+
+ONSET_VARIABLES: dict[str, Variable] = {
+    "critical_load": Variable("Pa", "load factor at which the interface as a whole lets go"),
+    "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
+    "first_instability": Variable("Pa", "mean interface stress when the first patch is unstable"),
+    "critical_position": Variable("m", "position of the critical patch"),
+}
+"""What every method returns for each sample."""
+
+FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
+
+
+def to_dataset(
+    values: Mapping[str, NDArray[Any]],
+    variables: Mapping[str, Variable],
+    coordinates: Mapping[str, tuple[NDArray[Any], Variable]],
+    attributes: Mapping[str, Any],
+) -> xr.Dataset:
+    """Label arrays with dimensions, coordinates, units and long names.
+
+    Parameters
+    ----------
+    values : mapping of arrays
+    variables : mapping of Variable
+        One for each array.
+    coordinates : mapping of (array, Variable)
+    attributes : mapping
+        Strings and numbers are kept, anything else is written as JSON.
+    """
+    from stiction import __version__
+
+    def attrs(variable: Variable) -> dict[str, str]:
+        return {"units": variable.units, "long_name": variable.long_name}
+
+    data = {
+        name: (variables[name].dims, np.asarray(value), attrs(variables[name]))
+        for name, value in values.items()
+    }
+    coords = {name: (v.dims, array, attrs(v)) for name, (array, v) in coordinates.items()}
+    dataset = xr.Dataset(data, coords=coords)
+    dataset.attrs["stiction_version"] = __version__
+    for name, value in attributes.items():
+        plain = isinstance(value, str | int | float)
+        dataset.attrs[name] = value if plain else json.dumps(value)
+    return dataset
+
+
+SAMPLE = Variable("1", "sample number", ("sample",))
+POSITION = Variable("m", "position along the interface", ("x",))

@@ -1,0 +1,91 @@
+"""Rows: validated strength profiles with everything else that may differ from sample to sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A batch of samples as solvers see them.
+
+    Attributes
+    ----------
+    strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
+        tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa). Read-only; constant ones are broadcast views.
+    load_profile : (nodes,) array
+        p, dimensionless, positive.
+    spacing : float
+        Distance between nodes, m.
+    """
+
+    strength: Array
+    residual_strength: Array
+    weakening_rate: Array
+    initial_stress: Array
+    load_profile: Array
+    spacing: float
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return int(self.strength.shape[0])
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return int(self.strength.shape[1])
+
+    @property
+    def uniform_weakening(self) -> bool:
+        """Whether W is the same at all nodes of each sample."""
+        return bool(np.all(self.weakening_rate == self.weakening_rate[:, :1]))
+
+    def mean_stress(self, load: Array) -> Array:
+        """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
+        mean: Array = self.initial_stress.mean(axis=1) + load * self.load_profile.mean()
+        return mean
+
+
+def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Array:
+    """`value` as a (samples, nodes) float64 array, or an `InputError` that names it.
+
+    A single profile (nodes,) is one sample; where `count` is given, a scalar, a (nodes,) profile
+    or a (count, 1) column is broadcast to it.
+    """
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":
+            raise TypeError
+        array = np.ascontiguousarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name}: must be an array of numbers of shape (samples, {nodes}) or ({nodes},),"
+            f" got {type(value).__name__}"
+        ) from None
+    if given.ndim == 0:
+        array = array.reshape(())
+    samples = 1 if count is None else count
+    shapes: set[tuple[int, ...]] = {(nodes,)}
+    if count is not None:
+        shapes |= {(), (count, nodes), (count, 1)}
+    if array.shape not in shapes and not (count is None and array.shape[1:] == (nodes,)):
+        valid = f"({samples if count else 'samples'}, {nodes}) or ({nodes},)"
+        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}")
+    bad = ~np.isfinite(array)
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
+        raise InputError(f"{name}: must be finite; entry {where} is not")
+    if array.ndim < 2:
+        array = np.broadcast_to(array, (samples, nodes))
+    elif array.shape[1] != nodes:
+        array = np.broadcast_to(array, (samples, nodes))
+    return array

@@ -1,0 +1,81 @@
+"""The elastic half-spaces."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+from scipy.optimize import brentq
+
+from stiction._model import Mode, Positive, _number, model
+
+
+@model
+class Solid:
+    """One of two identical linear-elastic half-spaces.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        G, Pa.
+    poisson_ratio : float
+        nu, in (-1, 0.5).
+    density : float
+        rho, kg/m3.
+    plane : {"strain", "stress"}
+        Plane state of the in-plane problem (mode II); mode III does not depend on it.
+
+    Raises
+    ------
+    InputError
+        If a value is missing, not finite or out of range.
+    """
+
+    shear_modulus: Positive
+    poisson_ratio: Annotated[
+        float, BeforeValidator(_number), Field(gt=-1, lt=0.5, allow_inf_nan=False)
+    ]
+    density: Positive
+    plane: Literal["strain", "stress"] = "strain"
+
+    @property
+    def shear_wave_speed(self) -> float:
+        """c_s = sqrt(G/rho), m/s."""
+        return math.sqrt(self.shear_modulus / self.density)
+
+    @property
+    def wave_speed_ratio(self) -> float:
+        """c_d/c_s of the plane state: sqrt(2 (1-nu)/(1-2 nu)) in strain, sqrt(2/(1-nu)) in stress."""
+        nu = self.poisson_ratio
+        if self.plane == "strain":
+            return math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))
+        return math.sqrt(2.0 / (1.0 - nu))
+
+    @property
+    def dilatational_wave_speed(self) -> float:
+        """c_d of the plane state, m/s."""
+        return self.wave_speed_ratio * self.shear_wave_speed
+
+    @property
+    def rayleigh_wave_speed(self) -> float:
+        """c_R, m/s: the root of (2-q^2)^2 = 4 sqrt(1-q^2) sqrt(1-q^2/eta^2), q = c_R/c_s."""
+        eta = self.wave_speed_ratio
+
+        # q = 0 is a trivial double root; dividing it out leaves one simple root below 1.
+        def rayleigh(q: float) -> float:
+            product = 4.0 * math.sqrt(1.0 - q * q) * math.sqrt(1.0 - (q / eta) ** 2)
+            return ((2.0 - q * q) ** 2 - product) / (q * q)
+
+        root: float = brentq(rayleigh, 1e-3, 1.0, xtol=1e-15, rtol=1e-15)
+        return root * self.shear_wave_speed
+
+    def effective_modulus(self, mode: Mode = "II") -> float:
+        """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
+
+        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress; mode III: G. In every case
+        it is 2 G (1 - c_s^2/c_d^2) for mode II (Geubelle and Rice, 1995, static limit).
+        """
+        if mode == "III":
+            return self.shear_modulus
+        return 2.0 * self.shear_modulus * (1.0 - self.wave_speed_ratio**-2)
