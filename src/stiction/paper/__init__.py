@@ -1,0 +1,22 @@
+"""The paper of Albertini, Karrer, Grigoriu and Kammer (2020): its system, figures and claims."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+# Public name -> module; on first use, so that the system does not cost the plotting library.
+_HOMES = {"problem": "setting", "strength": "setting"}
+
+__all__ = ["problem", "strength"]
+
+if TYPE_CHECKING:
+    from stiction.paper.setting import problem, strength
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(import_module(f"stiction.paper.{_HOMES[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'stiction.paper' has no attribute {name!r}")
