@@ -16,6 +16,15 @@ _HOMES = {
     "Problem": "problem",
     "InputError": "errors",
     "AccuracyWarning": "errors",
+    "LocalCriterion": "criterion.method",
+    "nucleation_stress": "criterion.nucleation",
+    "onset": "methods",
+    "RandomField": "fields.random_field",
+    "Beta": "fields.marginals",
+    "PowerLawSpectrum": "fields.spectra",
+    "SquaredExponentialSpectrum": "fields.spectra",
+    "ExponentialSpectrum": "fields.spectra",
+    "CustomSpectrum": "fields.spectra",
 }
 _MODULES = ("paper",)
 

@@ -91,13 +91,14 @@ class Problem:
                 "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
                 " rate; where it varies, use st.Equilibrium() or st.Rupture()"
             )
-        return self._nucleation_length(float(np.max(rate)))
+        return self.nucleation_length_of(float(np.max(rate)))
 
-    def _nucleation_length(self, rate: float) -> float:
+    def nucleation_length_of(self, rate: float) -> float:
+        """h_n, m, of a uniform weakening rate in Pa/m."""
         return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
 
     def _too_few_nodes(self, steepest_rate: float) -> list[str]:
-        length = self._nucleation_length(steepest_rate)
+        length = self.nucleation_length_of(steepest_rate)
         resolution = length / self.interface.spacing
         if resolution >= FEWEST_NODES:
             return []
@@ -110,7 +111,7 @@ class Problem:
 
     def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self._nucleation_length(float(rows.weakening_rate.max())) / rows.spacing
+        resolution = self.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
         if resolution < enough:
             warnings.warn(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"

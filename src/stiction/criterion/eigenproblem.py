@@ -1,0 +1,100 @@
+"""The Uenishi-Rice eigenproblem: the slip-rate profile of a patch that is about to run away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.special import jv
+
+Array = NDArray[np.float64]
+
+TERMS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Weight:
+    """An even weight g on [-1, 1] with unit integral, g(cos t) = sum over odd m of b_m sin(m t).
+
+    Attributes
+    ----------
+    sine : (M,) array
+        b_1, b_2, b_3, ... (even ones zero).
+    """
+
+    sine: Array
+
+    def at(self, s: Array) -> Array:
+        """g(s) for |s| <= 1, zero outside."""
+        inside = np.abs(s) <= 1.0
+        t = np.arccos(np.where(inside, s, 0.0))
+        m = np.arange(1, self.sine.size + 1)
+        value: Array = np.tensordot(self.sine, np.sin(np.multiply.outer(m, t)), axes=1)
+        return np.where(inside, value, 0.0)
+
+    def multiplier(self, z: Array) -> Array:
+        """Fourier transform of g at z = |k| h_n/2: what a moving average does to a cosine.
+
+        The integral of sin(m t) cos(z cos t) sin t over [0, pi] is
+        pi m (-1)^((m-1)/2) J_m(z)/z for odd m.
+        """
+        z = np.asarray(z, dtype=np.float64)
+        safe = np.where(z == 0.0, 1.0, z)
+        m = np.arange(1, self.sine.size + 1, 2)
+        factor = np.pi * self.sine[m - 1] * m * (-1.0) ** ((m - 1) // 2)
+        value: Array = np.tensordot(factor, jv(m[:, None], safe.ravel()), axes=1)
+        return np.where(z == 0.0, 1.0, value.reshape(z.shape) / safe)
+
+    @property
+    def second_moment(self) -> float:
+        """Integral of s^2 g over [-1, 1]; its half in units of (h_n/2)^2 corrects a smooth dip."""
+        a1 = self.sine[0]
+        a3 = self.sine[2] if self.sine.size > 2 else 0.0
+        # s^2 sin t = cos^2 t sin t = (sin t + sin 3t)/4
+        return float(np.pi / 8.0 * (a1 + a3))
+
+
+@lru_cache(maxsize=4)
+def eigenvalues_and_vector(terms: int = TERMS) -> tuple[float, Array]:
+    """Smallest eigenvalue lambda_0 and its eigenvector a_1, a_2, ... with a_1 = 1.
+
+    Uenishi and Rice (2003): a patch of half-length a is critical at a W/G* = lambda_0, with
+    v(cos t) = sum_k a_k sin(k t) and the Galerkin matrices A = diag(pi k/4) and
+    B_jk = (I(j-k) - I(j+k))/2, I(m) = 2/(1-m^2) for even m, 0 for odd.
+    """
+    k = np.arange(1, terms + 1)
+
+    def integral(m: NDArray[np.int64]) -> Array:
+        return np.where(m % 2 == 0, 2.0 / np.where(m % 2 == 0, 1.0 - m * m, 1.0), 0.0)
+
+    a = np.diag(np.pi * k / 4.0)
+    b = 0.5 * (integral(k[:, None] - k[None, :]) - integral(k[:, None] + k[None, :]))
+    # B is well conditioned only on the low end that matters; solve for 1/lambda instead.
+    inverse, vectors = scipy.linalg.eigh(b, a)
+    vector = vectors[:, -1] / vectors[0, -1]
+    vector[1::2] = 0.0  # the first eigenfunction is even
+    vector.flags.writeable = False
+    return float(1.0 / inverse[-1]), vector
+
+
+@lru_cache(maxsize=1)
+def exact_weight() -> Weight:
+    """g_0 = v_0 / integral of v_0, from the exact eigenfunction (Uenishi and Rice, 2003)."""
+    _, vector = eigenvalues_and_vector()
+    # The integral of sin(k t) sin t over [0, pi] is pi/2 for k = 1, else 0.
+    return Weight(vector * (2.0 / np.pi))
+
+
+@lru_cache(maxsize=1)
+def rounded_weight() -> Weight:
+    """The printed approximation 0.751 (0.925 - 0.308 s^2) sqrt(1-s^2), whose integral is 1.00036.
+
+    Uenishi and Rice (2003, Eq. 11), used by Albertini et al. (2020, Eq. 9).
+    """
+    sine = np.zeros(3)
+    sine[0] = 0.751 * (0.925 - 0.308 / 4.0)
+    sine[2] = -0.751 * 0.308 / 4.0
+    return Weight(sine)

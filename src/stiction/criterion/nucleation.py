@@ -1,0 +1,105 @@
+"""Nucleation stress: the load at which a critical patch centred at x would run away."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
+from stiction.criterion.moving_average import average_rows
+from stiction.errors import InputError
+from stiction.problem import Problem
+from stiction.rows import Rows
+
+Array = NDArray[np.float64]
+Weights = Literal["exact", "rounded"]
+
+
+def weight_of(weights: Weights) -> Weight:
+    """The exact weight or the printed, rounded one."""
+    if weights not in ("exact", "rounded"):
+        raise InputError(f"weights: must be 'exact' or 'rounded', got {weights!r}")
+    return exact_weight() if weights == "exact" else rounded_weight()
+
+
+def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights = "exact") -> Array:
+    """What the moving average over h_n does to each wavenumber, shape (nodes//2 + 1,)."""
+    return _multiplier(problem, nucleation_length, weights)
+
+
+def _multiplier(problem: Problem, length: float, weights: Weights) -> Array:
+    if length > problem.interface.length:
+        raise InputError(
+            f"interface.length: the nucleation length {length:.4g} m is longer than the interface"
+            f" ({problem.interface.length:.4g} m); the local criterion does not hold there, use"
+            " st.Equilibrium() or st.Rupture()"
+        )
+    weight = weight_of(weights)
+    multiplier = weight.multiplier(problem.interface.wavenumbers * length / 2.0)
+    if weights == "rounded":  # its integral is not 1
+        multiplier[0] = np.pi / 2.0 * weight.sine[0]
+    return np.ascontiguousarray(multiplier)
+
+
+def uniform_rates(rows: Rows) -> Array:
+    """W of each sample, shape (samples,), or an `InputError` where it varies along the interface."""
+    if not rows.uniform_weakening:
+        raise InputError(
+            "weakening_rate: varies along the interface, so there is no single nucleation length;"
+            " the local criterion does not hold, use st.Equilibrium() or st.Rupture()"
+        )
+    return np.ascontiguousarray(rows.weakening_rate[:, 0])
+
+
+def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact") -> Array:
+    """Nucleation stress tau_n(x) of strength profiles.
+
+    The load tau_0 at which a patch of length h_n centred at x becomes unstable, if it were alone:
+    the average of tau_p - tau_i over h_n with the weight of the critical slip-rate profile, over
+    the same average of the load profile (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020,
+    Eq. 9).
+
+    Parameters
+    ----------
+    problem : Problem
+        With a weakening rate uniform along the interface.
+    tau_p : (samples, nodes) or (nodes,) array
+        Peak strength, Pa.
+    weights : {"exact", "rounded"}
+        The exact eigenfunction, or the paper's 0.751 (0.925 - 0.308 s^2) sqrt(1 - s^2), which is
+        too high by 0.036 %.
+
+    Returns
+    -------
+    (samples, nodes) or (nodes,) array, Pa
+
+    Raises
+    ------
+    InputError
+        If the profile does not fit the problem, the weakening rate varies along the interface, or
+        h_n is longer than the interface.
+    """
+    rows = problem.rows(tau_p)
+    if problem.friction.weakening_rate is None:
+        rate = float(uniform_rates(rows)[0])
+        if np.ptp(rows.weakening_rate) > 0.0:
+            raise InputError("weakening_rate: differs between samples; pass them one by one")
+    else:
+        uniform_rates(rows)
+        rate = float(rows.weakening_rate[0, 0])
+    multiplier = _multiplier(problem, problem.nucleation_length_of(rate), weights)
+    excess = np.ascontiguousarray(rows.strength - rows.initial_stress)
+    result = np.empty_like(excess)
+    average_rows(excess, multiplier, result)
+    result /= averaged_load(rows, multiplier)
+    return result[0] if np.ndim(tau_p) == 1 else result
+
+
+def averaged_load(rows: Rows, multiplier: Array) -> Array:
+    """<g, p> at every node, with a weight of unit integral, shape (nodes,)."""
+    average = np.empty((1, rows.nodes))
+    profile = rows.load_profile[None, :]
+    average_rows(np.ascontiguousarray(profile), multiplier / multiplier[0], average)
+    return average[0]

@@ -1,0 +1,156 @@
+"""The discrete local criterion: the lowest window that is unstable by itself bounds the onset.
+
+A window of w nodes is unstable if the smallest eigenvalue of its block of K is at most the weakening
+rate in it. The eigenvector y is positive, A y <= 0, so <s, y>/<p, y> bounds the critical load from
+above: the grid's form of the criterion of Uenishi and Rice (2003), and strict on the grid.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from stiction._jit import jit
+from stiction.equilibrium.stiffness import stiffness_column
+
+Array = NDArray[np.float64]
+
+GROWTH = 1.04
+"""Ratio of successive widths tried where the weakening rate varies."""
+
+
+@functools.lru_cache(maxsize=512)
+def window_mode(nodes: int, width: int) -> tuple[float, Array]:
+    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector.
+
+    Parameters
+    ----------
+    nodes, width : int
+        Nodes of the interface and of the window.
+    """
+    block = scipy.linalg.toeplitz(stiffness_column(nodes, np.pi, 1.0)[:width])
+    values, vectors = scipy.linalg.eigh(block, subset_by_index=[0, 0])
+    mode = np.abs(vectors[:, 0])
+    mode /= mode.sum()
+    mode.flags.writeable = False
+    return float(values[0]), mode
+
+
+def smallest_window(nodes: int, rate: float) -> int | None:
+    """Fewest nodes that are unstable by themselves at a weakening rate, or None.
+
+    Parameters
+    ----------
+    nodes : int
+    rate : float
+        W in units of (G*/2)(2 pi/L).
+    """
+    # Continuum estimate: h_n/L = lambda_0 (2 G*/W)/L, here 1.158/(2 pi rate) of n nodes times 2.
+    guess = int(np.clip(0.3685 / rate * nodes, 1, nodes - 1))
+    low, high = 0, nodes  # width `low` is stable; `high` is unstable or the whole interface
+    step = 1
+    width = guess
+    while high - low > 1:
+        if window_mode(nodes, width)[0] <= rate:
+            high = width
+            width = max(low + 1, width - step)
+        else:
+            low = width
+            width = min(high - 1, width + step)
+        if low > 0 and high < nodes:
+            width = (low + high) // 2
+        step *= 2
+    return high if high < nodes else None
+
+
+@functools.lru_cache(maxsize=64)
+def window_table(nodes: int, lowest: float, highest: float) -> tuple[Array, NDArray[np.int64], Array]:
+    """Windows for weakening rates between two values: thresholds, widths, padded eigenvectors.
+
+    Returns
+    -------
+    thresholds : (count,) array
+        Rate, in units of (G*/2)(2 pi/L), from which on each window is unstable, falling.
+    widths : (count,) int array
+        Rising.
+    modes : (count, max(widths)) array
+        Eigenvectors of unit sum, zero beyond their width. No rows if no window is unstable.
+    """
+    first = smallest_window(nodes, highest)
+    if first is None:
+        return np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 1))
+    widths = [first]
+    while window_mode(nodes, widths[-1])[0] > lowest:
+        widest = max(widths[-1] + 1, int(widths[-1] * GROWTH))
+        if widest > nodes // 2:
+            break
+        widths.append(widest)
+    modes = np.zeros((len(widths), widths[-1]))
+    for i, width in enumerate(widths):
+        modes[i, :width] = window_mode(nodes, width)[1]
+    thresholds = np.array([window_mode(nodes, width)[0] for width in widths])
+    return thresholds, np.array(widths, dtype=np.int64), modes
+
+
+@jit
+def window_bound(excess, profile, rate, uniform, thresholds, widths, modes, work):
+    """Lowest bound over all windows and the uniform field.
+
+    Parameters
+    ----------
+    excess, profile, rate : (n,) arrays
+        tau_p - tau_i (Pa), load profile, weakening rate (Pa/m).
+    uniform : bool
+        Whether the rate is the same everywhere.
+    thresholds : (count,) array
+        As from `window_table`, times (G*/2)(2 pi/L): Pa/m.
+    widths, modes : arrays
+        From `window_table`.
+    work : (2, n) array
+
+    Returns
+    -------
+    bound, start, choice : float, int, int
+        Load (Pa), first node of the window, and row of the table; row -1 is the uniform field.
+    """
+    n = excess.shape[0]
+    best = excess.sum() / profile.sum()
+    start = 0
+    choice = -1
+    for c in range(thresholds.shape[0]):
+        width = widths[c]
+        above = work[0]
+        below = work[1]
+        above[:] = 0.0
+        below[:] = 0.0
+        for q in range(width):
+            z = modes[c, q]
+            shift = q % n
+            for a in range(n - shift):
+                above[a] += z * excess[a + shift]
+                below[a] += z * profile[a + shift]
+            for a in range(n - shift, n):
+                above[a] += z * excess[a + shift - n]
+                below[a] += z * profile[a + shift - n]
+        if uniform:
+            for a in range(n):
+                if above[a] < best * below[a]:
+                    best = above[a] / below[a]
+                    start = a
+                    choice = c
+            continue
+        # Last node of the current stretch in which every node weakens fast enough.
+        length = 0
+        for q in range(2 * n):
+            node = q if q < n else q - n
+            length = length + 1 if rate[node] >= thresholds[c] else 0
+            if length >= width and q >= width - 1:
+                a = (q - width + 1) % n
+                if above[a] < best * below[a]:
+                    best = above[a] / below[a]
+                    start = a
+                    choice = c
+    return best, start, choice

@@ -1,0 +1,97 @@
+"""The static stiffness K on the grid: its first column in closed form, its product with a slip.
+
+K is the circulant matrix of the symbol (G*/2)|k|. For an even number of nodes n its entries are
+
+    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,   0 for even j,
+
+so that nodes of one parity act on those of the other only: half of each product can be left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._jit import jit
+from stiction.equilibrium._compile import jit_sums
+
+
+def stiffness_column(nodes: int, length: float, modulus: float) -> NDArray[np.float64]:
+    """First column of K, shape (nodes,), Pa/m.
+
+    Parameters
+    ----------
+    nodes : int
+        Even number of nodes.
+    length : float
+        Period, m.
+    modulus : float
+        Effective modulus G*, Pa.
+    """
+    scale = np.pi * modulus / length
+    column = np.zeros(nodes)
+    odd = np.arange(1, nodes, 2)
+    column[odd] = -scale / (nodes * np.sin(np.pi * np.minimum(odd, nodes - odd) / nodes) ** 2)
+    column[0] = -column[odd].sum()  # equals scale * nodes / 4; this way a uniform slip is free
+    return column
+
+
+def coupling_strip(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Odd entries of K's first column, three times over, for products without index arithmetic."""
+    return np.ascontiguousarray(np.tile(column[1::2], 3))
+
+
+@jit_sums
+def _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3):
+    a = strip[p0 : p0 + half]
+    b = strip[p1 : p1 + half]
+    c = strip[p2 : p2 + half]
+    d = strip[p3 : p3 + half]
+    for q in range(half):
+        target[q] += z0 * a[q] + z1 * b[q] + z2 * c[q] + z3 * d[q]
+
+
+@jit
+def apply_stiffness(strip, own, members, size, values, halves, result):
+    """K times a field that vanishes off the members, at all nodes.
+
+    Parameters
+    ----------
+    strip : (3 n/2,) array
+        From `coupling_strip`.
+    own : float
+        K_0.
+    members, size : (n,) int array and int
+        Where the field is not zero.
+    values : (>= size,) array
+        The field there, in the same order.
+    halves : (2, n/2) array, work space
+    result : (n,) array, output
+    """
+    half = halves.shape[1]
+    halves[:] = 0.0
+    for parity in range(2):
+        # Sources of this parity act on targets of the other one.
+        target = halves[1 - parity]
+        held = 0
+        p0 = p1 = p2 = p3 = 0
+        z0 = z1 = z2 = z3 = 0.0
+        for t in range(size):
+            node = members[t]
+            if (node & 1) != parity or values[t] == 0.0:
+                continue
+            # Target q of the other parity lies at odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
+            p0, p1, p2, p3 = half - (node >> 1) - parity, p0, p1, p2
+            z0, z1, z2, z3 = values[t], z0, z1, z2
+            held += 1
+            if held == 4:
+                _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3)
+                held = 0
+                z0 = z1 = z2 = z3 = 0.0
+        if held > 0:
+            _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3)
+    for q in range(half):
+        result[2 * q] = halves[0, q]
+        result[2 * q + 1] = halves[1, q]
+    for t in range(size):
+        result[members[t]] += own * values[t]

@@ -1,0 +1,1 @@
+"""Random fields: marginal distributions, spectra and the sampler."""

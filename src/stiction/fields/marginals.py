@@ -1,0 +1,184 @@
+"""Marginal distributions: how strength is distributed at a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
+from scipy.special import ndtr
+
+from stiction._model import Positive, Real, model
+from stiction.errors import InputError, unknown_name
+
+Array = NDArray[np.float64]
+
+
+@model
+class Beta:
+    """Beta distribution on [low, high].
+
+    Parameters
+    ----------
+    alpha, beta : float
+        Shape parameters, positive.
+    low, high : float
+        Bounds, Pa, low < high.
+
+    Raises
+    ------
+    InputError
+        If a shape is not positive or the bounds are not in order.
+    """
+
+    alpha: Positive
+    beta: Positive
+    low: Real
+    high: Real
+    type: Literal["beta"] = "beta"
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Beta:
+        if not self.low < self.high:
+            raise InputError(f"low must be below high, got low={self.low:g}, high={self.high:g}")
+        return self
+
+    @property
+    def distribution(self) -> Any:
+        """The same as a frozen `scipy.stats` distribution."""
+        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
+
+
+@dataclass(frozen=True)
+class ScipyMarginal:
+    """A continuous `scipy.stats` distribution, known by name and parameters.
+
+    Attributes
+    ----------
+    type : str
+        scipy's name.
+    parameters : tuple of (str, float)
+        Shapes, loc and scale that were given.
+    """
+
+    type: str
+    parameters: tuple[tuple[str, float], ...]
+
+    @cached_property
+    def distribution(self) -> Any:
+        """The frozen distribution."""
+        return getattr(scipy.stats, self.type)(**dict(self.parameters))
+
+
+def _continuous_names() -> list[str]:
+    return [
+        name
+        for name in dir(scipy.stats)
+        if isinstance(getattr(scipy.stats, name), scipy.stats.rv_continuous)
+    ]
+
+
+def _parameter_names(family: Any) -> list[str]:
+    shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
+    return [*shapes, "loc", "scale"]
+
+
+def _scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
+    names = _continuous_names()
+    if name not in names:
+        valid = ["beta", "lognorm", "weibull_min", "gamma", "truncnorm", "uniform", "norm"]
+        text = unknown_name("type", name, names).split(" (valid:")[0]
+        raise InputError(f"{text} (valid: {', '.join(valid)} and scipy.stats' other continuous)")
+    known = _parameter_names(getattr(scipy.stats, name))
+    problems = [unknown_name(name, key, known) for key in parameters if key not in known]
+    problems += [
+        f"{name}.{key}: missing" for key in known[:-2] if key not in parameters and not problems
+    ]
+    for key, value in parameters.items():
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not number or not np.isfinite(value):
+            problems.append(f"{name}.{key}: must be a finite number, got {value!r}")
+    if problems:
+        raise InputError(problems)
+    result = ScipyMarginal(name, tuple((k, float(v)) for k, v in parameters.items()))
+    mean, deviation = result.distribution.mean(), result.distribution.std()
+    if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
+        raise InputError(
+            f"{name}: must have a finite mean and a positive, finite standard deviation,"
+            f" got {mean:g} and {deviation:g} from {parameters}"
+        )
+    return result
+
+
+def _marginal(value: Any) -> Any:
+    if isinstance(value, Beta | ScipyMarginal):
+        return value
+    if isinstance(value, dict):
+        given = dict(value)
+        name = given.pop("type", None)
+        if name is None:
+            raise InputError("type: missing; name a distribution, such as type = 'beta'")
+        if name == "beta" and not {"a", "b"} & set(given):
+            return Beta(**given)
+        return _scipy_marginal(str(name), given)
+    family = getattr(value, "dist", None)
+    if not isinstance(family, scipy.stats.rv_continuous):
+        raise InputError(
+            "must be st.Beta(...) or a frozen continuous scipy.stats distribution such as"
+            f" scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
+        )
+    parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
+    return _scipy_marginal(family.name, parameters)
+
+
+def _serialise(value: Any) -> Any:
+    if isinstance(value, Beta):
+        keys = ("alpha", "beta", "low", "high", "type")
+        return {key: getattr(value, key) for key in keys}
+    return {"type": value.type, **dict(value.parameters)}
+
+
+Marginal: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_marginal),
+    PlainSerializer(_serialise),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "description": "type = 'beta' with alpha, beta, low, high; or the name of a continuous"
+            " scipy.stats distribution with its shapes, loc and scale",
+            "properties": {"type": {"type": "string"}},
+            "required": ["type"],
+        }
+    ),
+]
+"""`Beta`, or any frozen continuous `scipy.stats` distribution."""
+
+
+def quantile_of_normal(distribution: Any, z: Array) -> Array:
+    """F^-1(Phi(z)) by scipy, through the survival function above the median.
+
+    Parameters
+    ----------
+    distribution : frozen scipy.stats distribution
+    z : array
+
+    Returns
+    -------
+    array of the shape of `z`
+
+    Notes
+    -----
+    Grigoriu (1995): translation process. Phi(z) rounds to 1 long before z = 8; the upper tail
+    keeps its digits only through 1 - Phi(z) = Phi(-z).
+    """
+    z = np.asarray(z, dtype=np.float64)
+    tail = ndtr(-np.abs(z))
+    lower = distribution.ppf(np.where(z < 0.0, tail, 0.5))
+    upper = distribution.isf(np.where(z < 0.0, 0.5, tail))
+    result: Array = np.where(z < 0.0, lower, upper)
+    return result

@@ -1,0 +1,341 @@
+"""Power spectral densities of the underlying Gaussian field.
+
+A spectrum is known by its density g(k), its correlation on an infinite line and the wavenumber at
+which it is truncated. Truncation is given as a multiple of lambda = 2 pi/xi_0 (`truncation`) or
+as the share of the power that is kept (`power_kept`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import betainc, betaincinv, erf, erfinv, gamma, kv
+
+from stiction._model import Positive, _number, model
+from stiction.errors import InputError
+
+Array = NDArray[np.float64]
+Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
+
+
+def _one_truncation(truncation: float | None, power_kept: float | None) -> None:
+    if truncation is not None and power_kept is not None:
+        raise InputError("give truncation or power_kept, not both")
+
+
+class _Spectrum:
+    """What all spectra share; a subclass gives g(k), its cumulative power and its correlation."""
+
+    def density(self, wavenumber: Array) -> Array:
+        """g(k)/g(0) at k in rad/m, an array of the same shape."""
+        raise NotImplementedError
+
+    def power_within(self, wavenumber: float) -> float:
+        """Share of the power at wavenumbers below `wavenumber` (rad/m), on an infinite line."""
+        raise NotImplementedError
+
+    def correlation(self, lag: Array) -> Array:
+        """Correlation of z at `lag` (m), on an infinite line and without truncation."""
+        raise NotImplementedError
+
+    @property
+    def cutoff(self) -> float:
+        """Wavenumber above which the spectrum is truncated, rad/m."""
+        raise NotImplementedError
+
+    @property
+    def power_kept_by_truncation(self) -> float:
+        """Share of the power that truncation keeps, on an infinite line."""
+        return self.power_within(self.cutoff)
+
+    @property
+    def efolding_length(self) -> float:
+        """Distance at which the correlation of z has fallen to 1/e, m, on an infinite line."""
+        reach = 2.0 * math.pi / self._power_quantile(0.5)
+
+        def excess(lag: float) -> float:
+            return float(self.correlation(np.array([lag]))[0]) - math.exp(-1.0)
+
+        while excess(reach) > 0.0:
+            reach *= 2.0
+        root: float = brentq(excess, 0.0, reach, rtol=1e-14)
+        return root
+
+    def _power_quantile(self, share: float) -> float:
+        upper = 1.0
+        while self.power_within(upper) < share:
+            upper *= 2.0
+        root: float = brentq(lambda k: self.power_within(k) - share, 0.0, upper, rtol=1e-12)
+        return root
+
+
+class _ScaledSpectrum(_Spectrum):
+    """Spectra known by one length; g depends on k times it only."""
+
+    correlation_length: float
+    truncation: float | None
+    power_kept: float | None
+
+    @property
+    def cutoff(self) -> float:
+        """Wavenumber above which the spectrum is truncated, rad/m."""
+        if self.truncation is not None:
+            return self.truncation * 2.0 * math.pi / self.correlation_length
+        return self._power_quantile(0.9997 if self.power_kept is None else self.power_kept)
+
+    def with_correlation_length(self, correlation_length: float) -> Any:
+        """The same spectrum with another `correlation_length` (m)."""
+        import dataclasses
+
+        return dataclasses.replace(self, correlation_length=correlation_length)  # type: ignore[type-var]  # every subclass is a dataclass
+
+    def with_efolding_length(self, length: float) -> Any:
+        """The same shape of spectrum whose correlation of z falls to 1/e at `length` (m)."""
+        return self.with_correlation_length(self.correlation_length * length / self.efolding_length)
+
+
+@model
+class PowerLawSpectrum(_ScaledSpectrum):
+    """g(k) ~ (k^2 + lambda^2)^-exponent, lambda = 2 pi/correlation_length.
+
+    Parameters
+    ----------
+    correlation_length : float
+        xi_0 = 2 pi/lambda, m.
+    exponent : float
+        Above 1/2; 4 in Albertini et al. (2020, Eq. 4).
+    truncation : float, optional
+        Truncation in multiples of lambda; 2.5 if neither this nor `power_kept` is given.
+    power_kept : float, optional
+        Share of the power kept by truncation, in (0, 1).
+
+    Notes
+    -----
+    On an infinite line this is a Matern covariance of smoothness exponent - 1/2.
+    """
+
+    correlation_length: Positive
+    exponent: Annotated[float, BeforeValidator(_number), Field(gt=0.5, allow_inf_nan=False)] = 4.0
+    truncation: Positive | None = None
+    power_kept: Share | None = None
+    type: Literal["power_law"] = "power_law"
+
+    @model_validator(mode="after")
+    def _truncated_once(self) -> PowerLawSpectrum:
+        _one_truncation(self.truncation, self.power_kept)
+        if self.truncation is None and self.power_kept is None:
+            object.__setattr__(self, "truncation", 2.5)
+        return self
+
+    @property
+    def cutoff_wavenumber(self) -> float:
+        """lambda = 2 pi/xi_0, rad/m: the density falls as a power law above it."""
+        return 2.0 * math.pi / self.correlation_length
+
+    def density(self, wavenumber: Array) -> Array:
+        """g(k)/g(0) at k in rad/m."""
+        ratio = np.asarray(wavenumber) / self.cutoff_wavenumber
+        result: Array = (1.0 + ratio * ratio) ** -self.exponent
+        return result
+
+    def power_within(self, wavenumber: float) -> float:
+        """Share of the power below `wavenumber`: an incomplete beta function of k^2/(k^2+lambda^2)."""
+        ratio = (wavenumber / self.cutoff_wavenumber) ** 2
+        return float(betainc(0.5, self.exponent - 0.5, ratio / (1.0 + ratio)))
+
+    def _power_quantile(self, share: float) -> float:
+        t = float(betaincinv(0.5, self.exponent - 0.5, share))
+        return self.cutoff_wavenumber * math.sqrt(t / (1.0 - t))
+
+    def correlation(self, lag: Array) -> Array:
+        """Matern correlation at `lag` (m), on an infinite line."""
+        smoothness = self.exponent - 0.5
+        a = np.maximum(np.abs(np.asarray(lag)) * self.cutoff_wavenumber, 1e-12)
+        value = 2.0 ** (1.0 - smoothness) / gamma(smoothness) * a**smoothness * kv(smoothness, a)
+        return np.where(a <= 1e-12, 1.0, value)
+
+
+@model
+class SquaredExponentialSpectrum(_ScaledSpectrum):
+    """Correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
+
+    Parameters
+    ----------
+    correlation_length : float
+        xi_0, m: here the correlation of z is 1/e at xi_0.
+    truncation : float, optional
+        Truncation in multiples of 2 pi/xi_0.
+    power_kept : float, optional
+        Share of the power kept by truncation; 0.9997 if neither is given.
+    """
+
+    correlation_length: Positive
+    truncation: Positive | None = None
+    power_kept: Share | None = None
+    type: Literal["squared_exponential"] = "squared_exponential"
+
+    @model_validator(mode="after")
+    def _truncated_once(self) -> SquaredExponentialSpectrum:
+        _one_truncation(self.truncation, self.power_kept)
+        return self
+
+    def density(self, wavenumber: Array) -> Array:
+        """g(k)/g(0) at k in rad/m."""
+        result: Array = np.exp(-((np.asarray(wavenumber) * self.correlation_length / 2.0) ** 2))
+        return result
+
+    def power_within(self, wavenumber: float) -> float:
+        """Share of the power below `wavenumber`."""
+        return float(erf(wavenumber * self.correlation_length / 2.0))
+
+    def _power_quantile(self, share: float) -> float:
+        return 2.0 / self.correlation_length * float(erfinv(share))
+
+    def correlation(self, lag: Array) -> Array:
+        """exp(-(lag/xi_0)^2)."""
+        result: Array = np.exp(-((np.asarray(lag) / self.correlation_length) ** 2))
+        return result
+
+
+@model
+class ExponentialSpectrum(_ScaledSpectrum):
+    """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
+
+    Parameters
+    ----------
+    correlation_length : float
+        xi_0, m: here the correlation of z is 1/e at xi_0.
+    truncation : float, optional
+        Truncation in multiples of 2 pi/xi_0.
+    power_kept : float, optional
+        Share of the power kept by truncation; 0.99 if neither is given, since the spectrum
+        falls slowly and every further nine takes ten times as many modes.
+    """
+
+    correlation_length: Positive
+    truncation: Positive | None = None
+    power_kept: Share | None = None
+    type: Literal["exponential"] = "exponential"
+
+    @model_validator(mode="after")
+    def _truncated_once(self) -> ExponentialSpectrum:
+        _one_truncation(self.truncation, self.power_kept)
+        if self.truncation is None and self.power_kept is None:
+            object.__setattr__(self, "power_kept", 0.99)
+        return self
+
+    def density(self, wavenumber: Array) -> Array:
+        """g(k)/g(0) at k in rad/m."""
+        result: Array = 1.0 / (1.0 + (np.asarray(wavenumber) * self.correlation_length) ** 2)
+        return result
+
+    def power_within(self, wavenumber: float) -> float:
+        """Share of the power below `wavenumber`."""
+        return 2.0 / math.pi * math.atan(wavenumber * self.correlation_length)
+
+    def _power_quantile(self, share: float) -> float:
+        return math.tan(share * math.pi / 2.0) / self.correlation_length
+
+    def correlation(self, lag: Array) -> Array:
+        """exp(-|lag|/xi_0)."""
+        result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
+        return result
+
+
+@model
+class CustomSpectrum(_Spectrum):
+    """A spectrum of your own: any g(k), up to a factor.
+
+    Parameters
+    ----------
+    function : callable
+        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative, integrable.
+    max_wavenumber : float, optional
+        Truncation, rad/m; by `power_kept` if left out.
+    power_kept : float, optional
+        Share of the power kept by truncation; 0.9997 if neither is given.
+
+    Notes
+    -----
+    For Python only: a study with a function of your own cannot be written to a file.
+    """
+
+    function: Callable[[Any], Any]
+    max_wavenumber: Positive | None = None
+    power_kept: Share | None = None
+    type: Literal["custom"] = "custom"
+
+    @model_validator(mode="after")
+    def _is_a_density(self) -> CustomSpectrum:
+        if self.max_wavenumber is not None and self.power_kept is not None:
+            raise InputError("give max_wavenumber or power_kept, not both")
+        probe = np.geomspace(1e-3, 1e6, 64)
+        try:
+            values = np.asarray(self.function(probe), dtype=np.float64)
+        except Exception as error:
+            raise InputError(f"function: fails on an array of wavenumbers: {error!r}") from None
+        if values.shape != probe.shape or not np.all(np.isfinite(values)) or values.min() < 0.0:
+            raise InputError("function: must map (m,) wavenumbers to (m,) finite values >= 0")
+        if not 0.0 < self._total < np.inf:
+            raise InputError("function: its integral over wavenumbers must be positive and finite")
+        return self
+
+    def _integral(self, upper: float) -> float:
+        # Decade by decade: adaptive quadrature over the half-line misses narrow peaks.
+        edges = [0.0, *[e for e in np.geomspace(1e-6, 1e12, 73) if e < upper], upper]
+        parts = (
+            quad(lambda k: float(self.function(np.array([k]))[0]), a, b, epsabs=0.0)[0]
+            for a, b in zip(edges[:-1], edges[1:], strict=True)
+        )
+        return float(sum(parts))
+
+    @property
+    def _total(self) -> float:
+        return self._integral(1e12)
+
+    def density(self, wavenumber: Array) -> Array:
+        """g(k) at k in rad/m, up to a factor."""
+        return np.asarray(self.function(np.asarray(wavenumber)), dtype=np.float64)
+
+    def power_within(self, wavenumber: float) -> float:
+        """Share of the power below `wavenumber`, by quadrature."""
+        return self._integral(wavenumber) / self._total
+
+    @property
+    def cutoff(self) -> float:
+        """Wavenumber above which the spectrum is truncated, rad/m."""
+        if self.max_wavenumber is not None:
+            return self.max_wavenumber
+        return self._power_quantile(0.9997 if self.power_kept is None else self.power_kept)
+
+    def correlation(self, lag: Array) -> Array:
+        """Correlation of z at `lag` (m): the cosine transform of g up to the cutoff."""
+        k = np.linspace(0.0, self.cutoff, 20001)
+        weight = self.density(k)
+        weight[[0, -1]] *= 0.5
+        lags = np.atleast_1d(np.asarray(lag, dtype=np.float64))
+        value = np.array([np.sum(weight * np.cos(k * x)) for x in lags]) / weight.sum()
+        return value.reshape(np.shape(lag))
+
+
+def _as_spectrum(value: Any) -> Any:
+    if callable(value) and not isinstance(value, _Spectrum):
+        return CustomSpectrum(function=value)
+    return value
+
+
+Spectrum: TypeAlias = Annotated[
+    Annotated[
+        PowerLawSpectrum | SquaredExponentialSpectrum | ExponentialSpectrum | CustomSpectrum,
+        Field(discriminator="type"),
+    ],
+    BeforeValidator(_as_spectrum),
+]
+"""Any of the spectra above, or a function g(k)."""
