@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 __version__ = "0.1.0"
 
@@ -14,29 +14,24 @@ _HOMES = {
     "SlipWeakening": "friction",
     "Load": "load",
     "Problem": "problem",
-    "InputError": "errors",
-    "AccuracyWarning": "errors",
-    "LocalCriterion": "criterion.method",
-    "nucleation_stress": "criterion.nucleation",
-    "onset": "methods",
     "RandomField": "fields.random_field",
     "Beta": "fields.marginals",
     "PowerLawSpectrum": "fields.spectra",
     "SquaredExponentialSpectrum": "fields.spectra",
     "ExponentialSpectrum": "fields.spectra",
     "CustomSpectrum": "fields.spectra",
+    "LocalCriterion": "criterion.method",
+    "nucleation_stress": "criterion.nucleation",
+    "onset": "methods",
+    "monte_carlo": "ensemble.run",
+    "Ensemble": "study",
+    "Study": "study",
+    "InputError": "errors",
+    "AccuracyWarning": "errors",
 }
 _MODULES = ("paper",)
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
-
-if TYPE_CHECKING:
-    from stiction.errors import AccuracyWarning, InputError
-    from stiction.friction import SlipWeakening
-    from stiction.interface import Interface
-    from stiction.load import Load
-    from stiction.problem import Problem
-    from stiction.solid import Solid
 
 
 def __getattr__(name: str) -> Any:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transf
 
 import numpy as np
 import pydantic
+import pydantic_core
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
@@ -149,6 +150,11 @@ def explain(error: pydantic.ValidationError, cls: type, root: str = "") -> list[
         elif kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_argument"):
             owner, _, key = path.rpartition(".")
             texts.append(unknown_name(owner or cls.__name__, key, valid))
+        elif kind == "union_tag_invalid":
+            tags = [tag.strip("' ") for tag in item["ctx"]["expected_tags"].split(",")]
+            texts.append(unknown_name(f"{path}.type", str(item["ctx"]["tag"]), tags))
+        elif kind == "union_tag_not_found":
+            texts.append(f"{path}.type: missing, got {describe(given)}")
         elif kind == "value_error":
             nested = (item.get("ctx") or {}).get("error")
             if isinstance(nested, InputError):
@@ -214,8 +220,18 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
 
 def to_plain(value: Any) -> Any:
-    """The object as plain dicts, lists and numbers: what TOML and JSON hold."""
-    return pydantic.TypeAdapter(type(value)).dump_python(value, mode="json", exclude_none=True)
+    """The object as plain dicts, lists and numbers: what TOML and JSON hold.
+
+    Raises
+    ------
+    InputError
+        If something in it exists in Python only, such as a function.
+    """
+    try:
+        return pydantic.TypeAdapter(type(value)).dump_python(value, mode="json", exclude_none=True)
+    except pydantic_core.PydanticSerializationError as error:
+        reason = str(error).removeprefix("Error calling function ").split(": ", 1)[-1]
+        raise InputError(f"{type(value).__name__}: cannot be written down: {reason}") from None
 
 
 Mode: TypeAlias = Literal["II", "III"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -64,9 +65,10 @@ def label(
     values: Mapping[str, NDArray[Any]],
     samples: NDArray[np.int64],
     attributes: Mapping[str, Any],
+    more_variables: Mapping[str, Variable] = MappingProxyType({}),
 ) -> xr.Dataset:
     """Values of many samples as a dataset over 'sample' (and 'x' where they have nodes)."""
-    variables = variables_of(problem, method)
+    variables = variables_of(problem, method) | dict(more_variables)
     coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
     if any("x" in variables[name].dims for name in values):
         coordinates["x"] = (problem.interface.x, POSITION)

@@ -45,7 +45,7 @@ class Problem:
     solid: Solid
     interface: Interface
     friction: SlipWeakening
-    load: Load = Load()  # noqa: RUF009 - frozen, so one default instance may be shared
+    load: Load = Load()
     mode: Mode = "II"
 
     @model_validator(mode="after")

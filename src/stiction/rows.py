@@ -84,8 +84,6 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
         raise InputError(f"{name}: must be finite; entry {where} is not")
-    if array.ndim < 2:
-        array = np.broadcast_to(array, (samples, nodes))
-    elif array.shape[1] != nodes:
+    if array.ndim < 2 or array.shape[1] != nodes:
         array = np.broadcast_to(array, (samples, nodes))
     return array

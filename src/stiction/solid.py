@@ -46,7 +46,7 @@ class Solid:
 
     @property
     def wave_speed_ratio(self) -> float:
-        """c_d/c_s of the plane state: sqrt(2 (1-nu)/(1-2 nu)) in strain, sqrt(2/(1-nu)) in stress."""
+        """c_d/c_s: sqrt(2 (1-nu)/(1-2 nu)) in plane strain, sqrt(2/(1-nu)) in plane stress."""
         nu = self.poisson_ratio
         if self.plane == "strain":
             return math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))

@@ -45,6 +45,11 @@ class LocalCriterion:
     type: Literal["local_criterion"] = "local_criterion"
 
     @property
+    def chunk_size(self) -> int:
+        """Samples that make a good piece of work in an ensemble."""
+        return 1024
+
+    @property
     def variables(self) -> dict[str, Variable]:
         """What the solver returns for each sample."""
         return dict(ONSET_VARIABLES)

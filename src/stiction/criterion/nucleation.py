@@ -44,7 +44,7 @@ def _multiplier(problem: Problem, length: float, weights: Weights) -> Array:
 
 
 def uniform_rates(rows: Rows) -> Array:
-    """W of each sample, shape (samples,), or an `InputError` where it varies along the interface."""
+    """W of each sample, shape (samples,); `InputError` where it varies along the interface."""
     if not rows.uniform_weakening:
         raise InputError(
             "weakening_rate: varies along the interface, so there is no single nucleation length;"

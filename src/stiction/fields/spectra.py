@@ -8,12 +8,14 @@ as the share of the power that is kept (`power_kept`).
 from __future__ import annotations
 
 import math
+import dataclasses
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import betainc, betaincinv, erf, erfinv, gamma, kv
@@ -92,8 +94,6 @@ class _ScaledSpectrum(_Spectrum):
 
     def with_correlation_length(self, correlation_length: float) -> Any:
         """The same spectrum with another `correlation_length` (m)."""
-        import dataclasses
-
         return dataclasses.replace(self, correlation_length=correlation_length)  # type: ignore[type-var]  # every subclass is a dataclass
 
     def with_efolding_length(self, length: float) -> Any:
@@ -146,7 +146,7 @@ class PowerLawSpectrum(_ScaledSpectrum):
         return result
 
     def power_within(self, wavenumber: float) -> float:
-        """Share of the power below `wavenumber`: an incomplete beta function of k^2/(k^2+lambda^2)."""
+        """Share of the power below `wavenumber`: an incomplete beta function."""
         ratio = (wavenumber / self.cutoff_wavenumber) ** 2
         return float(betainc(0.5, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
@@ -249,6 +249,11 @@ class ExponentialSpectrum(_ScaledSpectrum):
         return result
 
 
+def _refuse_to_write(function: Any) -> Any:
+    name = getattr(function, "__name__", repr(function))
+    raise ValueError(f"spectrum.function is the Python function {name!r}; use a named spectrum")
+
+
 @model
 class CustomSpectrum(_Spectrum):
     """A spectrum of your own: any g(k), up to a factor.
@@ -267,7 +272,7 @@ class CustomSpectrum(_Spectrum):
     For Python only: a study with a function of your own cannot be written to a file.
     """
 
-    function: Callable[[Any], Any]
+    function: Annotated[Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})]
     max_wavenumber: Positive | None = None
     power_kept: Share | None = None
     type: Literal["custom"] = "custom"
@@ -292,7 +297,7 @@ class CustomSpectrum(_Spectrum):
         edges = [0.0, *[e for e in np.geomspace(1e-6, 1e12, 73) if e < upper], upper]
         parts = (
             quad(lambda k: float(self.function(np.array([k]))[0]), a, b, epsabs=0.0)[0]
-            for a, b in zip(edges[:-1], edges[1:], strict=True)
+            for a, b in pairwise(edges)
         )
         return float(sum(parts))
 

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @jit
 def gaussian_rows(draws: Array, sigma: Array, has_mean: bool, nodes: int, out: Array) -> None:
-    """z(x_i) = sum_j sigma_j (A_j cos k_j x_i + B_j sin k_j x_i), one row of `out` a row of `draws`.
+    """z(x_i) = sum_j sigma_j (A_j cos k_j x_i + B_j sin k_j x_i), one row a sample.
 
     Modes that the grid does not resolve are folded onto those that it does: at the nodes, mode j
     and mode n - j differ by the sign of the sine only, so the values are exact whatever the grid.

@@ -1,0 +1,5 @@
+"""``python -m stiction``."""
+
+from stiction.cli.app import main
+
+main()

@@ -1,0 +1,46 @@
+"""Arguments, checks and summaries that several commands share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from stiction.errors import InputError
+
+StudyFile = Annotated[
+    Path, typer.Argument(metavar="STUDY.toml", help="Study file; `stiction schema` describes it.")
+]
+Workers = Annotated[
+    int | None, typer.Option(help="Threads; all cores by default.", show_default=False)
+]
+
+
+def writable(path: Path, what: str) -> Path:
+    """Refuse an output that cannot be written before any work is done."""
+    folder = path.absolute().parent
+    if path.is_dir():
+        raise InputError(f"--out: {path} is a folder; give a file name for {what}")
+    if not folder.is_dir():
+        raise InputError(f"--out: the folder {folder} does not exist")
+    if not os.access(folder, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+        raise InputError(f"--out: {path} cannot be written")
+    return path
+
+
+def summary(result: Any) -> str:
+    """A few lines about the onset, for people."""
+    lines = []
+    for name in ("critical_stress", "friction_coefficient"):
+        if name in result:
+            variable = result[name]
+            low, middle, high = (float(variable.quantile(q)) for q in (0.05, 0.5, 0.95))
+            scale, unit = (1e-6, "MPa") if variable.attrs["units"] == "Pa" else (1.0, "")
+            lines.append(
+                f"{name:22s} mean {float(variable.mean()) * scale:.5g} {unit},"
+                f" sd {float(variable.std()) * scale:.3g},"
+                f" 5/50/95 % {low * scale:.5g} / {middle * scale:.5g} / {high * scale:.5g}"
+            )
+    return "\n".join(lines)

@@ -1,0 +1,35 @@
+"""The command that reproduces the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiction.cli.common import Workers
+
+
+def paper(
+    out: Annotated[Path, typer.Option(help="Folder for results, figures and the report.")] = Path(
+        "stiction-paper"
+    ),
+    samples: Annotated[int, typer.Option(help="Samples for each correlation length.")] = 10_000,
+    seed: Annotated[int, typer.Option(help="Seed of the ensemble.")] = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="500 samples, for a first look.")] = False,
+    workers: Workers = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Only this figure; may be given several times.")
+    ] = None,
+) -> None:
+    """Compute the paper's statistics, draw its figures and write a report.
+
+    Albertini, Karrer, Grigoriu and Kammer (2020), Stochastic properties of static friction. Makes
+    a folder with `report.html`, `results.nc`, the figures (PNG and PDF) and the tables behind them.
+    """
+    from stiction import paper as room
+
+    report = room.run(
+        out=out, samples=samples, seed=seed, quick=quick, workers=workers, only=only, progress=True
+    )
+    typer.echo(f"report: {report}")

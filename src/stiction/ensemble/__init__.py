@@ -1,0 +1,1 @@
+"""Ensembles: which samples there are, and how they are computed."""
