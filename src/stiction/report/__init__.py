@@ -1,0 +1,1 @@
+"""Figure style, tables and the HTML report."""

@@ -1,0 +1,108 @@
+"""One look for every figure: sizes of a journal's columns, and lines that can be told in grey."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+COLUMN = 3.375
+PAGE = 6.75
+"""Widths of one column and of a page, inches."""
+
+INK = "#1a1a1a"
+QUIET = "#7a7a7a"
+PALE = "#d9d9d9"
+ACCENT = "#b5322a"
+
+# Dark to light, so that the order survives in grey; each also has its own dashes and marker.
+_SERIES: tuple[tuple[str, Any, str], ...] = (
+    ("#14213d", "-", "o"),
+    ("#2a6f97", (0, (5.0, 1.4)), "s"),
+    ("#c8553d", (0, (3.5, 1.2, 1.0, 1.2)), "^"),
+    ("#e0a030", (0, (1.2, 1.0)), "D"),
+    ("#5c8d4e", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), "v"),
+    ("#9a7fb8", (0, (2.5, 2.5)), "P"),
+)
+
+_RC: dict[str, Any] = {
+    "font.family": "serif",
+    "font.serif": ["STIXGeneral", "DejaVu Serif"],
+    "mathtext.fontset": "stix",
+    "font.size": 8.5,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "text.color": INK,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "figure.dpi": 110,
+    "savefig.dpi": 220,
+    "pdf.fonttype": 42,
+    "figure.constrained_layout.use": True,
+    "figure.constrained_layout.w_pad": 0.04,
+    "figure.constrained_layout.h_pad": 0.04,
+}
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Draw inside this: fonts, widths and ticks of a printed page."""
+    with matplotlib.rc_context(_RC):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, inches, that belongs to no window and needs no closing."""
+    return Figure(figsize=(width, height))
+
+
+def series(index: int, *, marker: bool = False) -> dict[str, Any]:
+    """Colour, dashes and (if asked) marker of series number `index`, as plot keywords."""
+    color, dashes, symbol = _SERIES[index % len(_SERIES)]
+    style: dict[str, Any] = {"color": color, "linestyle": dashes}
+    if marker:
+        style["marker"] = symbol
+    return style
+
+
+def color(index: int) -> str:
+    """Colour of series number `index`."""
+    return _SERIES[index % len(_SERIES)][0]
+
+
+def marker(index: int) -> str:
+    """Marker of series number `index`."""
+    return _SERIES[index % len(_SERIES)][2]
+
+
+def panel(axes: Axes, letter: str, *, x: float = 0.0, y: float = 1.02) -> None:
+    """Letter a panel, above its upper left corner."""
+    axes.text(
+        x,
+        y,
+        f"({letter})",
+        transform=axes.transAxes,
+        fontweight="bold",
+        va="bottom",
+        ha="left",
+    )

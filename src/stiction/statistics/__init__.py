@@ -1,0 +1,1 @@
+"""Statistics of strength and onset: moments and limits, densities, quantiles, extremes."""

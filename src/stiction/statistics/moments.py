@@ -1,0 +1,228 @@
+"""Mean and variance of the nucleation stress, exact, and their limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import simpson
+
+from stiction.criterion.eigenproblem import Weight
+from stiction.criterion.nucleation import Weights, multiplier_of, weight_of
+from stiction.errors import InputError
+from stiction.fields.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.fields.random_field import RandomField
+from stiction.problem import Problem
+
+Array = NDArray[np.float64]
+
+QUADRATURE = 400
+REACH = 40.0  # correlation lengths; beyond, even the exponential correlation is round-off
+
+
+@dataclass(frozen=True)
+class NucleationStatistics:
+    """Mean and variance of the nucleation stress tau_n at a point.
+
+    Attributes
+    ----------
+    mean, variance : float
+        E[tau_n] in Pa, Var[tau_n] in Pa^2.
+    strength_mean, strength_variance : float
+        E[tau_p] in Pa, Var[tau_p] in Pa^2.
+    """
+
+    mean: float
+    variance: float
+    strength_mean: float
+    strength_variance: float
+
+    @property
+    def standard_deviation(self) -> float:
+        """Square root of the variance, Pa."""
+        return math.sqrt(self.variance)
+
+    @property
+    def variance_ratio(self) -> float:
+        """Var[tau_n]/Var[tau_p]."""
+        return self.variance / self.strength_variance
+
+
+@dataclass(frozen=True)
+class NucleationLimits:
+    """What Var[tau_n]/Var[tau_p] and the critical stress tend to; no limit is a mean value.
+
+    Attributes
+    ----------
+    short_slope : float
+        For xi_0 << h_n the variance ratio is `short_slope` times xi_0/h_n (L >> h_n).
+    short_stress : float
+        tau_n and tau_cr for xi_0 -> 0 at fixed L: the mean strength, Pa. At fixed L/xi_0 there is
+        no such limit: L would fall below h_n, where the local criterion ends.
+    long_ratio_fixed_length : float
+        Variance ratio for xi_0 -> infinity at fixed L: the interface then holds the longest modes
+        only. 1 with the mean mode, |g(2 pi/L)|^2 averaged over the harmonics without it.
+    long_ratio_fixed_share : float
+        Variance ratio for xi_0 -> infinity with L/xi_0 fixed, that is h_n -> 0: 1.
+    long_stress_fixed_share : str
+        What tau_cr tends to then, in words: a distribution, not a number.
+    long_stress_fixed_length : str
+        The same for L fixed.
+    """
+
+    short_slope: float
+    short_stress: float
+    long_ratio_fixed_length: float
+    long_ratio_fixed_share: float
+    long_stress_fixed_share: str
+    long_stress_fixed_length: str
+
+
+def nucleation_statistics(
+    problem: Problem,
+    strength: RandomField,
+    *,
+    weights: Weights = "exact",
+    infinite: bool = False,
+) -> NucleationStatistics:
+    """Exact mean and variance of the nucleation stress.
+
+    Parameters
+    ----------
+    problem : Problem
+        With uniform weakening rate, load and initial stress.
+    strength : RandomField
+    weights : {"exact", "rounded"}
+        As in `nucleation_stress`.
+    infinite : bool
+        For an infinitely long interface and an untruncated spectrum instead of the problem's own.
+
+    Returns
+    -------
+    NucleationStatistics
+
+    Raises
+    ------
+    InputError
+        If the weakening rate, the load or the initial stress varies along the interface, or h_n is
+        longer than the interface.
+
+    Notes
+    -----
+    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p] and Var[tau_n] is the double
+    integral of the correlation of tau_p against the weights. On a periodic interface it is a sum
+    over wavenumbers of the spectrum of tau_p times the squared transform of the weight; on an
+    infinite one Gauss quadrature in both arguments (Chebyshev, second kind). The correlation is
+    that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the Gaussian field.
+    """
+    load, initial = _uniform_load(problem)
+    weight = weight_of(weights)
+    total = math.pi / 2.0 * float(weight.sine[0])
+    if infinite:
+        ratio = _infinite_ratio(problem, strength, weight)
+    else:
+        multiplier = multiplier_of(problem, problem.nucleation_length, weights)
+        ratio = float(np.sum(strength_spectrum(problem, strength) * multiplier**2))
+    variance = strength.standard_deviation**2
+    return NucleationStatistics(
+        mean=(strength.mean - initial) * total / load,
+        variance=ratio * variance / load**2,
+        strength_mean=strength.mean,
+        strength_variance=variance,
+    )
+
+
+def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
+    """Share of Var[tau_p] at each wavenumber of the grid, (nodes//2 + 1,); it sums to 1."""
+    interface = problem.interface
+    power = np.fft.rfft(strength.correlation(interface)).real / interface.nodes
+    power[1 : interface.nodes // 2] *= 2.0
+    return np.maximum(power, 0.0)
+
+
+def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimits:
+    """Limits of short and long correlation length, with L and with L/xi_0 held fixed.
+
+    Parameters
+    ----------
+    problem : Problem
+    strength : RandomField
+        With a spectrum that has a `correlation_length`.
+
+    Returns
+    -------
+    NucleationLimits
+
+    Raises
+    ------
+    InputError
+        As `nucleation_statistics`, and if the spectrum has no correlation length.
+
+    Notes
+    -----
+    For xi_0 << h_n the correlation acts as a delta function, and the double integral becomes
+    (2/h_n) int g^2 ds int C dx (Albertini et al., 2020, Eq. B.5, with its constant).
+    """
+    load, initial = _uniform_load(problem)
+    xi = getattr(strength.spectrum, "correlation_length", None)
+    if xi is None:
+        raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
+    weight = weight_of("exact")
+    lags = np.linspace(0.0, REACH * xi, 16385)
+    area = 2.0 * float(simpson(_strength_correlation(strength, lags), x=lags))
+    slope = 2.0 * _square_integral(weight) * area / xi
+    if strength.mean_mode:
+        long_ratio = 1.0
+        long_text = "the distribution of tau_p at a point: the interface is uniform"
+    else:
+        # One wave is left, of unit variance: its harmonics m carry c_m^2 through the map.
+        h = problem.nucleation_length
+        wave = 2.0 * math.pi / problem.interface.length
+        x = np.linspace(0.0, 1.0, 4096, endpoint=False)
+        c = correlation_of_mapped(np.cos(2.0 * math.pi * x), hermite_coefficients(strength.marginal))
+        power = np.abs(np.fft.rfft(c)) / x.size
+        power[1:-1] *= 2.0
+        multiplier = weight.multiplier(np.arange(64) * wave * h / 2.0)
+        long_ratio = float(np.sum(power[:64] * multiplier**2))
+        long_text = "the minimum of one mapped sine wave of random amplitude: it no longer falls"
+    return NucleationLimits(
+        short_slope=slope,
+        short_stress=(strength.mean - initial) / load,
+        long_ratio_fixed_length=long_ratio,
+        long_ratio_fixed_share=1.0,
+        long_stress_fixed_share="the distribution of min tau_p of the same field",
+        long_stress_fixed_length=long_text,
+    )
+
+
+def _uniform_load(problem: Problem) -> tuple[float, float]:
+    problems = [
+        f"load.{name}: varies along the interface, so tau_n is not stationary; sample it with"
+        " st.monte_carlo instead"
+        for name in ("profile", "initial_stress")
+        if np.ptp(getattr(problem.load, name)) > 0.0
+    ]
+    if problems:
+        raise InputError(problems)
+    return float(np.max(problem.load.profile)), float(np.max(problem.load.initial_stress))
+
+
+def _strength_correlation(strength: RandomField, lags: Array) -> Array:
+    rho = strength.spectrum.correlation(lags)
+    return correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
+
+
+def _infinite_ratio(problem: Problem, strength: RandomField, weight: Weight) -> float:
+    t = np.arange(1, QUADRATURE + 1) * math.pi / (QUADRATURE + 1)
+    s = np.cos(t)
+    share = weight.at(s) * np.sin(t) * math.pi / (QUADRATURE + 1)
+    lags = 0.5 * problem.nucleation_length * np.abs(s[:, None] - s[None, :])
+    return float(share @ _strength_correlation(strength, lags) @ share)
+
+
+def _square_integral(weight: Weight) -> float:
+    """Integral of g^2 over [-1, 1]; g is a root times a polynomial, so Gauss is exact."""
+    s, share = np.polynomial.legendre.leggauss(128)
+    return float(np.sum(share * weight.at(s) ** 2))

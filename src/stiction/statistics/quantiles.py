@@ -1,0 +1,89 @@
+"""Quantiles with confidence bands from order statistics: no assumption on the distribution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from stiction.errors import InputError
+from stiction.statistics.estimates import as_sample
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Quantiles:
+    """Quantiles of a sample.
+
+    Attributes
+    ----------
+    probability : (m,) array
+    value : (m,) array
+        The sample quantiles, in the unit of the values.
+    lower, upper : (m,) arrays
+        Ends of the confidence interval of each; infinite where the sample is too small to bound
+        that quantile.
+    confidence : float
+        Coverage of each interval, at least.
+    """
+
+    probability: Array
+    value: Array
+    lower: Array
+    upper: Array
+    confidence: float
+
+
+def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Quantiles:
+    """Quantiles of independent values with distribution-free confidence intervals.
+
+    Parameters
+    ----------
+    values : (samples,) array
+        For example the critical stress of a Monte Carlo ensemble, Pa.
+    probability : float or (m,) array
+        Between 0 and 1, exclusive.
+    confidence : float
+        Coverage of each interval, in (0, 1).
+
+    Returns
+    -------
+    Quantiles
+
+    Raises
+    ------
+    InputError
+        If there are no values, a value is not finite or a probability is out of range.
+
+    Notes
+    -----
+    The number of values below the p-quantile is binomial (N, p); the interval runs between the
+    order statistics whose ranks hold it with the asked probability (David and Nagaraja, 2003,
+    Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
+    """
+    ordered = np.sort(as_sample(values, 1))
+    p = np.atleast_1d(np.asarray(probability, dtype=np.float64))
+    problems = []
+    if p.ndim != 1 or not np.all((p > 0.0) & (p < 1.0)):
+        problems.append(f"probability: must be between 0 and 1, exclusive, got {probability!r}")
+    if not 0.0 < confidence < 1.0:
+        problems.append(f"confidence: must be between 0 and 1, exclusive, got {confidence!r}")
+    if problems:
+        raise InputError(problems)
+    n = ordered.size
+    tail = 0.5 * (1.0 - confidence)
+    # Rank r is a lower end if fewer than r values fall below the quantile with probability <= tail.
+    low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)
+    high = scipy.stats.binom.isf(tail, n, p).astype(int) + 1  # P(B >= high) <= tail
+    padded = np.concatenate(([-np.inf], ordered, [np.inf]))
+    return Quantiles(
+        probability=p,
+        value=np.quantile(ordered, p, method="median_unbiased"),
+        lower=padded[np.clip(low, 0, n + 1)],
+        upper=padded[np.clip(high, 0, n + 1)],
+        confidence=float(confidence),
+    )
