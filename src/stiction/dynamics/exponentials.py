@@ -202,10 +202,10 @@ def fit_exponentials(
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs), _DAMPING / t_max)
     check_times = sample_times(t_max, 150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
-    # Pairs grow like the product of the digits asked and the decades spanned.
-    decades = np.log10(t_max) + 1.0
-    density = 0.36 if mode == "III" else 0.9
-    pairs = max(2, round(density * decades * -np.log10(tolerance) / 1.5) - 1)
+    # Where the search begins: seen to be just below what is needed, for every Poisson's ratio.
+    digits, decades = -np.log10(tolerance), (np.log10(t_max) + 1.0) / 6.0
+    expected = 1.7 * digits - 2.0 if mode == "III" else 5.5 * digits - 10.0
+    pairs = max(3, round(expected * decades))
     for count in range(pairs, MAX_PAIRS + 1):
         poles, weights = _attempt(arcs, count, fit, tolerance, rounds=14)
         error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())

@@ -1,0 +1,1 @@
+"""Elastodynamic rupture: kernels, exponential memory, stepping, loading."""

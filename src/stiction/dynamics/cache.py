@@ -1,0 +1,94 @@
+"""Fitted kernels on disk: built once a machine, safe if several processes build at once."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import tempfile
+import threading
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+
+from stiction.dynamics.exponentials import ExponentialSum, fit_exponentials
+
+logger = logging.getLogger("stiction")
+
+_FORMAT = 1  # raise when the fit or the file layout changes, so that old files are left alone
+_memory: dict[tuple[str, float, float, float], ExponentialSum] = {}
+_lock = threading.Lock()
+_said = False
+
+
+def cache_folder() -> Path:
+    """`STICTION_CACHE_DIR` if set, else the user's cache folder of the platform."""
+    given = os.environ.get("STICTION_CACHE_DIR")
+    return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
+
+
+def _path(key: tuple[str, float, float, float]) -> Path:
+    mode, eta, tolerance, t_max = key
+    text = f"{_FORMAT} {mode} {eta.hex()} {tolerance.hex()} {t_max.hex()}"
+    return cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
+
+
+def _read(path: Path) -> ExponentialSum | None:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return ExponentialSum(
+                data["poles"], data["weights"], float(data["error"]), float(data["t_max"])
+            )
+    except FileNotFoundError:
+        return None
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        return None  # damaged: it is built and written again
+
+
+def _write(path: Path, kernel: ExponentialSum) -> None:
+    global _said
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Written aside and renamed: a reader sees the whole file or none.
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as stream:
+            temporary = stream.name
+            np.savez(
+                stream,
+                poles=kernel.poles,
+                weights=kernel.weights,
+                error=kernel.error,
+                t_max=kernel.t_max,
+            )
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)
+        if not _said:
+            _said = True
+            logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)
+
+
+def kernel_sum(
+    mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
+) -> ExponentialSum:
+    """The validated sum of exponentials, from memory, from disk, or built now (about 1 s).
+
+    Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel at
+    once both succeed: each writes aside and renames.
+    """
+    key = (mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max))
+    with _lock:
+        kernel = _memory.get(key)
+        if kernel is None:
+            path = _path(key)
+            kernel = _read(path)
+            if kernel is None:
+                kernel = fit_exponentials(*key)
+                _write(path, kernel)
+            _memory[key] = kernel
+        return kernel

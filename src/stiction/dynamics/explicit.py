@@ -1,0 +1,159 @@
+"""Explicit predictor-corrector steps: second order, one fixed step, all in one compiled loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import jit
+from stiction.dynamics.layout import advance_memory, pack
+from stiction.dynamics.track import observe
+
+
+@jit
+def load_at(times, values, t):  # type: ignore[no-untyped-def]
+    """Piecewise linear load history, continued beyond its last point with its last slope."""
+    low, high = 0, times.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    slope = (values[high] - values[low]) / (times[high] - times[low])
+    return values[low] + slope * (t - times[low])
+
+
+@jit
+def _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out):  # type: ignore[no-untyped-def]
+    """Stress transferred along the interface, in Fourier space, if the slip rate acts for a step."""
+    pack(rate_hat, packed)
+    out[0] = 0.0
+    for j in range(out.size - 1):
+        o = (j // 64) * 128 + j % 64
+        g, b = stiffness[0, j], fresh[j]
+        slip = slip_hat[j + 1] + step * rate_hat[j + 1]
+        real = stiffness[1, j] * (carried[o] + b * packed[o]) - g * slip.real
+        imaginary = stiffness[1, j] * (carried[o + 64] + b * packed[o + 64]) - g * slip.imag
+        out[j + 1] = complex(real, imaginary)
+
+
+@jit
+def explicit_steps(  # type: ignore[no-untyped-def]
+    count,
+    step,
+    slip,
+    rate,
+    stress,
+    slip_hat,
+    memory,
+    carried,
+    arrival,
+    watch,
+    table,
+    fresh,
+    stiffness,
+    medium,
+    rows,
+    load_times,
+    load_values,
+    control,
+    record,
+):
+    """Take up to `count` explicit steps in place; return (steps taken, reason).
+
+    Parameters
+    ----------
+    slip, rate, stress, arrival : (nodes,) arrays
+        m, m/s, Pa, and the time when half of d_c was reached (nan before), s; updated.
+    slip_hat : (nodes//2 + 1,) complex array
+    memory, carried, table : packed as in `layout`
+    fresh : (nodes//2,) array
+    stiffness : (2, nodes//2) array
+        G*|k|/2 and G|k|/2, Pa/m.
+    medium : (4,) array
+        Z = G/(2 c_s) (Pa s/m), dx (m), <p>, <tau_i>.
+    rows : (6, nodes) array
+        tau_p, tau_r, W, d_c, p, tau_i.
+    control : array
+        Thresholds, see `track`.
+    record : (>= count, columns) array, or with no rows to keep nothing.
+    """
+    n = slip.size
+    impedance, spacing = medium[0], medium[1]
+    pairs = memory.size // (carried.size * 2)
+    packed = np.zeros(carried.size)
+    out = np.empty(slip_hat.size, np.complex128)
+    guess = np.empty(n)
+    strength, residual, weakening = rows[0], rows[1], rows[2]
+    critical, profile, initial = rows[3], rows[4], rows[5]
+    keep = record.shape[0] > 0
+    load_before = watch[1]
+    for taken in range(count):
+        time = watch[0] + step
+        load = load_at(load_times, load_values, time)
+        rate_hat = np.fft.rfft(rate)
+        _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
+        moved = np.fft.irfft(out, n)
+        for i in range(n):
+            limit = max(strength[i] - weakening[i] * (slip[i] + step * rate[i]), residual[i])
+            guess[i] = max(moved[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
+        guess_hat = np.fft.rfft(guess)
+        for j in range(rate_hat.size):
+            rate_hat[j] = 0.5 * (rate_hat[j] + guess_hat[j])
+        _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
+        moved = np.fft.irfft(out, n)
+        work, total, slid = 0.0, 0.0, 0
+        mean_load = 0.5 * (load + load_before)
+        for i in range(n):
+            increment = 0.5 * step * (rate[i] + guess[i])
+            fresh_slip = slip[i] + increment
+            limit = max(strength[i] - weakening[i] * fresh_slip, residual[i])
+            stuck = moved[i] + load * profile[i] + initial[i]
+            v = max(stuck - limit, 0.0) / impedance
+            work += increment * (mean_load * profile[i] + initial[i])
+            guess[i] = v
+            stress[i] = stuck - impedance * v
+            total += v
+            slip[i] = fresh_slip
+            if fresh_slip >= critical[i]:
+                slid += 1
+        if not np.isfinite(total):
+            for i in range(n):
+                if not np.isfinite(guess[i]):
+                    watch[15] = i
+                    break
+            watch[0] = time
+            return taken, 4
+        top, node, slip_sum = -1.0, 0, 0.0
+        for i in range(n):
+            if guess[i] > top:
+                top, node = guess[i], i
+            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+                increment = 0.5 * step * (rate[i] + guess[i])
+                past = slip[i] - 0.5 * critical[i]
+                arrival[i] = time - step * min(1.0, past / max(increment, 1e-300))
+            slip_sum += slip[i]
+            rate[i] = guess[i]
+        for j in range(rate_hat.size):
+            slip_hat[j] += step * rate_hat[j]
+        advance_memory(memory, table, packed, carried, pairs)
+        radiated = impedance * total / n
+        mean_stress = medium[3] + load * medium[2] - radiated
+        watch[0], watch[1], watch[13], watch[14] = time, load, top, slid
+        watch[2] += work * spacing
+        watch[16] += 1.0
+        watch[20] = step
+        load_before = load
+        observe(watch, time, load, mean_stress, radiated, node)
+        if keep:
+            record[taken, 0], record[taken, 1], record[taken, 2] = time, load, mean_stress
+            record[taken, 3], record[taken, 4] = slip_sum / n, top
+            record[taken, 5], record[taken, 6] = step, watch[2]
+        if slid >= control[0]:
+            return taken + 1, 1
+        if watch[8] - mean_stress > control[1]:
+            return taken + 1, 5
+        watch[19] = watch[19] + 1.0 if top < control[2] else 0.0
+        if watch[19] >= control[3]:
+            return taken + 1, 3
+    return count, 0

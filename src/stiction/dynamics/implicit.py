@@ -1,0 +1,220 @@
+"""Implicit steps of adaptive size while the interface creeps, in one compiled loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import jit
+from stiction.dynamics.complementarity import solve_increment
+from stiction.dynamics.explicit import load_at
+from stiction.dynamics.track import observe
+
+
+@jit
+def _phi(z):  # type: ignore[no-untyped-def]
+    return 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0 * (1.0 + z / 6.0))))
+
+
+@jit
+def tabulate(poles, weights, pace, step, table, fresh):  # type: ignore[no-untyped-def]
+    """E and B of a step of any size, packed as in `layout`, and Re sum w B.
+
+    pace[j] = (j + 1) pace[0], so the exponentials of a pole are powers of one number: a product
+    each, with a relative error of 1e-16 j.
+    """
+    for j in range(fresh.size):
+        fresh[j] = 0.0
+    pairs = poles.size
+    for p in range(pairs):
+        unit = poles[p] * (pace[0] * step)
+        base = np.exp(unit)
+        decay = 1.0 + 0.0j
+        for j in range(fresh.size):
+            decay = decay * base
+            z = unit * (j + 1)
+            if abs(z) < 0.02:
+                gain = step * _phi(z)
+            else:
+                gain = step * ((decay - 1.0) / z)
+            o = ((j // 64) * pairs + p) * 256 + j % 64
+            table[o], table[o + 64] = decay.real, decay.imag
+            table[o + 128], table[o + 192] = gain.real, gain.imag
+            fresh[j] += (weights[p] * gain).real
+
+
+@jit
+def _carry(memory, table, weights, out):  # type: ignore[no-untyped-def]
+    """Re sum w E psi for the modes j = 1.., complex: what the past leaves after the step."""
+    pairs = weights.size
+    for j in range(out.size):
+        real, imaginary = 0.0, 0.0
+        for p in range(pairs):
+            o = ((j // 64) * pairs + p) * 256 + j % 64
+            w = weights[p] * complex(table[o], table[o + 64])
+            real += w.real * memory[o] - w.imag * memory[o + 64]
+            imaginary += w.real * memory[o + 128] - w.imag * memory[o + 192]
+        out[j] = complex(real, imaginary)
+
+
+@jit
+def _remember(memory, table, rate_hat, pairs):  # type: ignore[no-untyped-def]
+    """psi <- E psi + B V."""
+    for j in range(rate_hat.size - 1):
+        vr, vi = rate_hat[j + 1].real, rate_hat[j + 1].imag
+        for p in range(pairs):
+            o = ((j // 64) * pairs + p) * 256 + j % 64
+            er, ei, br, bi = table[o], table[o + 64], table[o + 128], table[o + 192]
+            yr, yi = memory[o], memory[o + 64]
+            memory[o] = er * yr - ei * yi + br * vr
+            memory[o + 64] = er * yi + ei * yr + bi * vr
+            yr, yi = memory[o + 128], memory[o + 192]
+            memory[o + 128] = er * yr - ei * yi + br * vi
+            memory[o + 192] = er * yi + ei * yr + bi * vi
+
+
+@jit
+def implicit_steps(  # type: ignore[no-untyped-def]
+    count,
+    step,
+    slip,
+    rate,
+    stress,
+    slip_hat,
+    memory,
+    arrival,
+    watch,
+    poles,
+    weights,
+    pace,
+    stiffness,
+    medium,
+    rows,
+    load_times,
+    load_values,
+    control,
+    record,
+):
+    """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
+
+    Parameters as in `explicit_steps`; `memory` holds psi itself, `step` is the size to try first.
+    Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
+    stays. A step is repeated at half the size if no slip increments are found (negative
+    curvature: the patches are unstable at this size) or a node slips too much.
+    """
+    n = slip.size
+    modes = pace.size
+    impedance, spacing = medium[0], medium[1]
+    table = np.zeros(memory.size)
+    fresh = np.empty(modes)
+    carried = np.empty(modes, np.complex128)
+    pushed_hat = np.empty(modes + 1, np.complex128)
+    symbol, inverse = np.empty(modes + 1), np.empty(modes + 1)
+    state = np.zeros(n, np.int64)
+    profile, initial, critical = rows[4], rows[5], rows[3]
+    root = np.sqrt(2.0)
+    tabulated = -1.0
+    taken = 0
+    while taken < count:
+        clipped = False
+        size = step
+        while True:
+            rise = load_at(load_times, load_values, watch[0] + size) - watch[1]
+            if size <= control[6] or abs(rise) <= control[5]:
+                break
+            size /= root
+            step = size
+        if watch[0] + size > control[9]:
+            size = control[9] - watch[0]
+            clipped = True
+        if size < control[6] and not clipped:
+            return taken, step, 2
+        if size != tabulated:
+            tabulate(poles, weights, pace, size, table, fresh)
+            symbol[0] = impedance / size
+            for j in range(modes):
+                symbol[j + 1] = (
+                    impedance / size + stiffness[0, j] - stiffness[1, j] * fresh[j] / size
+                )
+            for j in range(modes + 1):
+                inverse[j] = 1.0 / symbol[j]
+            tabulated = size
+        time = watch[0] + size
+        load = load_at(load_times, load_values, time)
+        _carry(memory, table, weights, carried)
+        pushed_hat[0] = 0.0
+        for j in range(modes):
+            pushed_hat[j + 1] = stiffness[1, j] * carried[j] - stiffness[0, j] * slip_hat[j + 1]
+        pushed = np.fft.irfft(pushed_hat, n)
+        u = np.empty(n)
+        for i in range(n):
+            pushed[i] += load * profile[i] + initial[i]
+            u[i] = rate[i] * size
+            state[i] = 1 if rate[i] > 0.0 else 0
+        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, control[7])
+        largest, total = 0.0, 0.0
+        if solved:
+            for i in range(n):
+                largest = max(largest, u[i] / critical[i])
+                total += u[i]
+            if not np.isfinite(total):
+                watch[15] = 0.0
+                return taken, step, 4
+        if not solved or largest > 2.0 * control[4]:
+            watch[18] += 1.0
+            step = size / 2.0
+            if step < control[6]:
+                return taken, step, 2
+            continue
+        work, slid, slip_sum, top, node = 0.0, 0, 0.0, -1.0, 0
+        mean_load = 0.5 * (load + watch[1])
+        rate_hat = np.fft.rfft(u)
+        for j in range(modes + 1):
+            slip_hat[j] += rate_hat[j]
+            rate_hat[j] /= size
+        _remember(memory, table, rate_hat, poles.size)
+        for j in range(modes):
+            pushed_hat[j + 1] = (
+                stiffness[1, j] * (carried[j] + fresh[j] * rate_hat[j + 1])
+                - stiffness[0, j] * slip_hat[j + 1]
+            )
+        moved = np.fft.irfft(pushed_hat, n)
+        for i in range(n):
+            work += u[i] * (mean_load * profile[i] + initial[i])
+            slip[i] += u[i]
+            rate[i] = u[i] / size
+            stress[i] = moved[i] + load * profile[i] + initial[i] - impedance * rate[i]
+            slip_sum += slip[i]
+            if slip[i] >= critical[i]:
+                slid += 1
+            if rate[i] > top:
+                top, node = rate[i], i
+            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+                past = slip[i] - 0.5 * critical[i]
+                arrival[i] = time - size * min(1.0, past / max(u[i], 1e-300))
+        radiated = impedance * total / (size * n)
+        mean_stress = medium[3] + load * medium[2] - radiated
+        watch[0], watch[1], watch[13], watch[14] = time, load, top, slid
+        watch[2] += work * spacing
+        watch[17] += 1.0
+        watch[20] = size
+        observe(watch, time, load, mean_stress, radiated, node)
+        if record.shape[0] > 0:
+            record[taken, 0], record[taken, 1], record[taken, 2] = time, load, mean_stress
+            record[taken, 3], record[taken, 4] = slip_sum / n, top
+            record[taken, 5], record[taken, 6] = size, watch[2]
+        taken += 1
+        if slid >= control[0]:
+            return taken, step, 1
+        if watch[8] - mean_stress > control[1]:
+            return taken, step, 5
+        if clipped or watch[0] >= control[9]:
+            return taken, step, 0
+        if largest > control[4]:
+            step = size / root
+        elif largest < 0.25 * control[4]:
+            step = min(2.0 * size, control[8])
+        elif largest < 0.7 * control[4]:
+            step = min(root * size, control[8])
+        if step < control[6]:
+            return taken, step, 2
+    return taken, step, 0

@@ -1,0 +1,240 @@
+"""Elastodynamic rupture as a method: from the first slip to global sliding, sample by sample."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field
+
+from stiction._model import Count, Positive, _number, model
+from stiction.dynamics import track
+from stiction.dynamics.loading import History, first_reach, uniform_rate
+from stiction.dynamics.measures import fracture_energy, radiated_energy, rupture_speed
+from stiction.dynamics.medium import Medium, prepare_medium
+from stiction.dynamics.run import Run, State
+from stiction.errors import AccuracyWarning, InputError
+from stiction.problem import Problem
+from stiction.results import ONSET_VARIABLES, Variable
+from stiction.rows import Rows
+
+Floats = NDArray[np.float64]
+Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
+
+_SWITCH = 6.0  # explicit steps in the smallest implicit step
+_CALM_STEPS = 300.0
+
+_MORE: dict[str, Variable] = {
+    "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
+    "onset_time": Variable("s", "time from zero load when the mean stress was largest"),
+    "kinetic_stress": Variable("Pa", "mean stress when every node had reached its residual"),
+    "stress_drop": Variable("Pa", "critical stress less kinetic stress"),
+    "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
+    "radiated_energy": Variable("J/m", "energy radiated until every node had weakened"),
+    "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
+    "arrested_events": Variable("1", "instabilities that stopped before the whole interface slid"),
+    "rupture_speed": Variable("m/s", "largest apparent speed of the rupture front"),
+    "implicit_steps": Variable("1", "implicit steps taken"),
+    "explicit_steps": Variable("1", "explicit steps taken"),
+}
+
+
+@model(kw_only=True)
+class Rupture:
+    """Onset from an elastodynamic simulation under a slowly rising load.
+
+    Implicit steps of adaptive size follow the interface while it creeps, explicit ones its
+    rupture; the run goes from the first slip to the moment when every node has reached its
+    residual strength.
+
+    Parameters
+    ----------
+    loading_rate : float
+        d tau_0/dt, Pa/s, positive.
+    kernel_tolerance : float
+        Error allowed in the memory kernel C(T) by its sum of exponentials (1).
+    memory_range : float
+        That error holds up to T = |k| c_s t of this size (1); older slip rate decays faster than
+        it should.
+    courant : float
+        Explicit time step in units of the stability limit, in (0, 1].
+    time_step : float, optional
+        Explicit time step, s, instead of `courant`.
+    slip_step : float
+        Slip of any node in one implicit step, in units of its d_c.
+    load_step : float
+        Rise of the load in one implicit step, in units of the mean of tau_p - tau_r.
+    event_drop : float
+        Fall of the mean stress that counts as an instability, in the same units.
+    implicit : bool
+        False takes explicit steps only (slow loading then costs a million steps).
+    max_steps : int
+        Steps after which a run is given up.
+
+    Raises
+    ------
+    InputError
+        If an option is out of range; from `prepare` if the time step is unstable.
+
+    Notes
+    -----
+    `critical_stress` is the largest mean shear stress on the interface, `critical_load` the load
+    factor that carries it statically, `applied_load` the one applied at that moment, somewhat
+    higher; the difference is radiated. Slip never reverses: a node whose slip rate would become
+    negative sticks, keeps its weakened strength, and slips again only when the stress reaches it.
+    Boundary integral in Fourier space: Breitenfeld and Geubelle (1998).
+    """
+
+    loading_rate: Positive
+    kernel_tolerance: Positive = 1e-6
+    memory_range: Positive = 1e5
+    courant: Fraction = 0.9
+    time_step: Positive | None = None
+    slip_step: Fraction = 0.03
+    load_step: Fraction = 2e-3
+    event_drop: Fraction = 1e-4
+    implicit: bool = True
+    max_steps: Count = 5_000_000
+    type: Literal["rupture"] = "rupture"
+
+    @property
+    def chunk_size(self) -> int:
+        """Samples that make a good piece of work in an ensemble."""
+        return 8
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """What the solver returns for each sample."""
+        return ONSET_VARIABLES | _MORE
+
+    def medium(self, problem: Problem) -> Medium:
+        """Kernel and tables for a problem."""
+        return prepare_medium(
+            problem,
+            tolerance=self.kernel_tolerance,
+            memory_range=self.memory_range,
+            courant=self.courant,
+            time_step=self.time_step,
+        )
+
+    def prepare(self, problem: Problem) -> Callable[[Rows], dict[str, NDArray[Any]]]:
+        """A solver for rows of this problem; the kernel is fitted here, once."""
+        medium = self.medium(problem)
+        history = uniform_rate(self.loading_rate)
+
+        def solve(rows: Rows) -> dict[str, NDArray[Any]]:
+            warn_if_coarse(problem, rows)
+            found = [
+                self._one(problem, make_run(self, medium, rows, i, history))
+                for i in range(rows.count)
+            ]
+            return {name: np.array([one[name] for one in found]) for name in self.variables}
+
+        return solve
+
+    def _one(self, problem: Problem, run: Run) -> dict[str, float]:
+        state = run.start(first_slip(run))
+        _, reason = run.advance(state, self.max_steps)
+        check_finite(run, state, reason)
+        if reason != track.ALL_SLID:
+            raise InputError(
+                f"max_steps: {self.max_steps} steps were taken before every node had reached its "
+                f"residual strength (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa); "
+                "raise max_steps or the loading rate"
+            )
+        return summary(problem, run, state)
+
+
+def warn_if_coarse(problem: Problem, rows: Rows) -> None:
+    """Warn where the nucleation length is not resolved, with the error to expect."""
+    resolution = problem.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
+    if resolution < 15.0:
+        percent = 3.0 * (16.0 / resolution) ** 3.3
+        warnings.warn(
+            f"the nucleation length spans {resolution:.1f} nodes: expect about {percent:.2g} % "
+            "error in slip just after onset (3 % at 16 nodes, 0.3 % at 32; the critical load is "
+            "far less sensitive)",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+
+
+def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: History) -> Run:
+    """The run of one sample."""
+    strength, residual = rows.strength[sample], rows.residual_strength[sample]
+    weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
+    critical = (strength - residual) / weakening
+    table = np.stack([strength, residual, weakening, critical, rows.load_profile, initial])
+    drop = float(np.mean(strength - residual))
+    control = np.zeros(track.CONTROLS)
+    smallest = _SWITCH * medium.step
+    control[track.SLID_STOP] = medium.nodes
+    control[track.DROP_STOP] = np.inf
+    control[track.CALM_RATE] = 0.25 * method.slip_step * critical.min() / smallest
+    control[track.CALM_COUNT] = _CALM_STEPS if method.implicit else np.inf
+    control[track.SLIP_STEP] = method.slip_step
+    control[track.LOAD_STEP] = method.load_step * drop
+    control[track.SMALLEST_STEP] = smallest
+    control[track.RESIDUAL] = 1e-9 * drop
+    control[track.LARGEST_STEP] = control[track.END_TIME] = np.inf
+    control[track.EVENT_DROP_SIZE] = method.event_drop * drop
+    control[track.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
+    constants = np.array(
+        [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
+    )
+    return Run(medium, table, constants, history, control)
+
+
+def first_slip(run: Run) -> float:
+    """When the first node reaches its strength, s."""
+    strength, profile, initial = run.rows[0], run.rows[4], run.rows[5]
+    return first_reach(run.history, float(np.min((strength - initial) / profile)))
+
+
+def check_finite(run: Run, state: State, reason: int) -> None:
+    """Raise `FloatingPointError` that says when and where a run became non-finite."""
+    if reason == track.NOT_FINITE:
+        node = int(state.watch[track.BAD_NODE])
+        raise FloatingPointError(
+            f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
+            f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
+            f"{state.steps} steps; the last finite state is kept"
+        )
+
+
+def front_window(problem: Problem, run: Run) -> float:
+    """Length over which rupture speeds are taken: a quarter of the shortest h_n, 8 nodes or more."""
+    shortest = problem.nucleation_length_of(float(run.rows[2].max()))
+    return max(0.25 * shortest, 8.0 * run.medium.spacing)
+
+
+def summary(problem: Problem, run: Run, state: State) -> dict[str, float]:
+    """The scalars of a finished run."""
+    medium, watch, rows = run.medium, state.watch, run.rows
+    peak = float(watch[track.PEAK_STRESS])
+    first = float(watch[track.FIRST_STRESS])
+    speeds = rupture_speed(state.arrival, medium.spacing, front_window(problem, run))
+    dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
+    return {
+        "critical_load": (peak - run.constants[3]) / run.constants[2],
+        "critical_stress": peak,
+        "first_instability": peak if first < 0.0 else first,
+        "critical_position": float(watch[track.PEAK_NODE]) * medium.spacing,
+        "applied_load": float(watch[track.PEAK_LOAD]),
+        "onset_time": float(watch[track.PEAK_TIME]),
+        "kinetic_stress": state.mean_stress,
+        "stress_drop": peak - state.mean_stress,
+        "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.spacing,
+        "radiated_energy": radiated_energy(
+            float(watch[track.WORK]), state.slip, state.slip_hat, rows,
+            medium.stiffness[0], medium.spacing,
+        ),
+        "fracture_energy": float(dissipated.sum()) * medium.spacing,
+        "arrested_events": int(watch[track.ARRESTED]),
+        "rupture_speed": float(np.nanmax(speeds)) if np.any(np.isfinite(speeds)) else np.nan,
+        "implicit_steps": int(watch[track.IMPLICIT_STEPS]),
+        "explicit_steps": int(watch[track.EXPLICIT_STEPS]),
+    }  # fmt: skip

@@ -1,0 +1,207 @@
+"""One run: explicit steps and implicit steps, and the switch between them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import track
+from stiction.dynamics.explicit import explicit_steps, load_at
+from stiction.dynamics.implicit import implicit_steps
+from stiction.dynamics.layout import LANES, blocks, carry_memory, scale_memory
+from stiction.dynamics.loading import History
+from stiction.dynamics.medium import Medium
+
+Floats = NDArray[np.float64]
+
+NOTHING = np.empty((0, track.COLUMNS))
+
+
+@dataclasses.dataclass(eq=False)
+class State:
+    """Everything that changes in a run; two runs from equal states are the same run, bit by bit.
+
+    Attributes
+    ----------
+    slip, rate, stress : (nodes,) arrays
+        m, m/s, Pa.
+    slip_hat : (nodes//2 + 1,) complex array
+        Real transform of the slip.
+    memory : flat array
+        Memory variables as in `layout`: psi/B while explicit, psi while implicit.
+    carried : flat array
+        The memory's part of the next explicit step.
+    arrival : (nodes,) array
+        When half of d_c was reached, s; nan before.
+    watch : (track.FIELDS,) array
+        Time, load, work of the load, peaks, events, counts.
+    explicit : bool
+        Which kind of step comes next.
+    step : float
+        Size that the next implicit step tries, s.
+    """
+
+    slip: Floats
+    rate: Floats
+    stress: Floats
+    slip_hat: NDArray[np.complex128]
+    memory: Floats
+    carried: Floats
+    arrival: Floats
+    watch: Floats
+    explicit: bool
+    step: float
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return float(self.watch[track.TIME])
+
+    @property
+    def load(self) -> float:
+        """tau_0, Pa."""
+        return float(self.watch[track.LOAD])
+
+    @property
+    def mean_stress(self) -> float:
+        """Mean shear stress on the interface, Pa."""
+        return float(self.watch[track.MEAN_STRESS])
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far, of both kinds."""
+        return int(self.watch[track.EXPLICIT_STEPS] + self.watch[track.IMPLICIT_STEPS])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Run:
+    """One interface under one load history: what does not change in a run.
+
+    Attributes
+    ----------
+    rows : (6, nodes) array
+        tau_p, tau_r, W, d_c, p, tau_i.
+    constants : (4,) array
+        Z, dx, <p>, <tau_i>.
+    """
+
+    medium: Medium
+    rows: Floats
+    constants: Floats
+    history: History
+    control: Floats
+
+    def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
+        """Static stress of a slip at a load, Pa: what an interface at rest carries."""
+        stress_hat = np.zeros_like(slip_hat)
+        stress_hat[1:] = -self.medium.stiffness[0] * slip_hat[1:]
+        shared: Floats = np.fft.irfft(stress_hat, self.medium.nodes)
+        return shared + load * self.rows[4] + self.rows[5]
+
+    def start(self, time: float, slip: Floats | None = None) -> State:
+        """State of rest (or of an equilibrium with this slip) at a time, with an empty memory."""
+        n, pairs = self.medium.nodes, self.medium.kernel.poles.size
+        count = blocks(n)
+        delta = np.zeros(n) if slip is None else np.array(slip, dtype=np.float64)
+        watch = np.zeros(track.FIELDS)
+        load = float(load_at(*self.history, time))
+        slip_hat = np.fft.rfft(delta)
+        stress = self.elastic_stress(slip_hat, load)
+        limit = np.maximum(self.rows[0] - self.rows[2] * delta, self.rows[1])
+        rate = np.maximum(stress - limit, 0.0) / self.medium.impedance
+        # A node that has just reached its strength has not begun to slip: drop round-off.
+        rate[rate * self.medium.impedance < 1e-12 * self.rows[0]] = 0.0
+        stress = stress - self.medium.impedance * rate
+        watch[track.TIME], watch[track.LOAD] = time, load
+        watch[track.MEAN_STRESS] = watch[track.PEAK_STRESS] = stress.mean()
+        watch[track.LOCAL_STRESS], watch[track.EVENT_START] = stress.mean(), time
+        watch[track.PEAK_TIME], watch[track.PEAK_LOAD] = time, load
+        watch[track.PEAK_NODE] = int(np.argmax(stress - limit))
+        watch[track.FIRST_STRESS] = watch[track.BAD_NODE] = -1.0
+        watch[track.EVENT_DROP] = self.control[track.EVENT_DROP_SIZE]
+        watch[track.TOP_RATE] = rate.max()
+        watch[track.SLID] = np.count_nonzero(delta >= self.rows[3])
+        arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
+        size = self.control[track.SMALLEST_STEP]
+        first = max(size, 0.1 * self.control[track.LOAD_STEP] / max(self.slope(time), 1e-300))
+        return State(
+            slip=delta,
+            rate=rate,
+            stress=stress,
+            slip_hat=slip_hat,
+            memory=np.zeros(count * pairs * 4 * LANES),
+            carried=np.zeros(count * 2 * LANES),
+            arrival=arrival,
+            watch=watch,
+            explicit=bool(self.control[track.EXPLICIT_ONLY] > 0.0),
+            step=min(first, self.control[track.LARGEST_STEP]),
+        )
+
+    def slope(self, time: float) -> float:
+        """Size of the loading rate just after a time, Pa/s."""
+        times, values = self.history
+        i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
+        return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
+
+    def _to_explicit(self, state: State) -> None:
+        pairs = self.medium.kernel.poles.size
+        scale_memory(state.memory, self.medium.gain, pairs, divide=True)
+        carry_memory(state.memory, self.medium.table, state.carried, pairs)
+        state.explicit = True
+        state.watch[track.CALM_STEPS] = 0.0
+
+    def _to_implicit(self, state: State) -> None:
+        scale_memory(
+            state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False
+        )
+        state.explicit = False
+        state.step = 2.0 * float(self.control[track.SMALLEST_STEP])
+
+    def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
+        """Take up to `count` steps in place; return (steps taken, why it returned).
+
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED or
+        NOT_FINITE of `track`. Rows of `record` are filled, one a step.
+        """
+        taken = 0
+        while taken < count:
+            part = record[taken:] if record.shape[0] else NOTHING
+            if state.explicit:
+                fresh, reason = self._explicit(state, count - taken, part)
+            else:
+                fresh, reason = self._implicit(state, count - taken, part)
+            taken += fresh
+            if reason == track.TO_EXPLICIT:
+                self._to_explicit(state)
+            elif reason == track.TO_IMPLICIT:
+                self._to_implicit(state)
+            elif reason != track.DONE or taken >= count:
+                return taken, reason
+            elif state.time >= self.control[track.END_TIME]:
+                return taken, track.DONE
+        return taken, track.DONE
+
+    def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        medium = self.medium
+        left = self.control[track.END_TIME] - state.time
+        if left < count * medium.step:
+            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-9))))
+        taken, reason = explicit_steps(
+            count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
+            state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,
+            medium.stiffness, self.constants, self.rows, *self.history, self.control, record,
+        )  # fmt: skip
+        return int(taken), int(reason)
+
+    def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        medium = self.medium
+        taken, size, reason = implicit_steps(
+            count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
+            state.memory, state.arrival, state.watch, medium.kernel.poles,
+            medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
+            *self.history, self.control, record,
+        )  # fmt: skip
+        state.step = float(size)
+        return int(taken), int(reason)

@@ -1,0 +1,63 @@
+"""What is watched at every step: peaks of the mean stress, arrested events, rupture arrival."""
+
+from __future__ import annotations
+
+from stiction._jit import jit
+
+# Fields of the `watch` array; a plain float64 array, so that compiled steps and checkpoints share it.
+TIME, LOAD, WORK, MEAN_STRESS = 0, 1, 2, 3
+PEAK_STRESS, PEAK_TIME, PEAK_LOAD, PEAK_NODE = 4, 5, 6, 7
+LOCAL_STRESS, IN_EVENT, FIRST_STRESS, ARRESTED = 8, 9, 10, 11
+EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
+EXPLICIT_STEPS, IMPLICIT_STEPS, REJECTED_STEPS, CALM_STEPS = 16, 17, 18, 19
+STEP, EVENT_START = 20, 21
+FIELDS = 24
+
+# Why a compiled phase returned.
+DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, FULL, NO_SOLUTION = range(8)
+
+# Columns of the record of every step.
+REC_TIME, REC_LOAD, REC_MEAN_STRESS, REC_MEAN_SLIP, REC_TOP_RATE, REC_STEP, REC_WORK = range(7)
+COLUMNS = 7
+
+
+# Thresholds of the `control` array.
+(
+    SLID_STOP,  # nodes at the residual strength at which to return
+    DROP_STOP,  # fall of the mean stress below its last maximum at which to return, Pa
+    CALM_RATE,  # top slip rate below which an explicit step counts as calm, m/s
+    CALM_COUNT,  # calm steps in a row after which implicit steps take over
+    SLIP_STEP,  # largest slip of a node in one implicit step, in units of its d_c
+    LOAD_STEP,  # largest rise of the load factor in one implicit step, Pa
+    SMALLEST_STEP,  # implicit step below which explicit steps take over, s
+    RESIDUAL,  # stress residual at which an implicit step counts as solved, Pa
+    LARGEST_STEP,  # s
+    END_TIME,  # s
+    EVENT_DROP_SIZE,  # fall of the mean stress that counts as an event, Pa
+    EXPLICIT_ONLY,  # 1 to take no implicit steps
+) = range(12)
+CONTROLS = 12
+
+
+@jit
+def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-untyped-def]
+    """Update peaks and events with the state after a step.
+
+    An event begins when the mean stress has fallen by EVENT_DROP below its last local maximum; it
+    was arrested if the stress radiated by slip, Z <V>, then falls below a tenth of that drop or
+    the mean stress rises above that maximum again before the whole interface slides.
+    """
+    watch[3] = mean_stress
+    if mean_stress > watch[4]:
+        watch[4], watch[5], watch[6], watch[7] = mean_stress, time, load, node
+    if watch[9] > 0.0:
+        if mean_stress > watch[8] or radiated < 0.1 * watch[12]:
+            watch[9] = 0.0
+            watch[11] += 1.0
+            watch[8] = mean_stress
+    elif mean_stress > watch[8]:
+        watch[8], watch[21] = mean_stress, time
+    elif watch[8] - mean_stress > watch[12]:
+        watch[9] = 1.0
+        if watch[10] < 0.0:
+            watch[10] = watch[8]
