@@ -40,140 +40,167 @@ def sort_by(keys, order, count):
 
 
 @jit
-def slip_at(factor, size, load, forward_profile, forward_excess, right, solution):
-    """Slip of the members at a load: A_SS d = load p - s."""
+def solve_forward(room, size, load, solution):
+    """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
+    right = room.vectors[0]
     for t in range(size):
-        right[t] = load * forward_profile[t] - forward_excess[t]
-    back_substitute(factor, size, right, solution)
+        right[t] = load * room.forward[0, t] - room.forward[1, t]
+    back_substitute(room.factor, size, right, solution)
 
 
 @jit
-def first_negative(solution, size):
-    """Position of the first member that would slip backwards, or `size`."""
+def singular_direction(room, size, direction):
+    """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
+
+    It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
+    which slip runs away.
+    """
+    right = room.vectors[0]
+    solution = room.vectors[1]
+    start = row_start(size)
     for t in range(size):
-        if solution[t] < 0.0:
-            return t
-    return size
+        right[t] = -room.factor[start + t]
+    back_substitute(room.factor, size, right, solution)
+    direction[:] = 0.0
+    for t in range(size):
+        direction[room.members[t]] = max(solution[t], 0.0)
+    direction[room.members[size]] = 1.0
 
 
 @jit
-def overstressed(load, excess, profile, stiff, inside, tolerance, keys, order):
+def overstressed(load, excess, profile, stiff, room, tolerance):
     """Nodes at rest above their strength, most overstressed first; returns how many."""
     count = 0
+    keys = room.vectors[2]
     for i in range(excess.shape[0]):
         margin = excess[i] - load * profile[i] + stiff[i]
-        if margin < -tolerance and not inside[i]:
+        if margin < -tolerance and not room.inside[i]:
             keys[count] = margin
-            order[count] = i
+            room.order[count] = i
             count += 1
-    sort_by(keys, order, count)
+    sort_by(keys, room.order, count)
     return count
 
 
 @jit
-def solve_program(
-    excess,
-    profile,
-    diagonal,
-    column,
-    strip,
-    bound,
-    cap,
-    multiplier,
-    slip,
-    stiff,
-    factor,
-    members,
-    order,
-    inside,
-    forward,
-    vectors,
-    halves,
-):
+def stress_tolerance(excess, profile, load):
+    """Overstress, Pa, that is round-off."""
+    scale = 0.0
+    for i in range(excess.shape[0]):
+        scale += abs(excess[i]) + abs(load) * profile[i]
+    return OVERSTRESS * scale / excess.shape[0]
+
+
+@jit
+def back_off(load, excess, profile, grid, room, size, solution, stiff):
+    """Lower the load of the slip by so little that no node at rest is overstressed.
+
+    Close to the onset slip grows so fast with the load that round-off in the load alone may leave
+    a node overstressed. One step along the tangent d d/d load mends it.
+    """
+    right = room.vectors[0]
+    stiff_rate = room.vectors[2]
+    own = grid.column[0]
+    for t in range(size):
+        right[t] = room.forward[0, t]
+    back_substitute(room.factor, size, right, solution)
+    apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff_rate)
+    step = 0.0
+    for i in range(excess.shape[0]):
+        margin = excess[i] - load * profile[i] + stiff[i]
+        if margin < 0.0 and not room.inside[i]:
+            step = max(step, margin / (stiff_rate[i] - profile[i]))
+    solve_forward(room, size, load - step, solution)
+    apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff)
+
+
+@jit
+def solve_program(excess, profile, grid, bound, cap, multiplier, slip, stiff, room):
     """Critical load with slip and multiplier, from an upper bound and its multiplier.
 
     Parameters
     ----------
-    excess, profile, diagonal : (n,) arrays
-        s = tau_p - tau_i (Pa), load profile p, diagonal of A (Pa/m).
-    column, strip : arrays
-        Of the stiffness.
+    excess, profile : (n,) arrays
+        s = tau_p - tau_i (Pa), load profile p.
+    grid : Grid
     bound : float
         An upper bound of the load that belongs to `multiplier`.
     cap : float
-        Do not look above this load: the solution is the least equilibrium at `cap` if there is one.
+        Do not look above this load: if it is below the critical one, the result is the least
+        equilibrium at `cap`.
     multiplier : (n,) array, changed
-        y of the lowest upper bound.
+        y of the lowest upper bound, <p, y> = 1.
     slip, stiff : (n,) arrays, output
         d and K d.
-    factor, members, order, inside, forward, vectors, halves : work space
-        Shapes row_start(n + 4), (n + 4), (n,), (n,), (2, n + 4), (3, n + 4), (2, n/2).
+    room : Room
+        With room.diagonal set to the diagonal of A.
 
     Returns
     -------
     load, size, cuts, status : float, int, int, int
     """
-    n = excess.shape[0]
     load = min(bound, cap)
-    scale = 0.0
-    for i in range(n):
-        scale += abs(excess[i])
-    tolerance = OVERSTRESS * (scale / n + abs(load) * profile.sum() / n)
-    forward_profile = forward[0]
-    forward_excess = forward[1]
-    right = vectors[0]
-    solution = vectors[1]
-    keys = vectors[2]
+    tolerance = stress_tolerance(excess, profile, load)
+    members = room.members
+    inside = room.inside
+    solution = room.vectors[1]
+    own = grid.column[0]
     inside[:] = False
     stiff[:] = 0.0
     size = 0
     cuts = 0
     status = STALLED
     for _ in range(PASSES):
-        count = overstressed(load, excess, profile, stiff, inside, tolerance, keys, order)
+        count = overstressed(load, excess, profile, stiff, room, tolerance)
         if count == 0:
             status = SOLVED
             break
         before = size
-        size = append(factor, size, members, order, count, column, diagonal, PIVOT)
-        extend_forward(factor, before, size, members, profile, forward_profile)
-        extend_forward(factor, before, size, members, excess, forward_excess)
+        size = append(
+            room.factor, size, members, room.order, count, grid.column, room.diagonal, PIVOT
+        )
+        extend_forward(room.factor, before, size, members, profile, room.forward[0])
+        extend_forward(room.factor, before, size, members, excess, room.forward[1])
         for t in range(before, size):
             inside[members[t]] = True
         failed = size < before + count
         settled = False
         if failed:
             cuts += 1
-            node = members[size]
-            start = row_start(size)
-            for t in range(size):
-                right[t] = -factor[start + t]
-            back_substitute(factor, size, right, solution)
-            above = excess[node]
-            below = profile[node]
-            for t in range(size):
-                above += solution[t] * excess[members[t]]
-                below += solution[t] * profile[members[t]]
+            direction = room.vectors[3]
+            singular_direction(room, size, direction)
+            above = 0.0
+            below = 0.0
+            for t in range(size + 1):
+                node = members[t]
+                above += direction[node] * excess[node]
+                below += direction[node] * profile[node]
+            settled = above / below >= load - tolerance
             if above / below < bound:
                 bound = above / below
-                multiplier[:] = 0.0
-                multiplier[node] = 1.0 / below
-                for t in range(size):
-                    multiplier[members[t]] = max(solution[t], 0.0) / below
-            settled = bound >= load - tolerance
+                for i in range(excess.shape[0]):
+                    multiplier[i] = direction[i] / below
             load = min(load, bound)
-        slip_at(factor, size, load, forward_profile, forward_excess, right, solution)
+        solve_forward(room, size, load, solution)
         if failed:
-            kept = first_negative(solution, size)
+            # Members that joined only because the load was too high would slip backwards now.
+            kept = 0
             while kept < size:
-                for t in range(kept, size):
-                    inside[members[t]] = False
-                size = kept
-                slip_at(factor, size, load, forward_profile, forward_excess, right, solution)
-                kept = first_negative(solution, size)
-        apply_stiffness(strip, column[0], members, size, solution, halves, stiff)
+                kept = 0
+                while kept < size and solution[kept] >= 0.0:
+                    kept += 1
+                if kept < size:
+                    for t in range(kept, size):
+                        inside[members[t]] = False
+                    size = kept
+                    solve_forward(room, size, load, solution)
+                    kept = 0
+                    if size == 0:
+                        break
+        apply_stiffness(grid.strip, own, members, size, solution, room.halves, stiff)
         if settled:  # a cut that lowers the load by round-off only: this is the optimum
             status = SOLVED
+            back_off(load, excess, profile, grid, room, size, solution, stiff)
             break
     slip[:] = 0.0
     for t in range(size):

@@ -1,0 +1,148 @@
+"""The onset of many profiles, one after the other, in one compiled loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import jit
+from stiction.equilibrium.bound import window_bound
+from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run, jump
+from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.program import solve_program
+from stiction.equilibrium.spaces import Sample, make_room
+from stiction.equilibrium.stiffness import apply_stiffness
+
+LOAD, GAP, PATCHES, POSITION, LENGTH, FATE, STATUS, CUTS, BOUND, SIZE = range(10)
+COLUMNS = 10
+"""Columns of the result of `solve_batch`."""
+
+FLOOR_REACHED = 3
+"""Fate of a sample whose floor is reached before the first instability."""
+
+QUICK_STEPS = 40
+"""Elastic steps of the quick test for arrest."""
+
+
+@jit
+def certificate(sample, grid, load, slip, stiff, multiplier, room):
+    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa."""
+    n = slip.shape[0]
+    lower = np.inf
+    count = 0
+    values = room.vectors[1]
+    for i in range(n):
+        balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
+        lower = min(lower, balance / sample.profile[i])
+        if multiplier[i] > 0.0:
+            room.order[count] = i
+            values[count] = multiplier[i]
+            count += 1
+    product = room.vectors[2]
+    apply_stiffness(grid.strip, grid.column[0], room.order, count, values, room.halves, product)
+    above = 0.0
+    below = 0.0
+    excess = 0.0
+    for i in range(n):
+        above += multiplier[i] * sample.excess[i]
+        below += multiplier[i] * sample.profile[i]
+        # Round-off may leave A y slightly positive; what this can do to the bound is added to it.
+        excess += max(product[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
+    return max((above + excess) / below - lower, 0.0)
+
+
+@jit
+def start_from_bound(start, width, mode, multiplier, profile):
+    """Write the multiplier of a window (or, width 0, of the uniform field), <p, y> = 1."""
+    n = multiplier.shape[0]
+    if width == 0:
+        multiplier[:] = 1.0
+    else:
+        multiplier[:] = 0.0
+        for q in range(width):
+            multiplier[(start + q) % n] = mode[q]
+    weight = 0.0
+    for i in range(n):
+        weight += multiplier[i] * profile[i]
+    for i in range(n):
+        multiplier[i] /= weight
+
+
+@jit
+def solve_batch(
+    excess,
+    floor,
+    profile,
+    rate,
+    uniform,
+    grid,
+    thresholds,
+    widths,
+    modes,
+    spacing,
+    modulus,
+    results,
+    slips,
+    multipliers,
+):
+    """Solve the programme for each row and test quickly whether its instability is arrested.
+
+    Parameters
+    ----------
+    excess, floor, rate : (samples, n) arrays
+        tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
+    profile : (n,) array
+    uniform : bool
+        Whether W is the same at all nodes of each sample.
+    grid : Grid
+    thresholds, widths, modes : arrays
+        From `window_table`, thresholds in Pa/m.
+    spacing, modulus : float
+        m and Pa.
+    results : (samples, COLUMNS) array, output
+    slips, multipliers : (samples or 0, n) arrays, output
+        Filled if they have rows.
+    """
+    samples, n = excess.shape
+    room = make_room(n)
+    slip = np.empty(n)
+    stiff = np.empty(n)
+    multiplier = np.empty(n)
+    critical = np.empty(n)
+    work = np.empty((2, n))
+    for row in range(samples):
+        for i in range(n):
+            critical[i] = (excess[row, i] - floor[row, i]) / rate[row, i]
+            room.diagonal[i] = grid.column[0] - rate[row, i]
+        sample = Sample(excess[row], floor[row], profile, rate[row], critical)
+        bound, start, choice = window_bound(
+            excess[row], profile, rate[row], uniform, thresholds, widths, modes, work
+        )
+        width = 0 if choice < 0 else widths[choice]
+        start_from_bound(start, width, modes[max(choice, 0)], multiplier, profile)
+        load, size, cuts, status = solve_program(
+            excess[row], profile, grid, bound, np.inf, multiplier, slip, stiff, room
+        )
+        line = results[row]
+        line[LOAD] = load
+        line[STATUS] = status
+        line[CUTS] = cuts
+        line[BOUND] = bound
+        line[SIZE] = size
+        line[PATCHES] = count_patches(slip)
+        line[GAP] = certificate(sample, grid, load, slip, stiff, multiplier, room)
+        first, length, centre = main_patch(multiplier)
+        line[POSITION] = centre * spacing
+        line[LENGTH] = length * spacing
+        if slips.shape[0] > 0:
+            slips[row] = slip
+        if multipliers.shape[0] > 0:
+            multipliers[row] = multiplier
+        line[FATE] = UNDECIDED
+        for i in range(n):
+            if slip[i] > critical[i] * (2.0 - AT_FLOOR):
+                line[FATE] = FLOOR_REACHED
+        if line[FATE] == UNDECIDED:
+            escape = escape_run(sample, load, spacing, modulus)
+            line[FATE] = jump(
+                sample, grid, load, slip, stiff, multiplier, escape, QUICK_STEPS, False, room
+            )

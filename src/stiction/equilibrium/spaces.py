@@ -1,0 +1,67 @@
+"""What the kernels pass around: one sample, the grid, and room to work in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._jit import jit
+from stiction.equilibrium.cholesky import row_start
+
+Array = NDArray[np.float64]
+
+
+class Sample(NamedTuple):
+    """One strength profile; all arrays of shape (n,).
+
+    `excess` is tau_p - tau_i and `floor` tau_r - tau_i (Pa): stress is counted from the initial
+    one. `profile` is the load profile, `rate` the weakening rate W (Pa/m), and `critical` the slip
+    d_c (m) at which the floor is reached.
+    """
+
+    excess: Array
+    floor: Array
+    profile: Array
+    rate: Array
+    critical: Array
+
+
+class Grid(NamedTuple):
+    """The stiffness: its first column (n,) and the strip of `coupling_strip`, Pa/m."""
+
+    column: Array
+    strip: Array
+
+
+class Room(NamedTuple):
+    """Work space for one sample at a time.
+
+    `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
+    them; `forward` holds the forward substitutions of the load profile and of the strength.
+    """
+
+    factor: Array
+    members: NDArray[np.int64]
+    order: NDArray[np.int64]
+    inside: NDArray[np.bool_]
+    diagonal: Array
+    forward: Array
+    vectors: Array
+    halves: Array
+
+
+@jit
+def make_room(n):
+    """Room for samples of n nodes. Pages of the factor that are never used cost no memory."""
+    return Room(
+        np.empty(row_start(n + 4)),
+        np.empty(n + 4, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.bool_),
+        np.empty(n),
+        np.empty((2, n + 4)),
+        np.empty((4, n + 4)),
+        np.empty((2, n // 2)),
+    )
