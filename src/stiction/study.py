@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import operator
 import tomllib
 from collections.abc import Callable
 from concurrent.futures import Executor
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import pydantic
 import tomli_w
@@ -15,14 +19,35 @@ import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from stiction._model import Count, _count, describe, explain, model, to_plain
-from stiction.criterion.method import LocalCriterion
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.run import make_plan, run_plan
 from stiction.errors import InputError
 from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
 
-AnyMethod = LocalCriterion
+
+
+def _known_methods() -> list[type]:
+    """The methods of the rooms that are there."""
+    found = []
+    for module, name in METHODS.items():
+        with suppress(ImportError):
+            found.append(getattr(import_module(f"stiction.{module}"), name))
+    return found
+
+
+METHODS = {
+    "criterion.method": "LocalCriterion",
+    "equilibrium.method": "Equilibrium",
+    "dynamics.method": "Rupture",
+}
+if TYPE_CHECKING:
+    AnyMethod: TypeAlias = Any
+else:
+    _found = _known_methods()
+    AnyMethod = _found[0]
+    if len(_found) > 1:
+        AnyMethod = Annotated[functools.reduce(operator.or_, _found), Field(discriminator="type")]
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 
