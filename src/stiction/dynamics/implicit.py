@@ -16,14 +16,22 @@ def _phi(z):  # type: ignore[no-untyped-def]
 
 
 @jit
-def tabulate(poles, weights, pace, step, table, fresh):  # type: ignore[no-untyped-def]
-    """E and B of a step of any size, packed as in `layout`, and Re sum w B.
+def _tilt(z):  # type: ignore[no-untyped-def]
+    """int_0^1 exp(z (1 - t)) (t - 1/2) dt near z = 0."""
+    return -z / 12.0 * (1.0 + z / 2.0 * (1.0 + z * 0.3 * (1.0 + z * (2.0 / 9.0))))
 
+
+@jit
+def tabulate(poles, weights, pace, step, table, tilt, fresh, turn):  # type: ignore[no-untyped-def]
+    """Tables of a step of any size, packed as in `layout`.
+
+    E and B = int_0^h exp(s k c_s t') dt' into `table`, its counterpart for a slip rate that rises
+    linearly with zero mean into `tilt`, and their sums Re sum w B into `fresh` and `turn`.
     pace[j] = (j + 1) pace[0], so the exponentials of a pole are powers of one number: a product
     each, with a relative error of 1e-16 j.
     """
     for j in range(fresh.size):
-        fresh[j] = 0.0
+        fresh[j] = turn[j] = 0.0
     pairs = poles.size
     for p in range(pairs):
         unit = poles[p] * (pace[0] * step)
@@ -33,13 +41,16 @@ def tabulate(poles, weights, pace, step, table, fresh):  # type: ignore[no-untyp
             decay = decay * base
             z = unit * (j + 1)
             if abs(z) < 0.02:
-                gain = step * _phi(z)
+                gain, lean = step * _phi(z), step * step * _tilt(z)
             else:
-                gain = step * ((decay - 1.0) / z)
+                ratio = (decay - 1.0) / z
+                gain, lean = step * ratio, step * step * ((ratio - 1.0) / z - 0.5 * ratio)
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
+            tilt[o], tilt[o + 64] = lean.real, lean.imag
             fresh[j] += (weights[p] * gain).real
+            turn[j] += (weights[p] * lean).real
 
 
 @jit
@@ -57,19 +68,19 @@ def _carry(memory, table, weights, out):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _remember(memory, table, rate_hat, pairs):  # type: ignore[no-untyped-def]
-    """psi <- E psi + B V."""
+def _remember(memory, table, tilt, rate_hat, slope_hat, pairs):  # type: ignore[no-untyped-def]
+    """psi <- E psi + B V, with a slip rate that changes linearly in the step."""
     for j in range(rate_hat.size - 1):
-        vr, vi = rate_hat[j + 1].real, rate_hat[j + 1].imag
+        v, a = rate_hat[j + 1], slope_hat[j + 1]
         for p in range(pairs):
             o = ((j // 64) * pairs + p) * 256 + j % 64
-            er, ei, br, bi = table[o], table[o + 64], table[o + 128], table[o + 192]
-            yr, yi = memory[o], memory[o + 64]
-            memory[o] = er * yr - ei * yi + br * vr
-            memory[o + 64] = er * yi + ei * yr + bi * vr
-            yr, yi = memory[o + 128], memory[o + 192]
-            memory[o + 128] = er * yr - ei * yi + br * vi
-            memory[o + 192] = er * yi + ei * yr + bi * vi
+            decay = complex(table[o], table[o + 64])
+            gain = complex(table[o + 128], table[o + 192])
+            lean = complex(tilt[o], tilt[o + 64])
+            y = decay * complex(memory[o], memory[o + 64]) + gain * v.real + lean * a.real
+            memory[o], memory[o + 64] = y.real, y.imag
+            y = decay * complex(memory[o + 128], memory[o + 192]) + gain * v.imag + lean * a.imag
+            memory[o + 128], memory[o + 192] = y.real, y.imag
 
 
 @jit
@@ -80,6 +91,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
     rate,
     stress,
     slip_hat,
+    past,
     memory,
     arrival,
     watch,
@@ -97,22 +109,27 @@ def implicit_steps(  # type: ignore[no-untyped-def]
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
     Parameters as in `explicit_steps`; `memory` holds psi itself, `step` is the size to try first.
+    Second order: the slip rate at the end of a step follows from the mean rates of this step and
+    of the one before (`past`, (nodes,) m/s, of length watch[23]; 0 for none), as in the two-step
+    backward differences, and the memory sees it rise or fall linearly.
     Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
     stays. A step is repeated at half the size if no slip increments are found (negative
-    curvature: the patches are unstable at this size) or a node slips too much.
+    curvature: the patches are unstable at this size), a node slips too much, or the interface
+    accelerates too much for the load at onset to be accurate.
     """
     n = slip.size
     modes = pace.size
     impedance, spacing = medium[0], medium[1]
-    table = np.zeros(memory.size)
-    fresh = np.empty(modes)
+    table, tilt = np.zeros(memory.size), np.zeros(memory.size)
+    fresh, turn = np.empty(modes), np.empty(modes)
     carried = np.empty(modes, np.complex128)
     pushed_hat = np.empty(modes + 1, np.complex128)
     symbol, inverse = np.empty(modes + 1), np.empty(modes + 1)
     state = np.zeros(n, np.int64)
     profile, initial, critical = rows[4], rows[5], rows[3]
     root = np.sqrt(2.0)
-    tabulated = -1.0
+    tabulated, paired = -1.0, -1.0
+    past_hat = np.fft.rfft(past)
     taken = 0
     while taken < count:
         clipped = False
@@ -128,27 +145,35 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             clipped = True
         if size < control[6] and not clipped:
             return taken, step, 2
+        # V at the end = mean + share (mean - past mean); its slope in the step, a second
+        # difference of slip, is (mean - past mean) bend.
+        share = size / (size + watch[23]) if watch[23] > 0.0 else 0.0
+        bend = 2.0 * share / size
         if size != tabulated:
-            tabulate(poles, weights, pace, size, table, fresh)
-            symbol[0] = impedance / size
+            tabulate(poles, weights, pace, size, table, tilt, fresh, turn)
+        if size != tabulated or share != paired:
+            symbol[0] = impedance * (1.0 + share) / size
             for j in range(modes):
-                symbol[j + 1] = (
-                    impedance / size + stiffness[0, j] - stiffness[1, j] * fresh[j] / size
-                )
+                fading = stiffness[1, j] * (fresh[j] + bend * turn[j]) / size
+                symbol[j + 1] = symbol[0] + stiffness[0, j] - fading
             for j in range(modes + 1):
                 inverse[j] = 1.0 / symbol[j]
-            tabulated = size
+            tabulated, paired = size, share
         time = watch[0] + size
         load = load_at(load_times, load_values, time)
         _carry(memory, table, weights, carried)
-        pushed_hat[0] = 0.0
+        pushed_hat[0] = impedance * share * past_hat[0]
         for j in range(modes):
-            pushed_hat[j + 1] = stiffness[1, j] * carried[j] - stiffness[0, j] * slip_hat[j + 1]
+            pushed_hat[j + 1] = (
+                stiffness[1, j] * (carried[j] - bend * turn[j] * past_hat[j + 1])
+                - stiffness[0, j] * slip_hat[j + 1]
+                + impedance * share * past_hat[j + 1]
+            )
         pushed = np.fft.irfft(pushed_hat, n)
         u = np.empty(n)
         for i in range(n):
             pushed[i] += load * profile[i] + initial[i]
-            u[i] = rate[i] * size
+            u[i] = past[i] * size
             state[i] = 1 if rate[i] > 0.0 else 0
         solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, control[7])
         largest, total = 0.0, 0.0
@@ -159,7 +184,13 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             if not np.isfinite(total):
                 watch[15] = 0.0
                 return taken, step, 4
-        if not solved or largest > 2.0 * control[4]:
+        radiated = 0.0
+        for i in range(n):
+            radiated += max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
+        radiated *= impedance / n
+        before = watch[22]
+        racing = radiated > control[12] and radiated > control[13] * max(before, control[12])
+        if not solved or largest > 2.0 * control[4] or (racing and share > 0.0):
             watch[18] += 1.0
             step = size / 2.0
             if step < control[6]:
@@ -171,17 +202,19 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         for j in range(modes + 1):
             slip_hat[j] += rate_hat[j]
             rate_hat[j] /= size
-        _remember(memory, table, rate_hat, poles.size)
+            past_hat[j] = bend * (rate_hat[j] - past_hat[j])
+        _remember(memory, table, tilt, rate_hat, past_hat, poles.size)
+        pushed_hat[0] = 0.0
         for j in range(modes):
-            pushed_hat[j + 1] = (
-                stiffness[1, j] * (carried[j] + fresh[j] * rate_hat[j + 1])
-                - stiffness[0, j] * slip_hat[j + 1]
-            )
+            memory_part = carried[j] + fresh[j] * rate_hat[j + 1] + turn[j] * past_hat[j + 1]
+            pushed_hat[j + 1] = stiffness[1, j] * memory_part - stiffness[0, j] * slip_hat[j + 1]
+        past_hat = rate_hat
         moved = np.fft.irfft(pushed_hat, n)
         for i in range(n):
             work += u[i] * (mean_load * profile[i] + initial[i])
             slip[i] += u[i]
-            rate[i] = u[i] / size
+            rate[i] = max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
+            past[i] = u[i] / size
             stress[i] = moved[i] + load * profile[i] + initial[i] - impedance * rate[i]
             slip_sum += slip[i]
             if slip[i] >= critical[i]:
@@ -189,14 +222,14 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             if rate[i] > top:
                 top, node = rate[i], i
             if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
-                past = slip[i] - 0.5 * critical[i]
-                arrival[i] = time - size * min(1.0, past / max(u[i], 1e-300))
-        radiated = impedance * total / (size * n)
+                beyond = slip[i] - 0.5 * critical[i]
+                arrival[i] = time - size * min(1.0, beyond / max(u[i], 1e-300))
         mean_stress = medium[3] + load * medium[2] - radiated
         watch[0], watch[1], watch[13], watch[14] = time, load, top, slid
         watch[2] += work * spacing
         watch[17] += 1.0
-        watch[20] = size
+        watch[20] = watch[23] = size
+        watch[22] = radiated
         observe(watch, time, load, mean_stress, radiated, node)
         if record.shape[0] > 0:
             record[taken, 0], record[taken, 1], record[taken, 2] = time, load, mean_stress
@@ -209,11 +242,12 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             return taken, step, 5
         if clipped or watch[0] >= control[9]:
             return taken, step, 0
+        growing = radiated > control[12] and radiated > np.sqrt(control[13]) * before
         if largest > control[4]:
             step = size / root
-        elif largest < 0.25 * control[4]:
+        elif largest < 0.25 * control[4] and not growing:
             step = min(2.0 * size, control[8])
-        elif largest < 0.7 * control[4]:
+        elif largest < 0.7 * control[4] and not growing:
             step = min(root * size, control[8])
         if step < control[6]:
             return taken, step, 2

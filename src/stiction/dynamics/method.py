@@ -26,6 +26,7 @@ Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_in
 
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300.0
+_GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
 _MORE: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
@@ -181,6 +182,8 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     control[track.RESIDUAL] = 1e-9 * drop
     control[track.LARGEST_STEP] = control[track.END_TIME] = np.inf
     control[track.EVENT_DROP_SIZE] = method.event_drop * drop
+    control[track.NOTICED] = 1e-7 * drop
+    control[track.GROWTH] = _GROWTH
     control[track.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     constants = np.array(
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]

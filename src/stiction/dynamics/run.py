@@ -29,6 +29,8 @@ class State:
         m, m/s, Pa.
     slip_hat : (nodes//2 + 1,) complex array
         Real transform of the slip.
+    past : (nodes,) array
+        Mean slip rate in the last implicit step, m/s.
     memory : flat array
         Memory variables as in `layout`: psi/B while explicit, psi while implicit.
     carried : flat array
@@ -47,6 +49,7 @@ class State:
     rate: Floats
     stress: Floats
     slip_hat: NDArray[np.complex128]
+    past: Floats
     memory: Floats
     carried: Floats
     arrival: Floats
@@ -131,6 +134,7 @@ class Run:
             rate=rate,
             stress=stress,
             slip_hat=slip_hat,
+            past=rate.copy(),
             memory=np.zeros(count * pairs * 4 * LANES),
             carried=np.zeros(count * 2 * LANES),
             arrival=arrival,
@@ -157,6 +161,9 @@ class Run:
             state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False
         )
         state.explicit = False
+        state.past = state.rate.copy()
+        state.watch[track.PAST_STEP] = 0.0  # the first implicit step is one of first order
+        state.watch[track.RADIATED] = self.medium.impedance * state.rate.mean()
         state.step = 2.0 * float(self.control[track.SMALLEST_STEP])
 
     def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
@@ -199,7 +206,7 @@ class Run:
         medium = self.medium
         taken, size, reason = implicit_steps(
             count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
-            state.memory, state.arrival, state.watch, medium.kernel.poles,
+            state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
             medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
             *self.history, self.control, record,
         )  # fmt: skip

@@ -10,7 +10,7 @@ PEAK_STRESS, PEAK_TIME, PEAK_LOAD, PEAK_NODE = 4, 5, 6, 7
 LOCAL_STRESS, IN_EVENT, FIRST_STRESS, ARRESTED = 8, 9, 10, 11
 EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
 EXPLICIT_STEPS, IMPLICIT_STEPS, REJECTED_STEPS, CALM_STEPS = 16, 17, 18, 19
-STEP, EVENT_START = 20, 21
+STEP, EVENT_START, RADIATED, PAST_STEP = 20, 21, 22, 23
 FIELDS = 24
 
 # Why a compiled phase returned.
@@ -35,8 +35,10 @@ COLUMNS = 7
     END_TIME,  # s
     EVENT_DROP_SIZE,  # fall of the mean stress that counts as an event, Pa
     EXPLICIT_ONLY,  # 1 to take no implicit steps
-) = range(12)
-CONTROLS = 12
+    NOTICED,  # radiated stress Z <V> from which the growth of one implicit step is limited, Pa
+    GROWTH,  # by this factor
+) = range(14)
+CONTROLS = 14
 
 
 @jit
