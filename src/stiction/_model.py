@@ -173,7 +173,7 @@ def _same(left: Any, right: Any) -> bool:
     return bool(left == right)
 
 
-def _equal(self: Any, other: object) -> bool:
+def _equal(self: Any, other: Any) -> bool:
     if type(self) is not type(other):
         return NotImplemented
     fields = dataclasses.fields(self)

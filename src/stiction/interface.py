@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from stiction._model import Positive, _count, model
+from stiction._typing import Array
 
 
 @model
@@ -37,11 +37,11 @@ class Interface:
         return self.length / self.nodes
 
     @property
-    def x(self) -> NDArray[np.float64]:
+    def x(self) -> Array:
         """Node positions in [0, L), shape (nodes,), m."""
         return np.arange(self.nodes) * self.spacing
 
     @property
-    def wavenumbers(self) -> NDArray[np.float64]:
+    def wavenumbers(self) -> Array:
         """Angular wavenumbers of a real transform, shape (nodes//2 + 1,), rad/m."""
         return 2.0 * np.pi / self.length * np.arange(self.nodes // 2 + 1)

@@ -7,10 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 from scipy.special import jv
 
-Array = NDArray[np.float64]
+from stiction._typing import Array
 
 TERMS = 40
 
@@ -67,7 +66,7 @@ def eigenvalues_and_vector(terms: int = TERMS) -> tuple[float, Array]:
     """
     k = np.arange(1, terms + 1)
 
-    def integral(m: NDArray[np.int64]) -> Array:
+    def integral(m: Array) -> Array:
         return np.where(m % 2 == 0, 2.0 / np.where(m % 2 == 0, 1.0 - m * m, 1.0), 0.0)
 
     a = np.diag(np.pi * k / 4.0)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._model import model
+from stiction._typing import Array
 from stiction.criterion.moving_average import minimum_rows
 from stiction.criterion.nucleation import (
     Weights,
@@ -20,7 +21,8 @@ from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
 from stiction.rows import Rows
 
-Array = NDArray[np.float64]
+
+ENOUGH_POINTS = 16
 
 
 @model(kw_only=True)
@@ -63,14 +65,16 @@ class LocalCriterion:
             From the solver: if the weakening rate varies along the interface, or h_n is longer
             than the interface.
         """
-        multipliers: dict[float, Array] = {}
+        multipliers: dict[float, tuple[Array, int]] = {}
 
-        def multiplier(rate: float) -> Array:
+        def multiplier(rate: float) -> tuple[Array, int]:
             if rate not in multipliers:
                 if len(multipliers) > 64:  # random rates: every sample has its own
                     multipliers.clear()
                 length = problem.nucleation_length_of(rate)
-                multipliers[rate] = multiplier_of(problem, length, self.weights)
+                # Enough points in h_n for a parabola to find every minimum between them.
+                factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / length)
+                multipliers[rate] = multiplier_of(problem, length, self.weights), factor
             return multipliers[rate]
 
         def solve(rows: Rows) -> dict[str, Array]:
@@ -82,9 +86,10 @@ class LocalCriterion:
             load, place = np.empty(rows.count), np.empty(rows.count)
             for rate in np.unique(rates):
                 same = slice(None) if np.ptp(rates) == 0.0 else rates == rate
-                table = multiplier(float(rate))
+                table, factor = multiplier(float(rate))
                 lowest, where = np.empty(rows.count)[same], np.empty(rows.count)[same]
-                minimum_rows(excess[same], table, averaged_load(rows, table), lowest, where)
+                scale = averaged_load(rows, table, factor)
+                minimum_rows(excess[same], table, scale, lowest, where)
                 load[same], place[same] = lowest, where
             stress = rows.mean_stress(load)
             return {

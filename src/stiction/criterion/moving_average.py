@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from stiction._typing import Array
 
 
 @jit
@@ -20,7 +17,7 @@ def average_rows(profiles: Array, multiplier: Array, out: Array) -> None:
 
 
 @jit
-def _interpolant(spectrum: Complex, nodes: int, theta: float) -> tuple[float, float, float]:
+def _interpolant(spectrum: Array, nodes: int, theta: float) -> tuple[float, float, float]:
     """Value, first and second derivative in theta = 2 pi x/L of the trigonometric interpolant."""
     half = nodes // 2
     step = complex(np.cos(theta), np.sin(theta))
@@ -37,7 +34,7 @@ def _interpolant(spectrum: Complex, nodes: int, theta: float) -> tuple[float, fl
 
 
 @jit
-def _newton(spectrum: Complex, nodes: int, node: int, start: float) -> tuple[float, float]:
+def _newton(spectrum: Array, nodes: int, node: int, start: float) -> tuple[float, float]:
     """The interpolant's minimum within one spacing of `node`: its value and place, in nodes.
 
     Newton's method on the slope, from `start`, kept between the points where the slope is known
@@ -60,7 +57,7 @@ def _newton(spectrum: Complex, nodes: int, node: int, start: float) -> tuple[flo
 
 
 @jit
-def refine_minimum(values: Array, spectrum: Complex) -> tuple[float, float]:
+def refine_minimum(values: Array, spectrum: Array) -> tuple[float, float]:
     """Minimum of the trigonometric interpolant of `values`, and its place in units of nodes.
 
     A parabola through each local minimum of the nodes estimates how low the interpolant falls
@@ -87,9 +84,15 @@ def refine_minimum(values: Array, spectrum: Complex) -> tuple[float, float]:
         return values[0], 0.0
     value, place = _newton(spectrum, nodes, lowest[best], starts[best])
     for i in range(count):
-        # The parabola's drop below its node is right to well within a factor of two.
-        if i != best and lows[i] - (values[lowest[i]] - lows[i]) < value:
-            other, elsewhere = _newton(spectrum, nodes, lowest[i], starts[i])
+        if i == best:
+            continue
+        # A cubic through four nodes differs from the parabola by at most 0.065 third differences.
+        node = lowest[i]
+        left, middle, right = values[node - 1], values[node], values[(node + 1) % nodes]
+        before = abs(right - 3.0 * middle + 3.0 * left - values[node - 2])
+        after = abs(values[(node + 2) % nodes] - 3.0 * right + 3.0 * middle - left)
+        if lows[i] - 0.065 * max(before, after) < value:
+            other, elsewhere = _newton(spectrum, nodes, node, starts[i])
             if other < value:
                 value, place = other, elsewhere
     return value, place % nodes
@@ -101,19 +104,30 @@ def minimum_rows(
 ) -> None:
     """Minimum over x of <g, excess>/scale for every row, and where, in units of nodes.
 
-    `scale` is the averaged load profile at the nodes. Where it is uniform, the minimum is that of
-    the interpolant of the average, else that of the interpolant of the quotient at the nodes.
+    `scale` is the averaged load profile on a grid that may be a whole number of times finer than
+    that of `excess`; the minimum is sought on that grid and then between its nodes. Where the
+    load is uniform, it is that of the interpolant of the average, else that of the interpolant of
+    the quotient.
     """
     rows, nodes = excess.shape
+    fine = scale.size
+    factor = fine // nodes
     uniform = True
-    for i in range(nodes):
+    for i in range(fine):
         if abs(scale[i] - scale[0]) > 1e-14 * scale[0]:
             uniform = False
+    spectrum = np.zeros(fine // 2 + 1, dtype=np.complex128)
     for row in range(rows):
-        spectrum = np.fft.rfft(excess[row]) * (multiplier / scale[0])
-        average = np.fft.irfft(spectrum, nodes)
-        if not uniform:
-            for i in range(nodes):
+        coarse = np.fft.rfft(excess[row])
+        for m in range(nodes // 2 + 1):
+            spectrum[m] = coarse[m] * (multiplier[m] * factor / scale[0])
+        if factor > 1:  # the highest mode of the coarse grid stands for both of its signs
+            spectrum[nodes // 2] *= 0.5
+        average = np.fft.irfft(spectrum, fine)
+        if uniform:
+            minimum[row], where = refine_minimum(average, spectrum)
+        else:
+            for i in range(fine):
                 average[i] *= scale[0] / scale[i]
-            spectrum = np.fft.rfft(average)
-        minimum[row], place[row] = refine_minimum(average, spectrum)
+            minimum[row], where = refine_minimum(average, np.fft.rfft(average))
+        place[row] = where / factor

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stiction._typing import Array
 from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.moving_average import average_rows
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.rows import Rows
 
-Array = NDArray[np.float64]
 Weights = Literal["exact", "rounded"]
 
 
@@ -97,9 +96,9 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
     return result[0] if np.ndim(tau_p) == 1 else result
 
 
-def averaged_load(rows: Rows, multiplier: Array) -> Array:
-    """<g, p> at every node, with a weight of unit integral, shape (nodes,)."""
-    average = np.empty((1, rows.nodes))
-    profile = rows.load_profile[None, :]
-    average_rows(np.ascontiguousarray(profile), multiplier / multiplier[0], average)
-    return average[0]
+def averaged_load(rows: Rows, multiplier: Array, factor: int = 1) -> Array:
+    """<g, p> with a weight of unit integral, on a grid `factor` times finer, (factor nodes,)."""
+    spectrum = np.fft.rfft(rows.load_profile) * (multiplier / multiplier[0])
+    if factor > 1:
+        spectrum[-1] *= 0.5
+    return np.fft.irfft(spectrum, factor * rows.nodes) * factor

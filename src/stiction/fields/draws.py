@@ -8,9 +8,8 @@ modes extends the same field.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from stiction._typing import Array
 
 BLOCK = 256
 

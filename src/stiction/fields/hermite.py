@@ -6,11 +6,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stiction._typing import Array
 from stiction.fields.marginals import quantile_of_normal
-
-Array = NDArray[np.float64]
 
 TERMS = 40
 QUADRATURE = 400

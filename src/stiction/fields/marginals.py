@@ -8,14 +8,12 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.stats
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 from scipy.special import ndtr
 
 from stiction._model import Positive, Real, model
+from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
-
-Array = NDArray[np.float64]
 
 
 @model

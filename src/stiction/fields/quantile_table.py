@@ -11,12 +11,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.fields.marginals import quantile_of_normal
-
-Array = NDArray[np.float64]
 
 REACH = 8.0
 PIECES = 4096

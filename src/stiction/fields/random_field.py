@@ -9,20 +9,18 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from stiction._model import model
+from stiction._typing import Array
 from stiction.errors import AccuracyWarning, InputError
 from stiction.fields.draws import standard_normal
 from stiction.fields.hermite import correlation_of_mapped, hermite_coefficients
 from stiction.fields.marginals import Marginal
 from stiction.fields.quantile_table import from_normal
-from stiction.fields.spectra import Spectrum
+from stiction.fields.spectra import CustomSpectrum, Spectrum
 from stiction.fields.synthesis import gaussian_rows
 from stiction.interface import Interface
-
-Array = NDArray[np.float64]
 
 FEWEST_LENGTHS = 4.0
 
@@ -245,12 +243,11 @@ class RandomField:
         of : {"strength", "z"}
             Correlation of the mapped field or of the Gaussian one.
         """
-        if not hasattr(self.spectrum, "with_correlation_length"):
+        if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")
         if not length > 0.0:
             raise InputError(f"length: must be positive, got {length!r}")
-        factor = length / self.efolding_length(of=of)
-        xi = self.spectrum.correlation_length * factor
+        xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = self.spectrum.with_correlation_length(xi)
         return RandomField(self.marginal, spectrum, self.mean_mode)
 

@@ -7,23 +7,22 @@ as the share of the power that is kept (`power_kept`).
 
 from __future__ import annotations
 
-import math
 import dataclasses
+import math
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import betainc, betaincinv, erf, erfinv, gamma, kv
 
 from stiction._model import Positive, _number, model
+from stiction._typing import Array
 from stiction.errors import InputError
 
-Array = NDArray[np.float64]
 Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
 
 
@@ -272,7 +271,9 @@ class CustomSpectrum(_Spectrum):
     For Python only: a study with a function of your own cannot be written to a file.
     """
 
-    function: Annotated[Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})]
+    function: Annotated[
+        Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})
+    ]
     max_wavenumber: Positive | None = None
     power_kept: Share | None = None
     type: Literal["custom"] = "custom"

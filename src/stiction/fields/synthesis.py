@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
-
-Array = NDArray[np.float64]
+from stiction._typing import Array
 
 
 @jit

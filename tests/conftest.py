@@ -1,0 +1,61 @@
+"""Shared by all tests: a compile cache that notices every edit, and the paper's system."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def _digest_of_sources() -> str:
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / "src").rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# numba does not notice an edited kernel that is called from another file: a new folder for every
+# state of the sources. Must be set before numba is imported.
+os.environ.setdefault(
+    "NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"stiction-numba-{_digest_of_sources()}")
+)
+os.environ.setdefault("STICTION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "stiction-tests"))
+
+
+@pytest.fixture
+def solid():
+    import stiction as st
+
+    return st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
+
+
+@pytest.fixture
+def problem(solid):
+    """The paper's system with the modulus G/(1-nu) that it prints, 256 nodes."""
+    import stiction as st
+
+    return st.Problem(
+        solid, st.Interface(length=0.1, nodes=256), st.SlipWeakening(weakening_rate=0.5e12)
+    )
+
+
+@pytest.fixture
+def make_strength(problem):
+    """The paper's random strength at a given xi_0/h_n."""
+    import stiction as st
+
+    def make(ratio=0.5, **options):
+        return st.RandomField(
+            marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+            spectrum=st.PowerLawSpectrum(
+                correlation_length=ratio * problem.nucleation_length, exponent=4.0, truncation=2.5
+            ),
+            **options,
+        )
+
+    return make

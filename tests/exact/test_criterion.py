@@ -1,0 +1,119 @@
+"""The local criterion against closed forms."""
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.criterion.eigenproblem import (
+    eigenvalues_and_vector,
+    exact_weight,
+    rounded_weight,
+)
+from stiction.problem import SMALLEST_EIGENVALUE
+
+
+def test_smallest_eigenvalue_and_its_vector():
+    """Digits of Uenishi and Rice's eigenproblem, converged in the number of terms."""
+    value, vector = eigenvalues_and_vector()
+    assert value == pytest.approx(0.57888694185, abs=1e-10)
+    assert pytest.approx(value, abs=1e-10) == SMALLEST_EIGENVALUE
+    expected = [1.0, -0.0874721588, -0.001737348, -0.000832592]
+    np.testing.assert_allclose(vector[:8:2], expected, atol=1e-9)
+    finer, _ = eigenvalues_and_vector(80)
+    assert finer == pytest.approx(value, abs=2e-10)
+
+
+def test_integrals_of_the_weight():
+    s = np.cos(np.linspace(np.pi, 0.0, 100_001))
+    g = exact_weight().at(s)
+    assert np.trapezoid(g, s) == pytest.approx(1.0, abs=1e-9)
+    assert np.trapezoid(s * s * g, s) == pytest.approx(0.22813196, abs=1e-8)
+    assert exact_weight().second_moment == pytest.approx(0.22813196, abs=1e-8)
+    unit_square = np.sqrt(np.trapezoid(g * g, s))
+    assert unit_square == pytest.approx(0.7499991, abs=1e-7)
+
+
+def test_eigenfunction_solves_the_integral_equation():
+    """v = (1/(2 pi lambda)) times the finite-part integral of v/(s - s')^2, term by term.
+
+    The finite part of sin(m t)-terms is -pi m sin(m t)/sin t, so the residual must vanish.
+    """
+    value, a = eigenvalues_and_vector(400)
+    t = np.linspace(0.4, np.pi - 0.4, 400)  # away from the ends, where the cut series rings
+    m = np.arange(1, a.size + 1)
+    v = a @ np.sin(np.outer(m, t))
+    stress = 0.5 * (a * m) @ np.sin(np.outer(m, t)) / np.sin(t)
+    # The terms that were cut, a_m m/2 at m = 401, are of this size.
+    np.testing.assert_allclose(stress, value * v, atol=1e-6)
+
+
+@pytest.mark.parametrize("z", [0.0, 1e-6, 0.3, 3.0, 20.0, 150.0])
+def test_multiplier_is_the_fourier_transform_of_the_weight(z):
+    s = np.cos(np.linspace(np.pi, 0.0, 200_001))
+    expected = np.trapezoid(exact_weight().at(s) * np.cos(z * s), s)
+    assert exact_weight().multiplier(np.array([z]))[0] == pytest.approx(expected, abs=1e-8)
+
+
+def test_rounded_weight_is_the_printed_one():
+    s = np.linspace(-1.0, 1.0, 2001)
+    printed = 0.751 * (0.925 - 0.308 * s**2) * np.sqrt(1.0 - s**2)
+    np.testing.assert_allclose(rounded_weight().at(s), printed, atol=1e-14)
+
+
+def test_uniform_strength_lets_go_at_its_value(problem):
+    result = st.onset(problem, np.full(256, 0.9e6), method=st.LocalCriterion())
+    assert float(result.critical_load[0]) == pytest.approx(0.9e6, rel=1e-14)
+    rounded = st.onset(problem, np.full(256, 0.9e6), method=st.LocalCriterion(weights="rounded"))
+    # 0.751 times the integral of the rounded eigenfunction is 0.751 pi/2 (0.925 - 0.077).
+    factor = 0.751 * np.pi / 2.0 * (0.925 - 0.308 / 4.0)
+    assert float(rounded.critical_load[0]) == pytest.approx(0.9e6 * factor, rel=1e-12)
+    assert round(factor, 5) == 1.00036
+
+
+def test_cosine_strength_has_its_minimum_between_the_nodes(problem):
+    x, mode, shift = problem.interface.x, 7, 0.0123
+    k = 2.0 * np.pi * mode / 0.1
+    tau_p = 1e6 - 2e5 * np.cos(k * (x - shift))
+    result = st.onset(problem, tau_p, method=st.LocalCriterion())
+    amplitude = exact_weight().multiplier(np.array([k * problem.nucleation_length / 2.0]))[0]
+    assert float(result.critical_load[0]) == pytest.approx(1e6 - 2e5 * amplitude, rel=1e-12)
+    place = float(result.critical_position[0])
+    # Seven equal minima; Newton's method finds one of them to round-off in the slope.
+    assert (place - shift) % (0.1 / mode) == pytest.approx(0.0, abs=1e-9) or (place - shift) % (
+        0.1 / mode
+    ) == pytest.approx(0.1 / mode, abs=1e-9)
+
+
+def test_load_profile_and_initial_stress(solid):
+    """tau_0 = <g, tau_p - tau_i>/<g, p>; the mean stress adds <tau_i>."""
+    interface = st.Interface(length=0.1, nodes=256)
+    x = interface.x
+    load = st.Load(
+        profile=np.full(256, 2.0),
+        initial_stress=1e5 * np.cos(2.0 * np.pi * x / 0.1) + 2e5,
+        normal_pressure=5e6,
+    )
+    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12), load)
+    result = st.onset(problem, np.full(256, 1e6), method=st.LocalCriterion())
+    k = 2.0 * np.pi / 0.1
+    amplitude = exact_weight().multiplier(np.array([k * problem.nucleation_length / 2.0]))[0]
+    load_factor = (1e6 - 2e5 - 1e5 * amplitude) / 2.0
+    assert float(result.critical_load[0]) == pytest.approx(load_factor, rel=1e-12)
+    assert float(result.critical_position[0]) == pytest.approx(0.0, abs=1e-8)
+    stress = 2.0 * load_factor + 2e5
+    assert float(result.critical_stress[0]) == pytest.approx(stress, rel=1e-12)
+    assert float(result.friction_coefficient[0]) == pytest.approx(stress / 5e6, rel=1e-12)
+
+
+def test_moduli_and_speeds():
+    """Plane stress: G (1 + nu), plane strain: G/(1 - nu), mode III: G."""
+    for plane, factor in (("stress", 1.33), ("strain", 1.0 / 0.67)):
+        solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane)
+        assert solid.effective_modulus("II") == pytest.approx(factor * 1e9, rel=1e-14)
+        assert solid.effective_modulus("III") == 1e9
+    assert solid.shear_wave_speed == pytest.approx(924.5, abs=0.05)
+    incompressible_limit = st.Solid(shear_modulus=1.0, poisson_ratio=0.25, density=1.0)
+    # nu = 1/4 in plane strain: c_R/c_s = sqrt(2 - 2/sqrt(3)), a classical closed form.
+    assert incompressible_limit.rayleigh_wave_speed == pytest.approx(
+        np.sqrt(2.0 - 2.0 / np.sqrt(3.0)), rel=1e-13
+    )

@@ -1,0 +1,176 @@
+"""Random fields against closed forms."""
+
+import numpy as np
+import pytest
+import scipy.stats
+
+import stiction as st
+from stiction.fields.marginals import quantile_of_normal
+from stiction.fields.quantile_table import from_normal, quantile_table
+
+
+@pytest.mark.parametrize(
+    ("exponent", "kept"), [(4.0, 0.9997), (2.0, 0.977), (1.5, 0.93), (1.0, 0.76)]
+)
+def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
+    spectrum = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent, truncation=2.5)
+    # The figures are printed with this many digits.
+    digits = len(str(kept)) - 2
+    assert round(spectrum.power_kept_by_truncation, digits) == kept
+
+
+@pytest.mark.parametrize(
+    "spectrum",
+    [
+        st.PowerLawSpectrum(correlation_length=0.3, exponent=1.2, power_kept=0.9),
+        st.SquaredExponentialSpectrum(correlation_length=0.3, power_kept=0.9),
+        st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.9),
+        st.CustomSpectrum(function=lambda k: np.exp(-0.5 * k * k), power_kept=0.9),
+    ],
+)
+def test_truncation_by_power_keeps_that_power(spectrum):
+    k = np.linspace(0.0, spectrum.cutoff, 200_001)
+    inside = np.trapezoid(spectrum.density(k), k)
+    far = np.concatenate([[0.0], np.geomspace(1e-4, 1e9, 400_001)])
+    total = np.trapezoid(spectrum.density(far), far)
+    # Trapezoidal sums on these grids are good to 1e-6.
+    assert inside / total == pytest.approx(0.9, abs=1e-5)
+
+
+def test_power_law_of_exponent_four_is_matern_seven_halves():
+    spectrum = st.PowerLawSpectrum(correlation_length=2.0, exponent=4.0)
+    x = np.linspace(0.0, 3.0, 50)
+    a = np.pi * x  # lambda |x|
+    expected = np.exp(-a) * (1.0 + a + 0.4 * a**2 + a**3 / 15.0)
+    np.testing.assert_allclose(spectrum.correlation(x), expected, rtol=1e-12, atol=1e-15)
+
+
+def test_efolding_lengths():
+    for spectrum in (
+        st.SquaredExponentialSpectrum(correlation_length=0.7),
+        st.ExponentialSpectrum(correlation_length=0.7),
+    ):
+        assert spectrum.efolding_length == pytest.approx(0.7, rel=1e-12)
+    power = st.PowerLawSpectrum(correlation_length=0.7, exponent=2.0)
+    again = power.with_efolding_length(0.2)
+    assert float(again.correlation(np.array([0.2]))[0]) == pytest.approx(np.exp(-1.0), rel=1e-12)
+    assert again.exponent == 2.0
+
+
+def test_efolding_length_of_the_strength_is_where_its_correlation_is_one_over_e(make_strength):
+    strength = make_strength(1.0).with_efolding_length(0.004, of="strength")
+    interface = st.Interface(length=0.4, nodes=4000)  # a node at 0.004 m; long, so nearly infinite
+    at_length = strength.correlation(interface)[40]
+    # Left over: truncation (3e-4 of the power) and the missing mean mode.
+    assert at_length == pytest.approx(np.exp(-1.0), abs=2e-2)
+    with_mean = st.RandomField(strength.marginal, strength.spectrum, mean_mode=True)
+    assert with_mean.correlation(interface)[40] == pytest.approx(np.exp(-1.0), abs=5e-4)
+    assert strength.efolding_length(of="z") > strength.efolding_length(of="strength")
+
+
+@pytest.mark.parametrize(
+    "distribution",
+    [
+        scipy.stats.beta(1.5, 3.0, 0.66e6, 1e6),
+        scipy.stats.lognorm(0.3, scale=1e6),
+        scipy.stats.weibull_min(1.7, scale=1e6),
+        scipy.stats.gamma(4.0, scale=2e5),
+        scipy.stats.truncnorm(-2.0, 3.0, loc=1e6, scale=2e5),
+        scipy.stats.uniform(1.0, 2.0),
+        scipy.stats.triang(0.3, loc=1.0, scale=2.0),
+    ],
+    ids=lambda d: d.dist.name,
+)
+def test_table_of_the_map_matches_the_quantile(distribution):
+    marginal = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=1.0)
+    ).marginal
+    z = np.linspace(-8.0, 8.0, 100_001)
+    exact = quantile_of_normal(distribution, z)
+    np.testing.assert_allclose(from_normal(marginal, z), exact, rtol=1e-9)
+    beyond = np.array([-9.0, 8.5, 20.0])
+    np.testing.assert_array_equal(
+        from_normal(marginal, beyond), quantile_of_normal(distribution, beyond)
+    )
+    # Where the table gives way to scipy, it must be rare, or sampling would be slow.
+    assert np.isnan(quantile_table(marginal)[:, 1]).mean() < 0.02
+
+
+def test_quantile_of_normal_by_scipy_below_the_median():
+    """The reference itself, against the textbook composition where that has all its digits."""
+    distribution = scipy.stats.beta(1.5, 3.0, 0.66e6, 1e6)
+    z = np.linspace(-8.0, 3.0, 101)
+    composed = distribution.ppf(scipy.stats.norm.cdf(z))
+    np.testing.assert_allclose(quantile_of_normal(distribution, z), composed, rtol=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [64, 100, 256, 1024])
+@pytest.mark.parametrize("mean_mode", [False, True])
+def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes, mean_mode):
+    """The grid of 64 nodes resolves 32 modes of the field's 289."""
+    strength = make_strength(0.25, mean_mode=mean_mode)
+    interface = st.Interface(length=0.1, nodes=nodes)
+    modes = strength.modes(interface)
+    assert modes.count == 289
+    draws = strength.draws(interface, 3, seed=5)
+    a0, pairs = (draws[:, :1], draws[:, 1:]) if mean_mode else (np.zeros((3, 1)), draws)
+    j = np.arange(1, modes.count + 1)
+    phase = 2.0 * np.pi * np.outer(j, interface.x) / interface.length
+    direct = (
+        modes.sigma[0] * a0
+        + (pairs[:, 0::2] * modes.sigma[1:]) @ np.cos(phase)
+        + (pairs[:, 1::2] * modes.sigma[1:]) @ np.sin(phase)
+    )
+    # Round-off of a sum of 578 terms of size one.
+    np.testing.assert_allclose(strength.gaussian(interface, draws), direct, atol=1e-12)
+    assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-14)
+
+
+def test_discrete_spectrum_is_the_density_at_the_modes(make_strength):
+    strength, interface = make_strength(1.0), st.Interface(length=0.1, nodes=256)
+    sigma = strength.modes(interface).sigma
+    k = 2.0 * np.pi * np.arange(1, sigma.size) / 0.1
+    lam = 2.0 * np.pi / strength.spectrum.correlation_length
+    assert k[-1] <= 2.5 * lam < k[-1] + k[0]
+    power = (k**2 + lam**2) ** -4.0
+    np.testing.assert_allclose(sigma[1:] ** 2, power / power.sum(), rtol=1e-12)
+    assert sigma[0] == 0.0
+    with_mean = make_strength(1.0, mean_mode=True).modes(interface).sigma
+    # Modes k and -k share sigma_j; the mean mode stands for itself.
+    assert with_mean[0] ** 2 / with_mean[1] ** 2 == pytest.approx(
+        0.5 * lam**-8.0 / power[0], rel=1e-12
+    )
+
+
+def test_sample_i_is_the_same_in_every_batch(make_strength):
+    strength, interface = make_strength(0.5), st.Interface(length=0.1, nodes=256)
+    whole = strength.sample(interface, samples=600, seed=3)
+    for first, samples in [(0, 1), (255, 2), (300, 300), (599, 1)]:
+        part = strength.sample(interface, samples=samples, seed=3, first=first)
+        np.testing.assert_array_equal(part, whole[first : first + samples])
+    assert not np.array_equal(whole[0], strength.sample(interface, samples=1, seed=4)[0])
+
+
+def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength):
+    interface = st.Interface(length=0.1, nodes=256)
+    few, many = make_strength(2.0), make_strength(0.25)
+    a = few.draws(interface, 5, seed=1, first=250)
+    b = many.draws(interface, 5, seed=1, first=250)
+    assert a.shape[1] < b.shape[1]
+    np.testing.assert_array_equal(a, b[:, : a.shape[1]])
+    with_mean = make_strength(2.0, mean_mode=True).draws(interface, 5, seed=1, first=250)
+    np.testing.assert_array_equal(with_mean[:, 1:], a)
+
+
+def test_streams_are_different(make_strength):
+    interface = st.Interface(length=0.1, nodes=256)
+    a = make_strength(1.0).draws(interface, 256, seed=1)
+    b = make_strength(1.0).draws(interface, 256, seed=1, stream=1)
+    # 256 x 144 products of independent normals: standard deviation of the mean 0.0052.
+    assert abs(np.mean(a * b)) < 5 * 0.0052
+
+
+def test_field_stays_between_the_bounds(make_strength):
+    profiles = make_strength(1.0).sample(st.Interface(length=0.1, nodes=256), samples=256)
+    assert profiles.min() >= 0.66e6
+    assert profiles.max() <= 1.66e6
