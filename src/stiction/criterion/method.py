@@ -21,7 +21,6 @@ from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
 from stiction.rows import Rows
 
-
 ENOUGH_POINTS = 16
 
 
