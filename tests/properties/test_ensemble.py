@@ -1,0 +1,127 @@
+"""Sample i depends on (seed, i) and on nothing else: not on workers, executors or batches."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+import stiction as st
+from stiction.ensemble.plan import chunks, compute
+from stiction.ensemble.run import make_plan
+
+SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
+
+
+@pytest.fixture
+def arguments(problem, make_strength):
+    return {"problem": problem, "strength": make_strength(), "method": st.LocalCriterion()}
+
+
+@pytest.fixture
+def reference(arguments):
+    return st.monte_carlo(**arguments, samples=SAMPLES, seed=5, workers=1)
+
+
+def assert_same_bits(left, right):
+    assert set(left.variables) == set(right.variables)
+    for name in left.variables:
+        assert left[name].dtype == right[name].dtype
+        assert left[name].values.tobytes() == right[name].values.tobytes(), name
+
+
+@pytest.mark.parametrize("workers", [2, 3])
+def test_workers_do_not_change_a_bit(arguments, reference, workers):
+    result = st.monte_carlo(**arguments, samples=SAMPLES, seed=5, workers=workers)
+    assert_same_bits(result, reference)
+    assert result.attrs == reference.attrs
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ThreadPoolExecutor(3),
+        lambda: ProcessPoolExecutor(2, mp_context=get_context("spawn")),
+    ],
+    ids=["threads", "spawned processes"],
+)
+def test_executors_do_not_change_a_bit(arguments, reference, make):
+    with make() as executor:
+        result = st.monte_carlo(**arguments, samples=SAMPLES, seed=5, executor=executor)
+    assert_same_bits(result, reference)
+
+
+@settings(max_examples=25, deadline=None)
+@given(first=some.integers(0, 900), samples=some.integers(1, 400))
+def test_any_batch_is_a_part_of_the_whole(first, samples):
+    problem = st.Problem(
+        st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+        st.Interface(length=0.1, nodes=128),
+        st.SlipWeakening(weakening_rate=0.25e12),
+    )
+    strength = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        st.PowerLawSpectrum(correlation_length=3e-3),
+    )
+    plan = make_plan(problem, strength, st.LocalCriterion(), 3, {})
+    whole = compute(plan, 0, 1300)
+    part = compute(plan, first, samples)
+    for name, values in part.items():
+        assert values.tobytes() == whole[name][first : first + samples].tobytes()
+
+
+@given(
+    samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9)
+)
+def test_pieces_cover_all_samples_once(samples, size, first):
+    pieces = list(chunks(samples, size, first))
+    assert sum(count for _, count in pieces) == samples
+    assert pieces[0][0] == first
+    for (start, count), (following, _) in zip(pieces, pieces[1:], strict=False):
+        assert start + count == following
+    assert all(0 < count <= size for _, count in pieces)
+
+
+def test_an_ensemble_may_be_continued(arguments, reference):
+    rest = st.monte_carlo(**arguments, samples=SAMPLES - 700, seed=5, first=700)
+    np.testing.assert_array_equal(rest["sample"], np.arange(700, SAMPLES))
+    np.testing.assert_array_equal(rest["critical_load"], reference["critical_load"][700:])
+
+
+def test_seeds_differ(arguments, reference):
+    other = st.monte_carlo(**arguments, samples=SAMPLES, seed=6)
+    assert not np.any(other["critical_load"].values == reference["critical_load"].values)
+
+
+def test_what_else_is_random_is_independent_of_the_strength(arguments, make_strength):
+    initial = st.RandomField(
+        st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5),
+        st.PowerLawSpectrum(correlation_length=2e-3),
+    )
+    result = st.monte_carlo(
+        **arguments,
+        samples=300,
+        seed=5,
+        initial_stress=initial,
+        keep=("strength", "initial_stress"),
+    )
+    strength, stress = result["strength"].values, result["initial_stress"].values
+    # 300 samples of about 20 independent lengths each: correlations scatter by 1/sqrt(6000).
+    assert abs(np.corrcoef(strength.ravel(), stress.ravel())[0, 1]) < 0.05
+    direct = st.onset(
+        arguments["problem"], strength, method=st.LocalCriterion(), initial_stress=stress
+    )
+    np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
+
+
+def test_progress_counts_every_sample_once(arguments):
+    seen = []
+    st.monte_carlo(
+        **arguments, samples=SAMPLES, workers=2, progress=lambda done, total: seen.append(
+            (done, total)
+        )
+    )
+    assert seen[-1] == (SAMPLES, SAMPLES)
+    assert [done for done, _ in seen] == sorted({done for done, _ in seen})
