@@ -6,9 +6,10 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction.equilibrium.bound import window_bound
-from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run, jump
+from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.program import solve_program
+from stiction.equilibrium.runaway import runs_away
 from stiction.equilibrium.spaces import Sample, make_room
 from stiction.equilibrium.stiffness import apply_stiffness
 
@@ -18,9 +19,6 @@ COLUMNS = 10
 
 FLOOR_REACHED = 3
 """Fate of a sample whose floor is reached before the first instability."""
-
-QUICK_STEPS = 40
-"""Elastic steps of the quick test for arrest."""
 
 
 @jit
@@ -73,11 +71,12 @@ def solve_batch(
     floor,
     profile,
     rate,
-    uniform,
+    usual_rate,
     grid,
-    thresholds,
-    widths,
-    modes,
+    usual,
+    others,
+    block,
+    reach,
     spacing,
     modulus,
     results,
@@ -91,11 +90,13 @@ def solve_batch(
     excess, floor, rate : (samples, n) arrays
         tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
     profile : (n,) array
-    uniform : bool
-        Whether W is the same at all nodes of each sample.
+    usual_rate : float
+        The problem's uniform weakening rate, or NaN.
     grid : Grid
-    thresholds, widths, modes : arrays
-        From `window_table`, thresholds in Pa/m.
+    usual, others : Windows
+        For samples with the usual rate everywhere, and for all others.
+    block, reach : array and int
+        From `block_factor`.
     spacing, modulus : float
         m and Pa.
     results : (samples, COLUMNS) array, output
@@ -108,17 +109,17 @@ def solve_batch(
     stiff = np.empty(n)
     multiplier = np.empty(n)
     critical = np.empty(n)
-    work = np.empty((2, n))
+    work = np.empty((6, n))
+    wide_column = np.concatenate((grid.column, grid.column, grid.column))
     for row in range(samples):
         for i in range(n):
             critical[i] = (excess[row, i] - floor[row, i]) / rate[row, i]
             room.diagonal[i] = grid.column[0] - rate[row, i]
         sample = Sample(excess[row], floor[row], profile, rate[row], critical)
-        bound, start, choice = window_bound(
-            excess[row], profile, rate[row], uniform, thresholds, widths, modes, work
-        )
-        width = 0 if choice < 0 else widths[choice]
-        start_from_bound(start, width, modes[max(choice, 0)], multiplier, profile)
+        windows = usual if np.all(rate[row] == usual_rate) else others
+        bound, start, choice = window_bound(excess[row], profile, rate[row], windows, work)
+        width = 0 if choice < 0 else windows.widths[choice]
+        start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, profile)
         load, size, cuts, status = solve_program(
             excess[row], profile, grid, bound, np.inf, multiplier, slip, stiff, room
         )
@@ -143,6 +144,16 @@ def solve_batch(
                 line[FATE] = FLOOR_REACHED
         if line[FATE] == UNDECIDED:
             escape = escape_run(sample, load, spacing, modulus)
-            line[FATE] = jump(
-                sample, grid, load, slip, stiff, multiplier, escape, QUICK_STEPS, False, room
+            line[FATE] = runs_away(
+                sample,
+                wide_column,
+                load,
+                slip,
+                stiff,
+                multiplier,
+                room.vectors[2],  # left there by `certificate`
+                escape,
+                block,
+                reach,
+                work,
             )

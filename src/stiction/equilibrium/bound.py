@@ -8,6 +8,7 @@ above: the grid's form of the criterion of Uenishi and Rice (2003), and strict o
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -66,62 +67,97 @@ def smallest_window(nodes: int, rate: float) -> int | None:
     return high if high < nodes else None
 
 
-@functools.lru_cache(maxsize=64)
-def window_table(nodes: int, lowest: float, highest: float) -> tuple[Array, NDArray[np.int64], Array]:
-    """Windows for weakening rates between two values: thresholds, widths, padded eigenvectors.
+def ladder(nodes: int) -> list[int]:
+    """Widths tried where the weakening rate varies: the same for all samples."""
+    widths = [1]
+    while widths[-1] < nodes // 2:
+        widths.append(max(widths[-1] + 1, int(widths[-1] * GROWTH)))
+    return widths[:-1]
 
-    Returns
-    -------
+
+class Windows(NamedTuple):
+    """Unstable windows, the narrowest first.
+
+    Attributes
+    ----------
     thresholds : (count,) array
-        Rate, in units of (G*/2)(2 pi/L), from which on each window is unstable, falling.
+        Weakening rate from which on each is unstable, Pa/m, falling.
     widths : (count,) int array
-        Rising.
-    modes : (count, max(widths)) array
-        Eigenvectors of unit sum, zero beyond their width. No rows if no window is unstable.
+    modes : (count or 1, largest width) array
+        Eigenvectors of unit sum, zero beyond their width.
     """
-    first = smallest_window(nodes, highest)
-    if first is None:
-        return np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 1))
-    widths = [first]
-    while window_mode(nodes, widths[-1])[0] > lowest:
-        widest = max(widths[-1] + 1, int(widths[-1] * GROWTH))
-        if widest > nodes // 2:
-            break
-        widths.append(widest)
-    modes = np.zeros((len(widths), widths[-1]))
+
+    thresholds: Array
+    widths: NDArray[np.int64]
+    modes: Array
+
+
+def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
+    modes = np.zeros((max(len(widths), 1), max(widths, default=1)))
     for i, width in enumerate(widths):
         modes[i, :width] = window_mode(nodes, width)[1]
-    thresholds = np.array([window_mode(nodes, width)[0] for width in widths])
-    return thresholds, np.array(widths, dtype=np.int64), modes
+    thresholds = np.array([window_mode(nodes, width)[0] * unit for width in widths])
+    return Windows(thresholds, np.array(widths, dtype=np.int64), modes)
+
+
+def exact_window(nodes: int, rate: float, unit: float) -> Windows:
+    """The narrowest window that is unstable at one weakening rate, if there is any.
+
+    Parameters
+    ----------
+    nodes : int
+    rate, unit : float
+        W and (G*/2)(2 pi/L), Pa/m.
+    """
+    width = smallest_window(nodes, rate / unit)
+    return _windows(nodes, () if width is None else (width,), unit)
+
+
+def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> Windows:
+    """Rungs of the ladder for weakening rates from `lowest` to `highest`, Pa/m."""
+    rungs = ladder(nodes)
+
+    def rung(rate: float) -> int:
+        low, high = -1, len(rungs)
+        while high - low > 1:
+            middle = (low + high) // 2
+            if window_mode(nodes, rungs[middle])[0] * unit <= rate:
+                high = middle
+            else:
+                low = middle
+        return high
+
+    return _windows(nodes, tuple(rungs[rung(highest) : rung(lowest) + 1]), unit)
 
 
 @jit
-def window_bound(excess, profile, rate, uniform, thresholds, widths, modes, work):
+def window_bound(excess, profile, rate, windows, work):
     """Lowest bound over all windows and the uniform field.
 
     Parameters
     ----------
     excess, profile, rate : (n,) arrays
         tau_p - tau_i (Pa), load profile, weakening rate (Pa/m).
-    uniform : bool
-        Whether the rate is the same everywhere.
-    thresholds : (count,) array
-        As from `window_table`, times (G*/2)(2 pi/L): Pa/m.
-    widths, modes : arrays
-        From `window_table`.
+    windows : Windows
     work : (2, n) array
 
     Returns
     -------
     bound, start, choice : float, int, int
-        Load (Pa), first node of the window, and row of the table; row -1 is the uniform field.
+        Load (Pa), first node of the window, and its number; -1 is the uniform field.
     """
     n = excess.shape[0]
     best = excess.sum() / profile.sum()
     start = 0
     choice = -1
+    lowest = rate.min()
+    highest = rate.max()
+    thresholds = windows.thresholds
+    modes = windows.modes
     for c in range(thresholds.shape[0]):
-        width = widths[c]
+        if thresholds[c] > highest:
+            continue
+        width = windows.widths[c]
         above = work[0]
         below = work[1]
         above[:] = 0.0
@@ -135,13 +171,13 @@ def window_bound(excess, profile, rate, uniform, thresholds, widths, modes, work
             for a in range(n - shift, n):
                 above[a] += z * excess[a + shift - n]
                 below[a] += z * profile[a + shift - n]
-        if uniform:
+        if thresholds[c] <= lowest:
             for a in range(n):
                 if above[a] < best * below[a]:
                     best = above[a] / below[a]
                     start = a
                     choice = c
-            continue
+            break  # wider windows are unstable too, but bound less tightly
         # Last node of the current stretch in which every node weakens fast enough.
         length = 0
         for q in range(2 * n):

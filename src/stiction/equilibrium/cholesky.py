@@ -172,6 +172,18 @@ def extend_forward(factor, first, last, members, values, forward):
 
 
 @jit_sums
+def substitute(factor, size, values, forward):
+    """Solve L forward = values, both in the order of the rows."""
+    for r in range(size):
+        start = row_start(r)
+        row = factor[start : start + r + 1]
+        total = 0.0
+        for t in range(r):
+            total += row[t] * forward[t]
+        forward[r] = (values[r] - total) / row[r]
+
+
+@jit_sums
 def back_substitute(factor, size, right, solution):
     """Solve L^T solution = right, rows of L taken four at a time; `right` is used up."""
     i = size

@@ -1,0 +1,133 @@
+"""The path of equilibria, event by event: the load rises until a node slips or reaches its floor.
+
+Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q the strength less
+the initial stress, W = 0 where the floor is reached. An event is a node at rest that reaches its
+strength (a row of the factor more), a slipping node that reaches its floor (a new factor), or a
+node whose slipping makes A singular: the path has an end there, at this load.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import jit
+from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
+from stiction.equilibrium.jump import AT_FLOOR
+from stiction.equilibrium.program import PIVOT, singular_direction
+from stiction.equilibrium.stiffness import apply_stiffness
+
+REACHED = 0
+UNSTABLE = 1
+
+
+@jit
+def build(sample, grid, slip, residual, strength, room):
+    """Factor of A on the slipping nodes for their present states; returns how many there are."""
+    count = 0
+    for i in range(slip.shape[0]):
+        room.inside[i] = slip[i] > 0.0
+        residual[i] = room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i]
+        strength[i] = sample.floor[i] if residual[i] else sample.excess[i]
+        room.diagonal[i] = grid.column[0] - (0.0 if residual[i] else sample.rate[i])
+        if room.inside[i]:
+            room.order[count] = i
+            count += 1
+    return count
+
+
+@jit
+def advance(sample, grid, load, target, slip, stiff, direction, events, room):
+    """Follow the stable path from one load towards another.
+
+    Parameters
+    ----------
+    sample, grid : Sample, Grid
+    load : float
+        tau_0 (Pa) at which `slip` is a stable equilibrium.
+    target : float
+        Load at which to stop.
+    slip, stiff : (n,) arrays, changed
+        d and K d.
+    direction : (n,) array, output
+        If the path ends: in which it is unstable, z >= 0 and A z <= 0.
+    events : int
+        Events at most.
+    room : Room
+
+    Returns
+    -------
+    load, status : float, int
+        REACHED or UNSTABLE.
+    """
+    n = slip.shape[0]
+    right = room.vectors[0]
+    solution = room.vectors[1]
+    stiff_rate = room.vectors[2]
+    rate = room.vectors[3]
+    residual = np.zeros(n, np.bool_)
+    strength = np.empty(n)
+    own = grid.column[0]
+    size = 0
+    rebuild = True
+    for _ in range(events):
+        if rebuild:
+            count = build(sample, grid, slip, residual, strength, room)
+            size = append(
+                room.factor, 0, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+            )
+            if size < count:
+                # Stability was lost exactly as the floor was reached.
+                singular_direction(room, size, direction)
+                return load, UNSTABLE
+            extend_forward(room.factor, 0, size, room.members, sample.profile, room.forward[0])
+            extend_forward(room.factor, 0, size, room.members, strength, room.forward[1])
+            rebuild = False
+        for t in range(size):
+            right[t] = room.forward[0, t]
+        back_substitute(room.factor, size, right, rate)
+        apply_stiffness(grid.strip, own, room.members, size, rate, room.halves, stiff_rate)
+        for t in range(size):
+            right[t] = load * room.forward[0, t] - room.forward[1, t]
+        back_substitute(room.factor, size, right, solution)
+        apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff)
+        step = target - load
+        starts = -1
+        ends = -1
+        for i in range(n):
+            if not room.inside[i]:
+                margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
+                closing = sample.profile[i] - stiff_rate[i]
+                if closing > 0.0 and margin < step * closing:
+                    step = margin / closing
+                    starts = i
+        for t in range(size):
+            i = room.members[t]
+            if not residual[i] and rate[t] > 0.0:
+                left = max(sample.critical[i] - solution[t], 0.0)
+                if left < step * rate[t]:
+                    step = left / rate[t]
+                    starts = -1
+                    ends = i
+        load = target if starts < 0 and ends < 0 else load + step
+        for t in range(size):
+            slip[room.members[t]] = max(solution[t] + step * rate[t], 0.0)
+        for i in range(n):
+            stiff[i] += step * stiff_rate[i]
+        if ends >= 0:
+            slip[ends] = sample.critical[ends]
+            rebuild = True
+        elif starts >= 0:
+            room.order[0] = starts
+            now = append(
+                room.factor, size, room.members, room.order, 1, grid.column, room.diagonal, PIVOT
+            )
+            if now == size:
+                singular_direction(room, size, direction)
+                return load, UNSTABLE
+            extend_forward(room.factor, size, now, room.members, sample.profile, room.forward[0])
+            extend_forward(room.factor, size, now, room.members, strength, room.forward[1])
+            room.inside[starts] = True
+            size = now
+        else:
+            return load, REACHED
+    return load, REACHED
