@@ -78,6 +78,8 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
     if array.shape not in shapes and not (count is None and array.shape[1:] == (nodes,)):
         valid = f"({samples if count else 'samples'}, {nodes}) or ({nodes},)"
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}")
+    if array.size == 0:
+        raise InputError(f"{name}: has no samples, shape {array.shape}")
     bad = ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])

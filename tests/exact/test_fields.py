@@ -174,3 +174,12 @@ def test_field_stays_between_the_bounds(make_strength):
     profiles = make_strength(1.0).sample(st.Interface(length=0.1, nodes=256), samples=256)
     assert profiles.min() >= 0.66e6
     assert profiles.max() <= 1.66e6
+
+
+def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
+    """The limit of a correlation length that is infinite against the interface."""
+    interface = st.Interface(length=0.1, nodes=64)
+    profiles = make_strength(1e6, mean_mode=True).sample(interface, samples=300, seed=1)
+    # Round-off of one transform.
+    np.testing.assert_allclose(profiles, profiles[:, :1] * np.ones(64), rtol=1e-13)
+    assert np.ptp(profiles[:, 0]) > 0.5e6

@@ -150,6 +150,10 @@ CASES = {
         lambda: st.onset(make_problem(), np.full(256, np.nan), method=st.LocalCriterion()),
         ["tau_p", "finite"],
     ),
+    "no samples": (
+        lambda: st.onset(make_problem(), np.ones((0, 256)), method=st.LocalCriterion()),
+        ["tau_p", "no samples"],
+    ),
     "strength below residual": (
         lambda: st.onset(
             make_problem(), np.ones(256), method=st.LocalCriterion(), residual_strength=2.0

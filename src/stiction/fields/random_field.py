@@ -287,7 +287,7 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
     spacing = 2.0 * math.pi / interface.length
     # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
     count = math.floor(field.spectrum.cutoff / spacing * (1.0 + 1e-12))
-    if count < 1:
+    if count < 1 and not field.mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {interface.length:g} m: the first mode"
             f" is at {spacing:.3g} rad/m, the spectrum is truncated at"
