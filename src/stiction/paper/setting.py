@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
+from pydantic import model_validator
+
+from stiction._model import Positive, model
 from stiction.errors import InputError
-from stiction.fields.marginals import Beta
+from stiction.fields.marginals import Beta, Marginal
 from stiction.fields.random_field import RandomField
 from stiction.fields.spectra import PowerLawSpectrum
 from stiction.friction import SlipWeakening
@@ -79,3 +82,72 @@ def strength(problem: Problem, correlation_ratio: float = 0.5) -> RandomField:
             truncation=2.5,
         ),
     )
+
+
+@model(kw_only=True)
+class Setting:
+    """What the studies of the paper are run for; another one changes figures and verdicts.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a uniform weakening rate.
+    marginal : Beta or frozen continuous scipy.stats distribution
+    exponent, truncation : float
+        Of the power-law spectrum.
+    mean_mode : bool
+        Whether the Gaussian field has the mode k = 0.
+    correlation_ratios : tuple of float
+        xi_0/h_n of the Monte Carlo study, rising, two to six of them.
+    """
+
+    problem: Problem = problem()  # noqa: RUF009 - frozen, so one default instance may be shared
+    marginal: Marginal = Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)  # noqa: RUF009 - same
+    exponent: Positive = 4.0
+    truncation: Positive = 2.5
+    mean_mode: bool = False
+    correlation_ratios: tuple[Positive, ...] = CORRELATION_RATIOS
+
+    @model_validator(mode="after")
+    def _rising(self) -> Setting:
+        ratios = self.correlation_ratios
+        if not 2 <= len(ratios) <= 6 or any(
+            left >= right for left, right in zip(ratios[:-1], ratios[1:], strict=True)
+        ):
+            raise InputError(f"correlation_ratios: must be 2 to 6 rising numbers, got {ratios!r}")
+        return self
+
+    def field(self, correlation_ratio: float, **changes: Any) -> RandomField:
+        """The random strength at xi_0/h_n; `changes` replace marginal, exponent, mean_mode, ...
+
+        Parameters
+        ----------
+        correlation_ratio : float
+        **changes
+            `marginal`, `exponent`, `truncation`, `power_kept`, `mean_mode`, or
+            `nucleation_length` (m) in place of the problem's own.
+        """
+        length = changes.get("nucleation_length", self.problem.nucleation_length)
+        kept = changes.get("power_kept")
+        spectrum = PowerLawSpectrum(
+            correlation_length=correlation_ratio * length,
+            exponent=changes.get("exponent", self.exponent),
+            truncation=None if kept else changes.get("truncation", self.truncation),
+            power_kept=kept,
+        )
+        return RandomField(
+            marginal=changes.get("marginal", self.marginal),
+            spectrum=spectrum,
+            mean_mode=changes.get("mean_mode", self.mean_mode),
+        )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Support of the strength, Pa; infinite where it has no bound."""
+        low, high = self.marginal.distribution.support()
+        return float(low), float(high)
+
+    @property
+    def mean(self) -> float:
+        """Mean strength <tau_p>, Pa."""
+        return float(self.marginal.distribution.mean())
