@@ -129,7 +129,6 @@ def implicit_steps(  # type: ignore[no-untyped-def]
     profile, initial, critical = rows[4], rows[5], rows[3]
     root = np.sqrt(2.0)
     tabulated, paired = -1.0, -1.0
-    past_hat = np.fft.rfft(past)
     taken = 0
     while taken < count:
         clipped = False
@@ -162,6 +161,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         time = watch[0] + size
         load = load_at(load_times, load_values, time)
         _carry(memory, table, weights, carried)
+        past_hat = np.fft.rfft(past)
         pushed_hat[0] = impedance * share * past_hat[0]
         for j in range(modes):
             pushed_hat[j + 1] = (
@@ -208,7 +208,6 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         for j in range(modes):
             memory_part = carried[j] + fresh[j] * rate_hat[j + 1] + turn[j] * past_hat[j + 1]
             pushed_hat[j + 1] = stiffness[1, j] * memory_part - stiffness[0, j] * slip_hat[j + 1]
-        past_hat = rate_hat
         moved = np.fft.irfft(pushed_hat, n)
         for i in range(n):
             work += u[i] * (mean_load * profile[i] + initial[i])

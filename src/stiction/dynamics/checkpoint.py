@@ -1,0 +1,141 @@
+"""Checkpoints: a run's whole state in one file, from which it goes on as if never interrupted."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import track
+from stiction.dynamics.run import Run, State
+from stiction.errors import InputError
+
+FORMAT = 1
+
+_NAMES = {
+    "nodes": "number of nodes",
+    "spacing": "spacing of the nodes (m)",
+    "impedance": "G/(2 c_s) (Pa s/m)",
+    "time_step": "explicit time step (s)",
+    "poles": "memory kernel",
+    "weights": "memory kernel",
+    "stiffness": "elastic stiffness",
+    "tau_p": "peak strength (Pa)",
+    "tau_r": "residual strength (Pa)",
+    "weakening_rate": "weakening rate (Pa/m)",
+    "profile": "load profile",
+    "initial_stress": "initial stress (Pa)",
+    "load_times": "load history (s)",
+    "load_values": "load history (Pa)",
+    "control": "step control of the method",
+}
+
+
+def identity(run: Run) -> dict[str, NDArray[Any]]:
+    """All that a run depends on besides its state."""
+    medium, rows = run.medium, run.rows
+    # When to stop may differ between the parts of one run; how to step may not.
+    control = run.control.copy()
+    control[[track.SLID_STOP, track.DROP_STOP, track.END_TIME]] = 0.0
+    values: dict[str, Any] = {
+        "nodes": medium.nodes,
+        "spacing": medium.spacing,
+        "impedance": medium.impedance,
+        "time_step": medium.step,
+        "stiffness": medium.stiffness,
+        "poles": medium.kernel.poles,
+        "weights": medium.kernel.weights,
+        "tau_p": rows[0],
+        "tau_r": rows[1],
+        "weakening_rate": rows[2],
+        "profile": rows[4],
+        "initial_stress": rows[5],
+        "load_times": run.history[0],
+        "load_values": run.history[1],
+        "control": control,
+    }
+    return {name: np.asarray(value) for name, value in values.items()}
+
+
+def write_atomically(path: Path, arrays: dict[str, Any]) -> None:
+    """Write an .npz aside, sync it, rename it: the old file stays whole until the new one is."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as stream:
+        try:
+            np.savez(stream, **arrays)
+            stream.flush()
+            os.fsync(stream.fileno())
+        except BaseException:
+            os.unlink(stream.name)
+            raise
+    os.replace(stream.name, path)
+
+
+def write_checkpoint(path: str | Path, run: Run, state: State) -> None:
+    """Save the state of a run, with all that it depends on.
+
+    Parameters
+    ----------
+    path : path
+        Replaced as a whole if it exists.
+    run, state
+    """
+    arrays: dict[str, Any] = {"format": FORMAT}
+    arrays |= {f"run_{name}": value for name, value in identity(run).items()}
+    arrays |= {f"state_{f.name}": getattr(state, f.name) for f in dataclasses.fields(State)}
+    write_atomically(Path(path), arrays)
+
+
+def _difference(name: str, here: NDArray[Any], there: NDArray[Any]) -> str:
+    what = _NAMES[name]
+    if here.shape != there.shape:
+        return f"{what}: shape {there.shape} in the checkpoint, {here.shape} here"
+    if here.ndim == 0:
+        return f"{what}: {there[()]:g} in the checkpoint, {here[()]:g} here"
+    node = int(np.argmax((here != there).ravel()))
+    return (
+        f"{what}: entry {node} is {there.ravel()[node]:g} in the checkpoint, "
+        f"{here.ravel()[node]:g} here"
+    )
+
+
+def read_checkpoint(path: str | Path, run: Run) -> State:
+    """The state saved in a checkpoint of this very run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has another format version, or belongs to another problem,
+        strength, load or method; every difference is named.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+    except FileNotFoundError:
+        raise InputError(f"restart: there is no checkpoint {str(path)!r}") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"restart: {str(path)!r} is not a readable checkpoint: {error}") from None
+    found = arrays.get("format")
+    if found is None or int(found) != FORMAT:
+        given = "none" if found is None else int(found)
+        raise InputError(
+            f"restart: {str(path)!r} has format version {given}, this version reads {FORMAT}"
+        )
+    here = identity(run)
+    problems = []
+    for name, value in here.items():
+        saved = arrays[f"run_{name}"]
+        if not np.array_equal(saved, value):
+            problems.append(f"restart: other {_difference(name, value, saved)}")
+    if problems:
+        raise InputError(problems)
+    values = {f.name: arrays[f"state_{f.name}"] for f in dataclasses.fields(State)}
+    values["explicit"] = bool(values["explicit"])
+    values["step"] = float(values["step"])
+    return State(**values)

@@ -1,0 +1,123 @@
+"""Frames: what a run shows at chosen moments, and their labels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import track
+from stiction.dynamics.measures import fracture_energy, strain_energy
+from stiction.dynamics.run import Run, State
+from stiction.errors import InputError, unknown_name
+from stiction.results import Variable
+
+Floats = NDArray[np.float64]
+
+FIELDS: dict[str, Variable] = {
+    "slip": Variable("m", "slip", ("time", "x")),
+    "slip_rate": Variable("m/s", "slip rate", ("time", "x")),
+    "shear_stress": Variable("Pa", "shear stress on the interface", ("time", "x")),
+    "strength": Variable("Pa", "current strength", ("time", "x")),
+}
+SCALARS: dict[str, Variable] = {
+    "load": Variable("Pa", "load factor tau_0", ("time",)),
+    "mean_stress": Variable("Pa", "mean shear stress on the interface", ("time",)),
+    "mean_slip": Variable("m", "mean slip", ("time",)),
+    "top_slip_rate": Variable("m/s", "largest slip rate", ("time",)),
+    "weakened_fraction": Variable("1", "share of nodes at the residual strength", ("time",)),
+    "seismic_moment": Variable("N", "seismic moment per length", ("time",)),
+    "work": Variable("J/m", "work of the load on the slip", ("time",)),
+    "strain_energy": Variable("J/m", "static strain energy of the slip", ("time",)),
+    "fracture_energy": Variable("J/m", "energy dissipated above the residual", ("time",)),
+    "radiated_energy": Variable("J/m", "work less friction less strain energy", ("time",)),
+    "time_step": Variable("s", "size of the last step", ("time",)),
+    "step_number": Variable("1", "steps taken so far", ("time",)),
+}
+STEPS: dict[str, Variable] = {
+    "step_time": Variable("s", "time after each step", ("step",)),
+    "step_load": Variable("Pa", "load factor tau_0 after each step", ("step",)),
+    "step_mean_stress": Variable("Pa", "mean shear stress after each step", ("step",)),
+    "step_mean_slip": Variable("m", "mean slip after each step", ("step",)),
+    "step_top_slip_rate": Variable("m/s", "largest slip rate after each step", ("step",)),
+    "step_size": Variable("s", "size of each step", ("step",)),
+    "step_work": Variable("J/m", "work of the load up to each step", ("step",)),
+}
+TIME = Variable("s", "time from zero load", ("time",))
+
+
+def check_variables(names: Sequence[str]) -> None:
+    """Refuse unknown names of fields."""
+    if isinstance(names, str):
+        raise InputError(f"variables: must be a list of names, got the string {names!r}")
+    problems = [unknown_name("variables", name, FIELDS) for name in names if name not in FIELDS]
+    if problems:
+        raise InputError(problems)
+
+
+class Frames:
+    """Frames and step records gathered so far, until they are taken away."""
+
+    def __init__(self, run: Run, variables: Sequence[str], *, steps: bool) -> None:
+        self.run, self.variables, self.keep_steps = run, tuple(variables), steps
+        self._frames: list[dict[str, Any]] = []
+        self._records: list[Floats] = []
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def add_steps(self, record: Floats) -> None:
+        """Keep the record of some steps."""
+        if self.keep_steps and record.shape[0]:
+            self._records.append(record.copy())
+
+    def add(self, state: State) -> None:
+        """Keep a frame of the state as it is now."""
+        run, rows = self.run, self.run.rows
+        medium, watch = run.medium, state.watch
+        spacing = medium.spacing
+        dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
+        fracture = float(dissipated.sum()) * spacing
+        strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
+        friction = fracture + float((rows[1] * state.slip).sum()) * spacing
+        work = float(watch[track.WORK])
+        frame: dict[str, Any] = {
+            "time": state.time,
+            "load": state.load,
+            "mean_stress": state.mean_stress,
+            "mean_slip": float(state.slip.mean()),
+            "top_slip_rate": float(state.rate.max()),
+            "weakened_fraction": float(watch[track.SLID]) / medium.nodes,
+            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * spacing,
+            "work": work,
+            "strain_energy": strain,
+            "fracture_energy": fracture,
+            "radiated_energy": work - friction - strain,
+            "time_step": float(watch[track.STEP]),
+            "step_number": state.steps,
+        }
+        fields = {
+            "slip": state.slip,
+            "slip_rate": state.rate,
+            "shear_stress": state.stress,
+            "strength": np.maximum(rows[0] - rows[2] * state.slip, rows[1]),
+        }
+        frame |= {name: fields[name].copy() for name in self.variables}
+        self._frames.append(frame)
+
+    def take(self) -> dict[str, NDArray[Any]]:
+        """All gathered as arrays, time first; what was gathered is let go."""
+        values = {
+            name: np.array([frame[name] for frame in self._frames])
+            for name in ("time", *SCALARS, *self.variables)
+        }
+        if not self._frames:
+            n = self.run.medium.nodes
+            values |= {name: np.empty((0, n)) for name in self.variables}
+        if self.keep_steps:
+            record = np.concatenate([np.empty((0, track.COLUMNS)), *self._records])
+            values |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
+        self._frames, self._records = [], []
+        return values

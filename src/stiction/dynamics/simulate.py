@@ -1,0 +1,342 @@
+"""simulate_rupture: one rupture in space and time."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiction._model import describe, to_plain
+from stiction.dynamics import track
+from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
+from stiction.dynamics.frames import Frames, check_variables
+from stiction.dynamics.loading import first_reach, load_history, uniform_rate
+from stiction.dynamics.measures import rupture_speed
+from stiction.dynamics.method import (
+    Rupture,
+    check_finite,
+    first_slip,
+    front_window,
+    make_run,
+    summary,
+    warn_if_coarse,
+)
+from stiction.dynamics.run import NOTHING, Run, State
+from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
+from stiction.errors import AccuracyWarning, InputError
+from stiction.problem import Problem
+from stiction.results import Variable
+
+Stop = Literal["sliding", "onset", "arrest", "time"]
+
+_NEAR_ONSET = 0.02  # fall of the mean stress, in units of tau_p - tau_r, that counts as 'around'
+
+_ALONG: dict[str, Variable] = {
+    "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
+    "arrival_time": Variable("s", "when half of the critical slip was reached", ("x",)),
+    "front_speed": Variable("m/s", "apparent speed of the rupture front", ("x",)),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """What a progress callback is told.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    load, mean_stress : float
+        Pa.
+    steps : int
+        Of both kinds so far.
+    weakened_fraction : float
+        Share of nodes at the residual strength.
+    """
+
+    time: float
+    load: float
+    mean_stress: float
+    steps: int
+    weakened_fraction: float
+
+
+def _progress(state: State) -> Progress:
+    return Progress(
+        state.time,
+        state.load,
+        state.mean_stress,
+        state.steps,
+        float(state.watch[track.SLID]) / state.slip.size,
+    )
+
+
+def _check(options: dict[str, Any]) -> None:
+    problems = []
+    for name in ("every", "every_implicit", "every_near_onset", "checkpoint_every", "chunk"):
+        value = options[name]
+        if value is not None and (not isinstance(value, int) or value < 1):
+            problems.append(f"{name}: must be a whole number of steps, at least 1, got {value!r}")
+    for name in ("interval", "end_time"):
+        value = options[name]
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
+    if options["stop"] not in get_args(Stop):
+        problems.append(f"stop: must be one of {get_args(Stop)}, got {options['stop']!r}")
+    elif options["stop"] == "time" and options["end_time"] is None:
+        problems.append("end_time: needed with stop='time', got None")
+    if (options["initial_slip"] is None) != (options["initial_load"] is None):
+        problems.append("initial_slip and initial_load: give both or neither")
+    if not isinstance(options["method"], Rupture):
+        problems.append(
+            "method: must be a method object st.Rupture(loading_rate=...), got "
+            f"{describe(options['method'])}"
+        )
+    if problems:
+        raise InputError(problems)
+
+
+def _initial(run: Run, slip: Any, load: float | None) -> State:
+    if slip is None or load is None:
+        return run.start(first_slip(run))
+    start = np.asarray(slip, dtype=np.float64)
+    if start.shape != (run.medium.nodes,) or not np.all(start >= 0.0):
+        raise InputError(
+            f"initial_slip: must be ({run.medium.nodes},) and nowhere negative, got "
+            f"{describe(np.asarray(slip))}"
+        )
+    return run.start(first_reach(run.history, float(load)), start)
+
+
+def simulate_rupture(
+    problem: Problem,
+    tau_p: Any,
+    *,
+    method: Rupture,
+    residual_strength: Any = None,
+    initial_stress: Any = None,
+    weakening_rate: Any = None,
+    load: Any = None,
+    initial_slip: Any = None,
+    initial_load: float | None = None,
+    variables: Sequence[str] = ("slip", "slip_rate", "shear_stress"),
+    every: int = 10,
+    every_implicit: int = 1,
+    every_near_onset: int | None = None,
+    interval: float | None = None,
+    steps: bool = True,
+    stop: Stop = "sliding",
+    end_time: float | None = None,
+    store: str | Path | None = None,
+    chunk: int = 64,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: int = 10_000,
+    restart: str | Path | None = None,
+    progress: Callable[[Progress], Any] | None = None,
+) -> xr.Dataset:
+    """Simulate one interface from its first slip to global sliding, in space and time.
+
+    Parameters
+    ----------
+    problem : Problem
+    tau_p : (nodes,) or (1, nodes) array
+        Peak strength, Pa.
+    method : Rupture
+        Loading rate and numerical options.
+    residual_strength, initial_stress, weakening_rate : array, optional
+        (nodes,), Pa or Pa/m; replaces the problem's own.
+    load : callable or (times, values), optional
+        tau_0(t), Pa, instead of the method's constant rate. It must not fall before the first
+        slip. A callable needs `end_time`.
+    initial_slip, initial_load : (nodes,) array in m, float in Pa, optional
+        Start from this equilibrium (with an empty memory) instead of from rest at first slip.
+    variables : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
+        Fields to keep.
+    every, every_implicit, every_near_onset : int
+        Steps between frames: explicit ones, implicit ones (while the interface creeps), and
+        explicit ones until the mean stress has fallen by 2 % of the mean strength drop (if
+        given). Since steps shorten as the interface accelerates, frames are dense in time around
+        onset anyhow.
+    interval : float, optional
+        Smallest time between frames, s.
+    steps : bool
+        Keep time, load, mean stress, ... of every step, over 'step'.
+    stop : {"sliding", "onset", "arrest", "time"}
+        When every node is at its residual strength; when the mean stress has fallen by
+        `method.event_drop`; when an instability has come to rest; or only at `end_time`.
+    end_time : float, optional
+        s; the run never goes beyond it (except for a part of the last explicit step).
+    store : path, optional
+        Folder to stream frames to, in chunks of `chunk` frames; memory then stays bounded, the
+        result holds no fields, and `open_rupture` reads them back.
+    checkpoint : path, optional
+        File to save the whole state to, every `checkpoint_every` steps and at the end.
+    restart : path, optional
+        Checkpoint of the same run to go on from; every later number is the same, bit by bit. The
+        result holds what comes after it (with `store`, everything).
+    progress : callable, optional
+        Called with a `Progress` after each frame.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, energies and more; over
+        'step' the same scalars at every step; over 'x' `peak_strength`, `arrival_time` and
+        `front_speed`; and the scalars of `Rupture` for the run so far. The attribute `stopped`
+        says why it ended.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit.
+    OSError
+        If a stream cannot be written; what was written stays readable.
+    """
+    _check(dict(locals()))
+    check_variables(variables)
+    rows = problem.rows(
+        tau_p,
+        residual_strength=residual_strength,
+        initial_stress=initial_stress,
+        weakening_rate=weakening_rate,
+    )
+    if rows.count != 1:
+        raise InputError(f"tau_p: one profile at a time, got {rows.count}")
+    history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
+    warn_if_coarse(problem, rows)
+    run = make_run(method, method.medium(problem), rows, 0, history)
+    drop = float(np.mean(run.rows[0] - run.rows[1]))
+    if stop in ("arrest", "time"):
+        run.control[track.SLID_STOP] = np.inf
+    if stop == "onset":
+        run.control[track.DROP_STOP] = method.event_drop * drop
+    if end_time is not None:
+        run.control[track.END_TIME] = end_time
+    if restart is None:
+        state = _initial(run, initial_slip, initial_load)
+    else:
+        state = read_checkpoint(restart, run)
+    if end_time is not None and state.time >= end_time:
+        raise InputError(
+            f"end_time: {end_time:g} s is not after the start of the run, t = {state.time:.6g} s "
+            "(first slip)"
+        )
+    attributes = {
+        "study": {"problem": to_plain(problem), "method": to_plain(method)},
+        "stopped": "running",
+    }
+    stream = None
+    if store is not None:
+        stream = Stream(store, resume=restart is not None)
+        if restart is not None:
+            stream.drop_after(state.steps)
+    frames = Frames(run, variables, steps=steps)
+    x = problem.interface.x
+
+    def flush() -> None:
+        if stream is not None and len(frames):
+            stream.append(chunk_dataset(frames.take(), x, attributes))
+
+    if restart is None:
+        frames.add(state)
+    last_frame = state.time
+    next_checkpoint = state.steps + checkpoint_every
+    reason = "max_steps"
+    near = _NEAR_ONSET * drop
+    record = np.empty((max(every, every_implicit, every_near_onset or 1), track.COLUMNS))
+    try:
+        while state.steps < method.max_steps:
+            count = every if state.explicit else every_implicit
+            falling = state.watch[track.LOCAL_STRESS] - state.mean_stress
+            if every_near_onset is not None and state.explicit and falling < near:
+                count = every_near_onset
+            part = record[:count] if steps else NOTHING
+            taken, code = run.advance(state, count, part)
+            frames.add_steps(part[:taken])
+            ended = _reason(code, state, stop, end_time)
+            if ended or interval is None or state.time - last_frame >= interval:
+                frames.add(state)
+                last_frame = state.time
+            if progress is not None:
+                progress(_progress(state))
+            if code == track.NOT_FINITE:
+                check_finite(run, state, code)
+            if ended:
+                reason = ended
+                break
+            if stream is not None and len(frames) >= chunk:
+                flush()
+            if checkpoint is not None and state.steps >= next_checkpoint:
+                flush()
+                write_checkpoint(checkpoint, run, state)
+                next_checkpoint = state.steps + checkpoint_every
+    except FloatingPointError as error:
+        reason = f"not finite: {error}"
+        warnings.warn(str(error), AccuracyWarning, stacklevel=2)
+    except BaseException:
+        # Interrupted or out of disk: what was computed is worth keeping.
+        if stream is not None and len(frames):
+            _quietly(flush)
+        raise
+    attributes["stopped"] = reason
+    if checkpoint is not None and not reason.startswith("not finite"):
+        write_checkpoint(checkpoint, run, state)
+    if stream is not None:
+        flush()
+        dataset = open_rupture(stream.folder, variables=(), steps=False)
+        dataset.attrs["stopped"] = reason
+        dataset.attrs["store"] = str(stream.folder)
+    else:
+        dataset = chunk_dataset(frames.take(), x, attributes)
+    return _complete(dataset, problem, method, run, state)
+
+
+def _quietly(action: Callable[[], None]) -> None:
+    try:
+        action()
+    except OSError:
+        return  # the first error is already on its way
+
+
+def _reason(code: int, state: State, stop: str, end_time: float | None) -> str | None:
+    """Why the run ends here, or None."""
+    if code == track.NOT_FINITE:
+        return "not finite"
+    if code == track.ALL_SLID:
+        return "sliding"
+    if code == track.DROPPED:
+        return "onset"
+    if stop == "arrest" and state.watch[track.ARRESTED] > 0.0:
+        return "arrest"
+    if end_time is not None and state.time >= end_time * (1.0 - 1e-15):
+        return "time"
+    return None
+
+
+def _complete(
+    dataset: xr.Dataset, problem: Problem, method: Rupture, run: Run, state: State
+) -> xr.Dataset:
+    """Add what belongs to the run as a whole."""
+    speed = rupture_speed(state.arrival, run.medium.spacing, front_window(problem, run))
+    along: dict[str, NDArray[Any]] = {
+        "peak_strength": run.rows[0],
+        "arrival_time": state.arrival,
+        "front_speed": speed,
+    }
+    for name, values in along.items():
+        variable = _ALONG[name]
+        attrs = {"units": variable.units, "long_name": variable.long_name}
+        dataset[name] = (variable.dims, values, attrs)
+    for name, value in summary(problem, run, state).items():
+        variable = method.variables[name]
+        label = {"units": variable.units, "long_name": variable.long_name}
+        # Energies and moment are already there over 'time'; their last value is the total.
+        if name not in dataset:
+            dataset[name] = ((), value, label)
+    return dataset
