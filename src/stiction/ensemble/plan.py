@@ -11,11 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.fields.random_field import RandomField
-from stiction.methods import Method, Values, solve
+from stiction.methods import Method, Values, solve, variables_of
 from stiction.problem import Problem
+from stiction.results import Variable
 
 STREAMS = {"residual_strength": 1, "initial_stress": 2, "weakening_rate": 3}
 """What may be random besides the strength (stream 0); streams are independent of each other."""
+
+PROFILES: dict[str, Variable] = {
+    "strength": Variable("Pa", "peak strength", ("sample", "x")),
+    "residual_strength": Variable("Pa", "residual strength", ("sample", "x")),
+    "initial_stress": Variable("Pa", "initial stress", ("sample", "x")),
+    "weakening_rate": Variable("Pa m-1", "weakening rate", ("sample", "x")),
+}
+"""Sampled profiles that may be kept."""
+
+CHUNK = 256
 
 
 @dataclass(frozen=True)
@@ -30,6 +41,8 @@ class Plan:
         What is random besides the strength, by keyword.
     keep : tuple of str
         Fields whose sampled profiles are kept beside the results; 'strength' among them.
+    keep_samples : tuple of int, optional
+        Samples whose profiles are kept; all if None.
     """
 
     problem: Problem
@@ -38,6 +51,23 @@ class Plan:
     seed: int
     fields: tuple[tuple[str, RandomField], ...] = field(default=())
     keep: tuple[str, ...] = ()
+    keep_samples: tuple[int, ...] | None = None
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """All that `compute` returns."""
+        kept = {name: PROFILES[name] for name in self.keep if name in PROFILES}
+        return variables_of(self.problem, self.method) | kept
+
+    @property
+    def wide(self) -> tuple[str, ...]:
+        """The variables that have more than one number a sample."""
+        return tuple(name for name, v in self.variables.items() if len(v.dims) > 1)
+
+    @property
+    def piece(self) -> int:
+        """Samples solved at once: a few tens of milliseconds of work, where the method says so."""
+        return int(getattr(self.method, "chunk_size", CHUNK))
 
     def profiles(self, first: int, samples: int) -> dict[str, NDArray[np.float64]]:
         """The random profiles of samples first .. first + samples - 1, by name."""
@@ -50,6 +80,12 @@ class Plan:
             )
             for name, field in named.items()
         }
+
+    def wide_rows(self, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which of these samples keep their wide variables."""
+        if self.keep_samples is None:
+            return np.ones(samples.size, dtype=np.bool_)
+        return np.isin(samples, self.keep_samples)
 
 
 @lru_cache(maxsize=8)
@@ -64,7 +100,7 @@ def compute(plan: Plan, first: int, samples: int) -> Values:
     rows = plan.problem.rows(profiles["strength"], **extras)
     solver = _solver(plan.problem, plan.method)
     values = solve(plan.problem, plan.method, solver, rows)
-    return values | {name: profiles[name] for name in plan.keep}
+    return values | {name: profiles[name] for name in plan.keep if name in PROFILES}
 
 
 def chunks(samples: int, size: int, first: int = 0) -> Iterator[tuple[int, int]]:

@@ -1,79 +1,27 @@
-"""Running an ensemble: chunks through any executor, the same numbers whoever computes them."""
+"""Running an ensemble in memory: the same numbers whoever computes them."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+import dataclasses
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
 from stiction._model import describe, to_plain
 from stiction._progress import progress_bar
-from stiction.ensemble.plan import STREAMS, Plan, chunks, compute
-from stiction.errors import InputError
+from stiction.ensemble.gather import Gathered
+from stiction.ensemble.plan import PROFILES, STREAMS, Plan
+from stiction.ensemble.share import Span, share_out, usable_cores
+from stiction.ensemble.work import raise_failure
+from stiction.errors import InputError, unknown_name
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
-from stiction.methods import Method, Values, check_method, label
+from stiction.methods import Method, check_method, variables_of
 from stiction.problem import Problem
-from stiction.results import Variable
 
-CHUNK = 256
-
-
-def chunk_size(method: Any) -> int:
-    """Samples in a chunk: a few tens of milliseconds of work, where the method says so."""
-    return int(getattr(method, "chunk_size", CHUNK))
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def results(
-    plan: Plan,
-    pieces: Iterable[tuple[int, int]],
-    *,
-    executor: Executor | None = None,
-    workers: int = 1,
-) -> Iterator[tuple[int, Values]]:
-    """Compute pieces (first, samples) and yield (first, values) as they are done.
-
-    No more than two pieces a worker are under way at once, so that memory stays bounded whatever
-    the number of samples. Leaving the iteration early cancels what has not begun.
-    """
-    with ExitStack() as stack:
-        # The kernels are the parallel part; threads of BLAS below them only get in the way.
-        stack.enter_context(threadpool_limits(limits=1, user_api="blas"))
-        if executor is None and workers == 1:
-            for first, samples in pieces:
-                yield first, compute(plan, first, samples)
-            return
-        if executor is None:
-            executor = stack.enter_context(ThreadPoolExecutor(workers))
-        limit = 2 * max(workers, int(getattr(executor, "_max_workers", 0) or workers))
-        waiting = iter(pieces)
-        running: dict[Future[Values], int] = {}
-        try:
-            while True:
-                for first, samples in waiting:
-                    running[executor.submit(compute, plan, first, samples)] = first
-                    if len(running) >= limit:
-                        break
-                if not running:
-                    return
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield running.pop(future), future.result()
-        finally:
-            for future in running:
-                future.cancel()
+KEEP_LIMIT = 2.0**30
 
 
 def make_plan(
@@ -83,6 +31,7 @@ def make_plan(
     seed: int,
     fields: Mapping[str, RandomField | None],
     keep: tuple[str, ...] = (),
+    keep_samples: tuple[int, ...] | None = None,
 ) -> Plan:
     """The plan of these arguments, or one `InputError` with all that is wrong with them."""
     check_method(method)
@@ -102,33 +51,97 @@ def make_plan(
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
     random = tuple((name, field) for name, field in fields.items() if field is not None)
-    known = {"strength", *(name for name, _ in random)}
-    problems += [
-        f"keep: {name!r} is not random here (valid: {', '.join(sorted(known))})"
-        for name in keep
-        if name not in known
-    ]
+    if isinstance(problem, Problem):
+        method, mistakes = _keep_of_method(problem, method, keep, {name for name, _ in random})
+        problems += mistakes
     if problems:
         raise InputError(problems)
-    return Plan(problem, strength, method, int(seed), random, keep)
+    return Plan(problem, strength, method, int(seed), random, keep, keep_samples)
 
 
-def _check_count(name: str, value: Any, smallest: int) -> None:
+def _keep_of_method(
+    problem: Problem, method: Any, keep: tuple[str, ...], random: set[str]
+) -> tuple[Any, list[str]]:
+    """The method with the options switched on that `keep` names, and what cannot be kept."""
+    switches = {
+        field.name
+        for field in dataclasses.fields(method)
+        if isinstance(getattr(method, field.name), bool)
+    }
+    problems = []
+    for name in keep:
+        if name == "strength" or name in random:
+            continue
+        if name not in variables_of(problem, method) and name in switches:
+            wider = dataclasses.replace(method, **{name: True})
+            if name in variables_of(problem, wider):
+                method = wider
+                continue
+        if name in PROFILES:
+            valid = ", ".join(sorted({"strength", *random}))
+            problems.append(f"keep: {name!r} is not random here (valid: {valid})")
+        elif name not in variables_of(problem, method):
+            wide = {n for n in switches | set(variables_of(problem, method)) if _wide(method, n)}
+            problems.append(unknown_name("keep", name, sorted({"strength"} | random | wide)))
+    return method, problems
+
+
+def _wide(method: Any, name: str) -> bool:
+    if isinstance(getattr(method, name, None), bool):
+        method = dataclasses.replace(method, **{name: True})
+    return name in method.variables and len(method.variables[name].dims) > 1
+
+
+def check_count(name: str, value: Any, smallest: int) -> None:
+    """Refuse what is not a whole number of at least `smallest`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
         raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
 
 
-KEPT: dict[str, Variable] = {
-    "strength": Variable("Pa", "peak strength", ("sample", "x")),
-    "residual_strength": Variable("Pa", "residual strength", ("sample", "x")),
-    "initial_stress": Variable("Pa", "initial stress", ("sample", "x")),
-    "weakening_rate": Variable("Pa m-1", "weakening rate", ("sample", "x")),
-}
+def check_run(
+    samples: Any, first: Any, workers: Any, executor: Any, *, nothing_to_do: bool = False
+) -> None:
+    """Refuse arguments of a run that make no sense, before any work is done."""
+    check_count("samples", samples, 1)
+    check_count("first", first, 0)
+    if workers is not None:
+        check_count("workers", workers, 1)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise InputError(
+            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
+        )
+
+
+def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
+    """Bytes of what is kept along the interface."""
+    kept = samples
+    if plan.keep_samples is not None:
+        kept = sum(first <= sample < first + samples for sample in plan.keep_samples)
+    return 8.0 * plan.problem.interface.nodes * len(plan.wide) * kept
+
+
+def check_size(needed: float, limit: float) -> None:
+    """Refuse to keep more than the stated size."""
+    if needed > limit:
+        raise InputError(
+            f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
+            f" keep_limit = {limit / 2**20:,.0f} MiB; keep fewer variables, choose samples with"
+            " keep_samples, or raise keep_limit (bytes)"
+        )
+
+
+def warn_of_fields(plan: Plan) -> None:
+    """Warn of fields that the grid or the interface cannot do justice to."""
+    for _, field in (("strength", plan.strength), *plan.fields):
+        warn_if_inaccurate(field, plan.problem.interface)
 
 
 def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
     """All it takes to run the plan again, as a study in plain form."""
-    ensemble = {"samples": samples, "seed": plan.seed, "first": first, "keep": list(plan.keep)}
+    ensemble: dict[str, Any] = {"samples": samples, "seed": plan.seed, "first": first}
+    ensemble["keep"] = list(plan.keep)
+    if plan.keep_samples is not None:
+        ensemble["keep_samples"] = list(plan.keep_samples)
     try:
         study: dict[str, Any] = {
             "problem": to_plain(plan.problem),
@@ -150,32 +163,24 @@ def run_plan(
     workers: int | None = None,
     executor: Executor | None = None,
     progress: bool | Callable[[int, int], None] = False,
+    keep_limit: float = KEEP_LIMIT,
 ) -> xr.Dataset:
     """Compute samples first .. first + samples - 1 of a plan; see `monte_carlo`."""
-    _check_count("samples", samples, 1)
-    _check_count("first", first, 0)
-    if workers is not None:
-        _check_count("workers", workers, 1)
-    if executor is not None and not hasattr(executor, "submit"):
-        raise InputError(
-            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
-        )
-    for _, field in (("strength", plan.strength), *plan.fields):
-        warn_if_inaccurate(field, plan.problem.interface)
+    check_run(samples, first, workers, executor)
+    check_size(wide_bytes(plan, samples, first), keep_limit)
+    warn_of_fields(plan)
     workers = usable_cores() if workers is None else workers
-    collected: dict[str, Any] = {}
-    pieces = chunks(samples, chunk_size(plan.method), first)
+    gathered = Gathered([plan], samples, first)
     with progress_bar(samples, plan.method.type, progress) as report:
-        for start, values in results(plan, pieces, executor=executor, workers=workers):
-            count = 0
-            for name, value in values.items():
-                if name not in collected:
-                    collected[name] = np.empty((samples, *value.shape[1:]), dtype=value.dtype)
-                count = len(value)
-                collected[name][start - first : start - first + count] = value
-            report(count)
-    attributes = plan_attributes(plan, samples, first)
-    return label(plan.problem, plan.method, collected, first + np.arange(samples), attributes, KEPT)
+        spans = [Span(0, first, samples)]
+        for outcome in share_out([plan], spans, executor=executor, workers=workers):
+            if outcome is None:
+                continue
+            if outcome.failures:
+                raise_failure(outcome.failures[0])
+            gathered.add(outcome)
+            report(outcome.count)
+    return gathered.dataset(plan_attributes(plan, samples, first))
 
 
 def monte_carlo(
@@ -213,7 +218,8 @@ def monte_carlo(
     residual_strength, initial_stress, weakening_rate : RandomField, optional
         What is random besides the strength, Pa or Pa/m, independent of it.
     keep : tuple of str
-        Random fields whose sampled profiles are kept, such as ``("strength",)``.
+        What is kept along the interface: random fields, such as ``"strength"``, and what the
+        method can add, such as ``"sensitivity"``; at most 1 GiB.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -230,7 +236,9 @@ def monte_carlo(
     Raises
     ------
     InputError
-        Naming all that does not fit.
+        Naming all that does not fit; a sample that does not fit is named with its seed.
+    RuntimeError
+        Naming the sample and the seed, if a solver fails.
     """
     fields = {
         "residual_strength": residual_strength,

@@ -1,0 +1,136 @@
+"""Gathering: outcomes in any order become one labelled dataset over sweep, sample and x."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiction.ensemble.plan import Plan
+from stiction.ensemble.work import Outcome
+from stiction.results import POSITION, SAMPLE, Variable, to_dataset
+
+KEPT_SAMPLE = Variable("1", "number of the sample whose profiles are kept", ("kept_sample",))
+
+
+@dataclass(frozen=True)
+class GridAxis:
+    """One axis of a sweep as a dimension of the result.
+
+    Attributes
+    ----------
+    dim : str
+        Its name.
+    size : int
+    coordinates : mapping of (values, Variable)
+        What is swept along it, by name.
+    """
+
+    dim: str
+    size: int
+    coordinates: Mapping[str, tuple[NDArray[Any], Variable]]
+
+
+class Gathered:
+    """Room for the results of all samples of one or several plans.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        One for each point, in the order of the points.
+    samples, first : int
+        Samples of each point.
+    only : sequence of str, optional
+        Names of the variables to gather; all if left out.
+    """
+
+    def __init__(
+        self, plans: Sequence[Plan], samples: int, first: int = 0, only: Sequence[str] | None = None
+    ) -> None:
+        self.plans, self.samples, self.first, self.only = plans, samples, first, only
+        self.variables: dict[str, Variable] = {}
+        self.kept = plans[0].keep_samples
+        for plan in plans:
+            for name, variable in plan.variables.items():
+                if only is None or name in only:
+                    wide = len(variable.dims) > 1 and self.kept is not None
+                    dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
+                    self.variables[name] = replace(variable, dims=dims)
+        if self.kept is not None:
+            inside = [s for s in self.kept if first <= s < first + samples]
+            self._kept = np.array(sorted(inside), dtype=np.int64)
+        self._arrays: dict[str, NDArray[Any]] = {}
+        self._seen: dict[str, NDArray[np.bool_]] = {}
+
+    def add(self, outcome: Outcome) -> None:
+        """Put the values of an outcome in their places."""
+        rows = outcome.samples - self.first
+        inside = (rows >= 0) & (rows < self.samples)
+        wide_rows = np.empty(0, dtype=np.int64)
+        wide_inside = np.zeros(outcome.wide_samples.size, dtype=np.bool_)
+        if self.kept is not None:
+            wide_inside = np.isin(outcome.wide_samples, self._kept)
+            wide_rows = np.searchsorted(self._kept, outcome.wide_samples[wide_inside])
+        for name, value in outcome.values.items():
+            if name not in self.variables:
+                continue
+            if self.variables[name].dims[0] == "kept_sample":
+                self._put(name, outcome.point, wide_rows, value[wide_inside], self._kept.size)
+            else:
+                self._put(name, outcome.point, rows[inside], value[inside], self.samples)
+
+    def _put(
+        self, name: str, point: int, rows: NDArray[np.int64], value: NDArray[Any], length: int
+    ) -> None:
+        if name not in self._arrays:
+            shape = (len(self.plans), length)
+            self._arrays[name] = np.zeros((*shape, *value.shape[1:]), dtype=value.dtype)
+            self._seen[name] = np.zeros(shape, dtype=np.bool_)
+        self._arrays[name][point, rows] = value
+        self._seen[name][point, rows] = True
+
+    def _filled(self, name: str) -> NDArray[Any]:
+        """The array of a variable, NaN where nothing was put."""
+        array, seen = self._arrays[name], self._seen[name]
+        if not seen.all():
+            if array.dtype.kind != "f":
+                array = array.astype(np.float64)
+            array[~seen] = np.nan
+        return array
+
+    def dataset(self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()) -> xr.Dataset:
+        """All that was gathered, in the order in which the first plan's method names it.
+
+        Parameters
+        ----------
+        attributes : mapping
+        axes : sequence of GridAxis
+            Of the sweep; the product of their sizes is the number of plans.
+        """
+        shape = tuple(axis.size for axis in axes)
+        dims = tuple(axis.dim for axis in axes)
+        values, variables = {}, {}
+        for name, variable in self.variables.items():
+            if name in self._arrays:
+                array = self._filled(name)
+                values[name] = array.reshape(shape + array.shape[1:])
+                variables[name] = replace(variable, dims=dims + variable.dims)
+        coordinates: dict[str, tuple[NDArray[Any], Variable]] = {}
+        for axis in axes:
+            coordinates |= axis.coordinates
+        coordinates["sample"] = (self.first + np.arange(self.samples), SAMPLE)
+        used = {dim for variable in variables.values() for dim in variable.dims}
+        if "kept_sample" in used:
+            coordinates["kept_sample"] = (self._kept, KEPT_SAMPLE)
+        if "x" in used:
+            places = [plan.problem.interface.x for plan in self.plans]
+            if all(np.array_equal(x, places[0]) for x in places):
+                coordinates["x"] = (places[0], POSITION)
+            else:  # the length is swept: every point has positions of its own
+                each = replace(POSITION, dims=(*dims, "x"))
+                coordinates["position"] = (np.reshape(places, (*shape, -1)), each)
+        return to_dataset(values, variables, coordinates, attributes)
