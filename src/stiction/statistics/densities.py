@@ -79,7 +79,9 @@ def density(values: Any, *, bounds: tuple[float | None, float | None] = (None, N
     by the heat equation with no flux through the ends, which is a Gaussian kernel reflected at the
     bounds; the time of diffusion, and so the bandwidth, solves their fixed-point equation (14)
     without reference to a normal distribution. No mass leaves the support and the density may be
-    positive at a bound. Where there is no bound the grid reaches beyond the sample.
+    positive at a bound; what it does within about a bandwidth of the bound is smoothed away.
+    Where there is no bound the grid reaches beyond the sample. Stretching the bound to infinity
+    with a logarithm resolves more there but spikes wherever a few values crowd on the bound.
     """
     sample = as_sample(values, 16)
     low, high = _ends(sample, bounds)
@@ -117,7 +119,7 @@ def density_of_counts(counts: Any, low: float, high: float, *, effective: float)
     counts : (cells,) array
         How many values fell into each cell.
     low, high : float
-        Ends of the support; nothing is smoothed across them.
+        Ends of the support. No mass diffuses through them, which reflects the kernel there.
     effective : float
         How many independent values the counts are worth; fewer than their number where
         neighbouring points of one field were counted.

@@ -28,11 +28,11 @@ def caption(data: Data) -> str:
     return (
         f"(a) Peak strength of one and the same draws at four correlation lengths ({ratio} times the"
         " nucleation length), (b) its density, the same for all, and (c) the density of the weakest"
-        " point of each sample. (d) Nucleation stress of the samples in (a) and (e) its density."
+        " point of each sample, on an enlarged axis. (d) Nucleation stress of the samples in (a) and (e) its density."
         " (f) Density of the critical stress. (g) Density of the position of onset with its"
         f" 95 % interval for a uniform one. {data.samples:,} samples each. Densities by the"
-        " diffusion estimator with no flux through the bounds of the strength (Botev et al., 2010);"
-        " the shade is one standard error to either side."
+        " diffusion estimator (Botev et al., 2010) with no flux through the bounds of the strength"
+        " (dashed); the shade is one standard error to either side."
     )
 
 
@@ -120,13 +120,12 @@ def draw(data: Data) -> Figure:
     for axes, key in ((weakest, "min tau_p"), (point, "tau_n")):
         for i, ratio in enumerate(data.ratios):
             _line(axes, densities[ratio][key], series(i), upright=True)
-        _beside(axes, limits)
-    # The weakest point of the finest fields lies so close to the bound that it hides the others.
-    peaks = sorted(float(densities[ratio]["min tau_p"].value.max()) for ratio in data.ratios)
-    weakest.set_xscale("log")
-    weakest.set_xlim(max(0.05, 1e-3 * peaks[-1]), 2.0 * peaks[-1])
+        axes.set_xlim(left=0)
+    _beside(point, limits)
+    _enlarged(weakest, [densities[ratio]["min tau_p"] for ratio in data.ratios])
+    if np.isfinite(data.setting.bounds[0]):
+        _dashed(weakest, data.setting.bounds[0] / data.setting.mean)
     weakest.set_xlabel(r"$f(\min \tau_\mathrm{p})$")
-    point.set_xlim(left=0)
     point.set_xlabel(r"$f(\tau_\mathrm{n})$")
     legend.set_axis_off()
     for i, ratio in enumerate(data.ratios):
@@ -166,11 +165,22 @@ def _profiles(axes: Axes, data: Data, key: str, limits: tuple[float, float]) -> 
     axes.axhline(1.0, color=PALE, linewidth=0.8, zorder=0)
     for bound in data.setting.bounds:
         if np.isfinite(bound):
-            axes.axhline(
-                bound / data.setting.mean, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3))
-            )
+            _dashed(axes, bound / data.setting.mean)
     axes.set_xlim(0, 1)
     axes.set_ylim(limits)
+
+
+def _dashed(axes: Axes, level: float) -> None:
+    axes.axhline(level, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=0)
+
+
+def _enlarged(axes: Axes, estimates: list[Density]) -> None:
+    """An axis of its own: minima crowd within a few per cent of the bound."""
+    low, high = _extent(estimates, 0.03)
+    axes.set_ylim(low - 0.08 * (high - low), high)
+    axes.yaxis.tick_right()
+    axes.spines["right"].set_visible(True)
+    axes.spines["left"].set_visible(False)
 
 
 def _beside(axes: Axes, limits: tuple[float, float]) -> None:
@@ -200,9 +210,14 @@ def _line(axes: Axes, estimate: Density, style: dict[str, Any], *, upright: bool
 
 
 def _frame(axes: Axes, estimates: list[Density]) -> None:
-    shown = [estimate.x[estimate.value > 4e-3 * estimate.value.max()] for estimate in estimates]
-    low, high = min(float(x.min()) for x in shown), max(float(x.max()) for x in shown)
+    low, high = _extent(estimates, 4e-3)
     axes.set_xlim(low - 0.05 * (high - low), high + 0.02 * (high - low))
+
+
+def _extent(estimates: list[Density], share: float) -> tuple[float, float]:
+    """Where any of the densities is above `share` of its largest value."""
+    shown = [estimate.x[estimate.value > share * estimate.value.max()] for estimate in estimates]
+    return min(float(x.min()) for x in shown), max(float(x.max()) for x in shown)
 
 
 def _positions(axes: Axes, data: Data) -> None:

@@ -12,7 +12,6 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from stiction.paper.data import Data
 from stiction.report.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, panel, series
 from stiction.report.tables import Table
-from stiction.statistics.densities import density
 
 name = "problem"
 number = "1"
@@ -31,7 +30,7 @@ def caption(data: Data) -> str:
         " at one rate W. (d) One sample of the peak strength at"
         f" \N{GREEK SMALL LETTER XI}\N{SUBSCRIPT ZERO}/h\N{LATIN SUBSCRIPT SMALL LETTER N}"
         f" = {data.ratios[SHOWN]:g}, with the nucleation length for scale; (e) its correlation;"
-        " (f) its density: exact, and estimated from this sample alone."
+        " (f) its density (line) and a histogram of this sample."
     )
 
 
@@ -76,7 +75,7 @@ def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **s
 def _sketch(axes: Axes) -> None:
     axes.set_axis_off()
     axes.set_xlim(-0.14, 1.14)
-    axes.set_ylim(-0.12, 1.12)
+    axes.set_ylim(-0.2, 1.05)
     for bottom, shade in ((0.5, "#ececec"), (0.0, "#dedede")):
         axes.add_patch(Rectangle((0, bottom), 1.0, 0.5, facecolor=shade, edgecolor="none"))
     axes.plot([0, 1], [0.5, 0.5], color=series(1)["color"], linewidth=2.2)
@@ -89,9 +88,10 @@ def _sketch(axes: Axes) -> None:
     axes.text(0.5, 0.53, r"$\tau_\mathrm{f}(\delta, x)$", ha="center", va="bottom")
     axes.text(0.03, 0.68, r"$G,\,\nu,\,\rho$", ha="left", va="center")
     axes.text(0.03, 0.28, r"$G,\,\nu,\,\rho$", ha="left", va="center")
-    _arrow(axes, (0.5, -0.07), (1.0, -0.07), linewidth=0.7)
-    _arrow(axes, (0.5, -0.07), (0.0, -0.07), linewidth=0.7)
-    axes.text(0.5, -0.07, "$L$", ha="center", va="center", backgroundcolor="white")
+    _arrow(axes, (0.5, -0.09), (1.0, -0.09), linewidth=0.7)
+    _arrow(axes, (0.5, -0.09), (0.0, -0.09), linewidth=0.7)
+    gap = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+    axes.text(0.5, -0.09, "$L$", ha="center", va="center", bbox=gap)
     _arrow(axes, (1.045, 0.5), (1.13, 0.5), linewidth=0.7)
     axes.text(1.1, 0.45, "$x$", ha="center", va="top")
 
@@ -126,10 +126,13 @@ def _law(axes: Axes) -> None:
         axes.plot([0, critical], [peak, 0.2], color=QUIET, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.set_xlim(0, 0.95)
     axes.set_ylim(0, 1.18)
-    axes.text(0.34, 0.55, "$W$", ha="left", va="bottom")
+    axes.plot([0.55, 0.55], [0.0, 0.2], color=PALE, linewidth=0.7, zorder=0)
+    axes.plot([0.62, 0.62, 0.76], [0.74, 0.557, 0.557], color=QUIET, linewidth=0.7)
+    axes.text(0.6, 0.65, "$W$", ha="right", va="center")
+    axes.text(0.69, 0.54, "1", ha="center", va="top", fontsize=7.5)
+    axes.text(0.57, 0.02, r"$d_\mathrm{c}(x)$", ha="left", va="bottom")
     _plain(axes, r"slip $\delta$", r"strength $\tau_\mathrm{f}$")
     axes.set_yticks([0.2, 0.92], [r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"])
-    axes.set_xticks([0.55], [r"$d_\mathrm{c}(x)$"])
 
 
 def _field(axes: Axes, data: Data) -> None:
@@ -179,10 +182,20 @@ def _density(axes: Axes, data: Data, limits: tuple[float, float]) -> None:
         setting.marginal.distribution.pdf(y * setting.mean) * setting.mean, y, color=INK, linewidth=1.0
     )
     sample = data.relative(data.at(data.ratios[SHOWN])["profile_strength"].values)
-    low, high = (bound / setting.mean if np.isfinite(bound) else None for bound in setting.bounds)
-    estimate = density(sample, bounds=(low, high))
-    axes.fill_betweenx(estimate.x, estimate.value, color=series(1)["color"], alpha=0.3, linewidth=0)
+    value, edges = np.histogram(sample, bins=18, range=_range(data, sample), density=True)
+    axes.stairs(
+        value, edges, orientation="horizontal", fill=True, color=series(1)["color"], alpha=0.3
+    )
     axes.set_ylim(limits)
     axes.set_xlim(left=0)
     axes.tick_params(labelleft=False)
     axes.set_xlabel(r"density $f(\tau_\mathrm{p})$")
+
+
+def _range(data: Data, sample: np.ndarray) -> tuple[float, float]:
+    """Bounds of the strength where it has them, in units of its mean."""
+    low, high = (bound / data.setting.mean for bound in data.setting.bounds)
+    return (
+        low if np.isfinite(low) else float(sample.min()),
+        high if np.isfinite(high) else float(sample.max()),
+    )

@@ -138,8 +138,10 @@ def _series(axes: Axes, data: Data, key: str, index: int) -> None:
     axes.fill_between(ratios, numbers[:, 1], numbers[:, 3], color=shade, alpha=0.18, linewidth=0)
     for column, dashes in ((1, (0, (4, 2))), (3, (0, (4, 2)))):
         axes.plot(ratios, numbers[:, column], color=shade, linestyle=dashes, linewidth=0.8)
-    axes.plot(ratios, numbers[:, 2], color=shade, linestyle=(0, (1.2, 1.2)), marker="x", label="median")
     axes.plot(ratios, numbers[:, 0], color=shade, marker="o", label="mean")
+    axes.plot(
+        ratios, numbers[:, 2], color=shade, linestyle=(0, (1.2, 1.2)), marker="x", label="median"
+    )
     axes.plot([], [], color=shade, linestyle=(0, (4, 2)), linewidth=0.8, label="quartiles")
     axes.set_xscale("log")
     left, right = ratios[0] * _ZERO, ratios[-1] * _INFINITY
@@ -159,7 +161,8 @@ def _series(axes: Axes, data: Data, key: str, index: int) -> None:
     )
     axes.minorticks_off()
     axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$")
-    axes.legend(loc="upper right" if key == "critical_stress" else "upper left")
+    if key == "critical_stress":
+        axes.legend(loc="upper right")
 
 
 def _short_side(axes: Axes, data: Data) -> None:
@@ -227,8 +230,9 @@ def _wide(axes: Axes, data: Data) -> None:
         color=QUIET,
     )
     axes.set_xscale("log")
-    axes.set_xlabel(r"$\xi_0/h_\mathrm{n}$ at fixed $L$")
+    axes.set_xticks([0.1, 1.0, 10.0], ["0.1", "1", "10"])
+    axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$, fixed $L$")
     axes.set_ylabel(r"mean $\tau_\mathrm{cr}/\langle\tau_\mathrm{p}\rangle$, $\pm$ st. dev.")
     axes.legend(loc="upper center", handlelength=2.2)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.18 * (high - low))
+    axes.set_ylim(low - 0.08 * (high - low), high + 0.22 * (high - low))

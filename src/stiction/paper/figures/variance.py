@@ -90,15 +90,15 @@ def draw(data: Data) -> Figure:
     weight.set_xlabel(r"position $s = 2x/h_\mathrm{n}$")
     weight.set_ylabel(r"weight $v_0(s)\,/\int v_0\,\mathrm{d}s$")
     weight.legend(loc="lower center")
-    _variance(whole, data, float(theory["ratio"].values[-1]))
+    _variance(whole, data, max(8.0, 2.0 * data.ratios[-1]))
     whole.legend(loc="lower right")
     largest = min(1.0, data.ratios[-1])
     _variance(zoom, data, largest)
     line = np.array([0.0, largest])
-    zoom.plot(
-        line, line * theory.attrs["short_slope"], color=color(3), linestyle=(0, (1.2, 1.2)), linewidth=1.6
-    )
-    zoom.set_ylim(0, 1.05 * float(np.nanmax(theory["variance_ratio_infinite"].values[theory["ratio"].values <= largest])))
+    slope = theory.attrs["short_slope"]
+    zoom.plot(line, line * slope, color=color(3), linestyle=(0, (1.2, 1.2)), linewidth=1.6)
+    inside = theory["variance_ratio_infinite"].values[theory["ratio"].values <= largest]
+    zoom.set_ylim(0, 1.2 * float(inside.max()))
     for axes, letter in zip((correlation, weight, whole, zoom), "abcd", strict=True):
         panel(axes, letter)
     return figure

@@ -6,12 +6,15 @@ import numpy as np
 import xarray as xr
 
 from stiction.criterion.eigenproblem import exact_weight, rounded_weight
+from stiction.fields.random_field import RandomField
+from stiction.interface import Interface
 from stiction.paper.studies.context import Context
 from stiction.statistics.moments import nucleation_limits, nucleation_statistics
 
 name = "theory"
 title = "Exact statistics of the nucleation stress"
 
+UNRESOLVED = 1e-3  # share of the power that a grid may fold without changing the curve
 RATIOS = np.geomspace(0.02, 20.0, 41)
 
 
@@ -27,7 +30,7 @@ def compute(context: Context) -> xr.Dataset:
     ratios = list(setting.correlation_ratios)
     fields = [setting.field(ratio) for ratio in ratios]
     finest = [setting.field(float(ratio)) for ratio in RATIOS]
-    usable = [2.0 * np.pi / interface.length <= field.spectrum.cutoff for field in finest]
+    usable = [_resolved(field, interface) for field in finest]
     finite = [
         nucleation_statistics(problem, field).variance_ratio if there else np.nan
         for field, there in zip(finest, usable, strict=True)
@@ -72,3 +75,11 @@ def compute(context: Context) -> xr.Dataset:
             "long_ratio_fixed_length": limits.long_ratio_fixed_length,
         },
     )
+
+
+def _resolved(field: RandomField, interface: Interface) -> bool:
+    """Whether the interface holds a mode of the field, and its grid nearly all of the power."""
+    if 2.0 * np.pi / interface.length > field.spectrum.cutoff:
+        return False
+    unresolved = field.modes(interface).sigma[interface.nodes // 2 + 1 :]
+    return float(np.sum(unresolved**2)) < UNRESOLVED
