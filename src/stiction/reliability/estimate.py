@@ -1,0 +1,224 @@
+"""Failure probability: checks, exact answers, choice of algorithm, and the report."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+import numpy as np
+
+from stiction._model import describe
+from stiction.criterion.method import LocalCriterion
+from stiction.errors import InputError, unknown_name
+from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.methods import Method
+from stiction.problem import Problem
+from stiction.reliability.limit_state import Event, LimitState, make_limit_state
+from stiction.reliability.plain import NOTHING, Count, count_on
+from stiction.reliability.result import FailureProbability
+from stiction.reliability.sampled import (
+    Request,
+    by_counting,
+    by_importance,
+    by_subset,
+    by_two_levels,
+)
+
+Algorithm = Literal["auto", "plain", "subset", "importance", "two_level"]
+ALGORITHMS = ("auto", "plain", "subset", "importance", "two_level")
+
+BUDGET = {"local_criterion": 2_000_000, "equilibrium": 200_000, "rupture": 1_000}
+"""Most evaluations if the user does not say: up to a minute, for rupture a few."""
+PILOT = {"rupture": 100}
+FREQUENT = 0.01
+"""From here on plain sampling needs no more evaluations than subset simulation."""
+
+
+def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list[str]:
+    """What is wrong with the options that all of the room share."""
+    problems = []
+    if not 0.0 < target_cov < math.inf:
+        problems.append(f"target_cov: must be positive, got {target_cov!r}")
+    if not 0.0 < confidence < 1.0:
+        problems.append(f"confidence: must lie between 0 and 1, got {confidence!r}")
+    whole = isinstance(max_evaluations, int | np.integer) and not isinstance(max_evaluations, bool)
+    if max_evaluations is not None and not (whole and max_evaluations >= 100):
+        problems.append(
+            f"max_evaluations: must be a whole number >= 100, got {describe(max_evaluations)}"
+        )
+    return problems
+
+
+def usable_first_stage(state: LimitState) -> str | None:
+    """Why two levels are not possible, or None if they are."""
+    if state.method.type != "equilibrium":
+        return f"two levels join the local criterion to equilibrium, not to {state.method.type!r}"
+    reason = state.no_single_length()
+    return None if reason is None else f"the local criterion does not hold: {reason}"
+
+
+def check_algorithm(state: LimitState, algorithm: str, valid: tuple[str, ...]) -> list[str]:
+    """Why an algorithm cannot be used here; no texts if it can."""
+    if algorithm not in valid:
+        return [unknown_name("algorithm", str(algorithm), valid)]
+    if state.method.type == "rupture" and algorithm not in ("auto", "plain"):
+        return [f"algorithm: {algorithm!r} would take days by rupture; use 'plain' or 'auto'"]
+    reason = None
+    if algorithm == "two_level":
+        reason = usable_first_stage(state)
+    elif algorithm == "importance":
+        reason = state.not_alike_everywhere()
+    return [] if reason is None else [f"algorithm: {algorithm!r} is not possible: {reason}"]
+
+
+def budget_of(state: LimitState, max_evaluations: int | None) -> int:
+    """Evaluations allowed."""
+    if max_evaluations is not None:
+        return int(max_evaluations)
+    return BUDGET.get(state.method.type, 200_000)
+
+
+def _exact(request: Request, probability: float, reason: str) -> FailureProbability:
+    return FailureProbability(
+        probability=probability,
+        coefficient_of_variation=0.0,
+        interval=(probability, probability),
+        evaluations=0,
+        stress=request.stress,
+        lower_bound=request.state.bounds[0],
+        algorithm="exact",
+        reason=reason,
+        confidence=request.confidence,
+    )
+
+
+def _chosen(request: Request) -> tuple[str, str, Count | None]:
+    """Algorithm, reason, and the pilot count that told."""
+    state = request.state
+    if state.method.type == "rupture":
+        return "plain", "a rupture simulation takes too long for long chains of samples", None
+    pilot = count_on(state, request.seed, request.stress, request.pilot, NOTHING)
+    seen = f"{pilot.failures} failures among {pilot.samples} plain samples"
+    if pilot.probability >= FREQUENT:
+        return "plain", f"{seen}: frequent enough to count", pilot
+    if usable_first_stage(state) is None:
+        text = f"{seen}: rare; the local criterion resembles equilibrium and is a tenth of its cost"
+        return "two_level", text, pilot
+    return "subset", f"{seen}: rare, and subset simulation does not need to know where", pilot
+
+
+def failure_probability(
+    problem: Problem,
+    strength: RandomField,
+    stress: float,
+    *,
+    method: Method,
+    algorithm: Algorithm = "auto",
+    target_cov: float = 0.1,
+    seed: int = 0,
+    max_evaluations: int | None = None,
+    confidence: float = 0.95,
+    event: Event = "critical_stress",
+    residual_strength: RandomField | None = None,
+    initial_stress: RandomField | None = None,
+    weakening_rate: RandomField | None = None,
+    workers: int | None = None,
+) -> FailureProbability:
+    """How likely does an interface of random strength let go below a given stress?
+
+    Parameters
+    ----------
+    problem : Problem
+    strength : RandomField
+        Peak strength, Pa.
+    stress : float
+        Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
+    method : LocalCriterion, Equilibrium or Rupture
+        How the onset is found. `Rupture` goes with plain Monte Carlo only.
+    algorithm : {"auto", "plain", "subset", "importance", "two_level"}
+        Plain Monte Carlo; subset simulation; importance sampling around the most likely weak spot
+        at a random place (where the interface is alike everywhere); subset simulation by the local
+        criterion with equilibrium at its end. 'auto' counts failures among a thousand plain
+        samples and goes on counting from 1 % on; below, it takes two levels for equilibrium and
+        subset simulation otherwise. `reason` in the result says which and why.
+    target_cov : float
+        Coefficient of variation to reach.
+    seed : int
+        Not negative. The result depends on it and not on the number of workers.
+    max_evaluations : int, optional
+        Most samples the method is asked for: by default 2,000,000 by the local criterion, 200,000
+        by equilibrium, 1,000 by rupture. If they do not suffice, the result holds what there is
+        and a warning.
+    confidence : float
+        Of the interval.
+    event : {"critical_stress", "first_instability"}
+        Which stress counts as letting go: that of the whole interface, or that at which the first
+        patch becomes unstable, arrested or not. By the local criterion they are the same.
+    residual_strength, initial_stress, weakening_rate : RandomField, optional
+        What is random besides the strength, as in `monte_carlo`.
+    workers : int, optional
+        Threads; all cores by default.
+
+    Returns
+    -------
+    FailureProbability
+        With `probability`, `coefficient_of_variation`, `interval`, `evaluations` and more.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the estimate is not to be trusted; `warnings` in the result holds the same texts.
+
+    Notes
+    -----
+    Subset simulation: Au and Beck (2001), Papaioannou et al. (2015); its error from the ancestry
+    of the failing samples, Lee and Whiteley (2018). Intervals are binomial (Clopper and Pearson,
+    1934) for plain Monte Carlo, log-normal otherwise.
+    """
+    fields = {
+        "residual_strength": residual_strength,
+        "initial_stress": initial_stress,
+        "weakening_rate": weakening_rate,
+    }
+    problems = check_target(target_cov, confidence, max_evaluations)
+    real = isinstance(stress, int | float | np.number) and not isinstance(stress, bool)
+    if not (real and math.isfinite(stress)):
+        problems.append(f"stress: must be a finite number in Pa, got {describe(stress)}")
+    try:
+        state = make_limit_state(problem, strength, method, seed, fields, event, workers)
+        problems += check_algorithm(state, algorithm, ALGORITHMS)
+    except InputError as error:
+        problems += error.problems
+    if problems:
+        raise InputError(problems)
+    for _, random in state.fields:
+        warn_if_inaccurate(random, problem.interface)
+    budget = budget_of(state, max_evaluations)
+    pilot = min(PILOT.get(state.method.type, 1_000), budget)
+    request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
+    low, high = state.bounds
+    if stress <= low:
+        text = f"no interface lets go at or below {low:g} Pa, where nothing slips"
+        return _exact(request, 0.0, text)
+    if stress >= high:
+        text = f"no interface holds more than the greatest strength, {high:g} Pa"
+        return _exact(request, 1.0, text)
+    reason = "as asked"
+    if algorithm == "auto":
+        chosen, reason, seen = _chosen(request)
+    else:
+        chosen, seen = algorithm, None
+    if chosen == "plain":
+        return by_counting(request, reason, seen)
+    if seen is not None:
+        request = request.after(seen.samples)
+    if chosen == "importance":
+        return by_importance(request, reason)
+    if chosen == "two_level":
+        return by_two_levels(request, state.by(LocalCriterion()), reason)
+    return by_subset(request, reason)

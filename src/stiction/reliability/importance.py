@@ -1,0 +1,180 @@
+"""Importance sampling around the most likely weak spot, put at a random place on the interface.
+
+Where the problem looks the same everywhere there is one most likely failure for each place, so the
+sampling density is a mixture of normal densities shifted by the same dip at all nodes. Its weights
+are sums over the nodes, taken as logarithms: in hundreds of dimensions densities underflow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from stiction._typing import Array
+from stiction.criterion.nucleation import multiplier_of
+from stiction.fields.quantile_table import from_normal
+from stiction.fields.random_field import RandomField
+from stiction.problem import Problem
+
+SIZES = (1.0, 1.15)
+"""Shifts in units of the design point: the failures lie a little beyond it."""
+ITERATIONS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class DesignPoint:
+    """The most likely draws at which a given place lets go at a given stress.
+
+    Attributes
+    ----------
+    draws : (dimension,) array
+    index : float
+        beta, their distance from the origin.
+    converged : bool
+    """
+
+    draws: Array
+    index: float
+    converged: bool
+
+
+def _slope(field: RandomField, z: Array) -> Array:
+    h = 1e-4
+    difference: Array = from_normal(field.marginal, z + h) - from_normal(field.marginal, z - h)
+    return difference / (2.0 * h)
+
+
+def _draws_of(field: RandomField, problem: Problem, nodal: Array) -> Array:
+    """Draws u = A^T w, where z = A u is the field of draws u at the nodes."""
+    modes = field.modes(problem.interface)
+    spectrum = np.fft.fft(nodal)
+    j = np.arange(1, modes.count + 1)
+    waves = modes.sigma[1:] * spectrum[j % nodal.size]
+    start = int(field.mean_mode)
+    draws = np.zeros(modes.dimension)
+    draws[start::2], draws[start + 1 :: 2] = waves.real, -waves.imag
+    if field.mean_mode:
+        draws[0] = modes.sigma[0] * spectrum[0].real
+    return draws
+
+
+def design_point(problem: Problem, field: RandomField, excess: float) -> DesignPoint:
+    """Most likely draws whose nucleation stress at x = 0 is as low as given.
+
+    Parameters
+    ----------
+    problem : Problem
+        Uniform along the interface.
+    field : RandomField
+        Peak strength.
+    excess : float
+        Average of the strength over the critical patch at which it lets go, Pa.
+
+    Notes
+    -----
+    The nearest point to the origin on <g, F^-1(Phi(z))> = excess, by the iteration of Rackwitz and
+    Fiessler (1978), with the step halved as long as the merit |u|^2/2 + c |miss| of Zhang and
+    Der Kiureghian (1995) does not fall. The gradient is the criterion's weight g times the slope
+    of the map.
+    """
+    nodes = problem.interface.nodes
+    weight = np.fft.irfft(multiplier_of(problem, problem.nucleation_length), nodes)
+    draws = np.zeros(field.modes(problem.interface).dimension)
+
+    def miss(u: Array) -> tuple[float, Array]:
+        z = field.gaussian(problem.interface, u[None])[0]
+        return float(weight @ from_normal(field.marginal, z)) - excess, z
+
+    height, z = miss(draws)
+    scale = abs(height) if height != 0.0 else 1.0
+    converged = False
+    for _ in range(ITERATIONS):
+        slope = _draws_of(field, problem, weight * _slope(field, z))
+        steepness = float(slope @ slope)
+        if not steepness > 0.0:
+            break
+        target = slope * ((float(slope @ draws) - height) / steepness)
+        if np.linalg.norm(target - draws) < 1e-3 and abs(height) < 1e-6 * scale:
+            converged = True
+            break
+        penalty = 2.0 * np.linalg.norm(target) / np.sqrt(steepness) + 1e-30
+
+        def merit(u: Array, value: float, penalty: float = float(penalty)) -> float:
+            return 0.5 * float(u @ u) + penalty * abs(value)
+
+        now, length = merit(draws, height), 1.0
+        for _ in range(12):
+            trial = draws + length * (target - draws)
+            trial_height, trial_z = miss(trial)
+            if merit(trial, trial_height) < now:
+                break
+            length *= 0.5
+        draws, height, z = trial, trial_height, trial_z
+    return DesignPoint(draws, float(np.linalg.norm(draws)), converged)
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """Normal densities shifted by one dip, at every node and in several sizes, equally likely.
+
+    Attributes
+    ----------
+    shift : (dimension,) array
+        Draws of the dip at x = 0.
+    nodes : int
+    mean_mode : bool
+        Whether the first draw belongs to the mean.
+    sizes : tuple of float
+    """
+
+    shift: Array
+    nodes: int
+    mean_mode: bool = False
+    sizes: tuple[float, ...] = SIZES
+
+    def _waves(self, draws: Array) -> NDArray[np.complex128]:
+        start = int(self.mean_mode)
+        waves: NDArray[np.complex128] = draws[..., start::2] - 1j * draws[..., start + 1 :: 2]
+        return waves
+
+    def moved(self, node: NDArray[np.int64]) -> Array:
+        """The shift with its dip at given nodes, shape (len(node), dimension)."""
+        wave = self._waves(self.shift)
+        j = np.arange(1, wave.size + 1)
+        turned = wave * np.exp(-2j * np.pi * ((node[:, None] * j) % self.nodes) / self.nodes)
+        start = int(self.mean_mode)
+        draws = np.empty((node.size, self.shift.size))
+        draws[:, start::2], draws[:, start + 1 :: 2] = turned.real, -turned.imag
+        if start:
+            draws[:, 0] = self.shift[0]
+        return draws
+
+    def sample(self, samples: int, rng: np.random.Generator) -> Array:
+        """Draws of the mixture, shape (samples, dimension)."""
+        draws = rng.standard_normal((samples, self.shift.size))
+        node = rng.integers(0, self.nodes, samples)
+        size = np.asarray(self.sizes)[rng.integers(0, len(self.sizes), samples)]
+        draws += size[:, None] * self.moved(node)
+        return draws
+
+    def projections(self, draws: Array) -> Array:
+        """Product of each sample with the shift at each node, shape (samples, nodes)."""
+        product = self._waves(draws) * np.conj(self._waves(self.shift))
+        spectrum = np.zeros((draws.shape[0], self.nodes), dtype=np.complex128)
+        for j in range(product.shape[1]):
+            spectrum[:, (j + 1) % self.nodes] += product[:, j]
+        found: Array = np.fft.ifft(spectrum, axis=1).real * self.nodes
+        if self.mean_mode:
+            found += (draws[:, 0] * self.shift[0])[:, None]
+        return found
+
+    def log_weights(self, draws: Array) -> Array:
+        """Logarithm of the normal density over the mixture's, shape (samples,)."""
+        projected = self.projections(draws)
+        square = float(self.shift @ self.shift)
+        parts = [logsumexp(a * projected, axis=1) - 0.5 * a * a * square for a in self.sizes]
+        mixture: Array = logsumexp(np.stack(parts), axis=0) - np.log(self.nodes * len(self.sizes))
+        return -mixture

@@ -1,0 +1,184 @@
+"""The limit state: from standard normal draws to the stress at which the interface lets go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.ensemble.plan import STREAMS
+from stiction.ensemble.run import make_plan
+from stiction.ensemble.share import usable_cores
+from stiction.errors import InputError
+from stiction.fields.random_field import RandomField
+from stiction.problem import Problem
+
+Event = Literal["critical_stress", "first_instability"]
+
+PIECE = 16
+"""Fewest rows worth a thread of their own."""
+
+
+@dataclass(frozen=True)
+class LimitState:
+    """Stress at onset as a function of standard normal draws.
+
+    Attributes
+    ----------
+    problem : Problem
+    fields : tuple of (str, RandomField)
+        'strength' first, then what else is random; their draws stand side by side.
+    method : LocalCriterion, Equilibrium or Rupture
+    event : {"critical_stress", "first_instability"}
+        Which of the method's stresses.
+    workers : int
+        Threads. Rows do not depend on their batch, so the numbers do not depend on this.
+    """
+
+    problem: Problem
+    fields: tuple[tuple[str, RandomField], ...]
+    method: Any
+    event: Event = "critical_stress"
+    workers: int = 1
+
+    @cached_property
+    def _sizes(self) -> tuple[int, ...]:
+        return tuple(f.modes(self.problem.interface).dimension for _, f in self.fields)
+
+    @property
+    def dimension(self) -> int:
+        """Number of draws of a sample."""
+        return sum(self._sizes)
+
+    @cached_property
+    def _solver(self) -> Callable[..., Any]:
+        solver: Callable[..., Any] = self.method.prepare(self.problem)
+        return solver
+
+    def by(self, method: Any) -> LimitState:
+        """The same by another method."""
+        return replace(self, method=method)
+
+    def draws(self, seed: int, first: int, samples: int) -> Array:
+        """Draws of samples first .. first + samples - 1 of the ensemble of this seed.
+
+        The same samples as `stiction.monte_carlo` takes, shape (samples, dimension).
+        """
+        interface = self.problem.interface
+        parts = [
+            field.draws(interface, samples, seed, first, stream=STREAMS.get(name, 0))
+            for name, field in self.fields
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+
+    def profiles(self, draws: Array) -> dict[str, Array]:
+        """Sampled profiles by name, each of shape (samples, nodes)."""
+        found, start = {}, 0
+        for (name, field), size in zip(self.fields, self._sizes, strict=True):
+            part = draws[:, start : start + size]
+            found[name] = field.profiles(self.problem.interface, part)
+            start += size
+        return found
+
+    def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
+        """All that the method says of some profiles."""
+        others = {name: value for name, value in profiles.items() if name != "strength"}
+        return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
+
+    def _stress(self, draws: Array) -> Array:
+        result: Array = np.asarray(self.onset(self.profiles(draws))[self.event])
+        return result
+
+    def __call__(self, draws: Array) -> Array:
+        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,)."""
+        pieces = min(self.workers, max(1, draws.shape[0] // PIECE))
+        if pieces == 1:
+            return self._stress(draws)
+        _ = self._solver  # prepared before the threads need it
+        with ThreadPoolExecutor(pieces) as pool:
+            return np.concatenate(list(pool.map(self._stress, np.array_split(draws, pieces))))
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Stresses below and above which no sample can let go, Pa.
+
+        Nothing slips, and so nothing can let go, while the stress is below the strength at every
+        node; and the mean stress of an interface whose slip sums to no net force is at most the
+        mean of its strength. Both hold for every method and every sample.
+        """
+        fields = dict(self.fields)
+        low, high = (float(end) for end in fields["strength"].marginal.distribution.support())
+        load = self.problem.load
+        profile = np.asarray(load.profile, dtype=np.float64)
+        least: Any = np.asarray(load.initial_stress, dtype=np.float64)
+        most: Any = least
+        if "initial_stress" in fields:
+            ends = fields["initial_stress"].marginal.distribution.support()
+            least, most = (float(end) for end in ends)
+        lowest_load = float(np.min((low - most) / profile))
+        nodes = self.problem.interface.nodes
+        mean = float(np.mean(np.broadcast_to(profile, (nodes,))))
+        # The mean of the initial stress is itself random where it is a field: take its lowest.
+        initial = float(np.mean(np.broadcast_to(least, (nodes,))))
+        # The rounded weight of the local criterion integrates to a little more than one.
+        slack = 1.001 if getattr(self.method, "weights", "exact") == "rounded" else 1.0
+        return initial + lowest_load * mean, high * slack
+
+    def no_single_length(self) -> str | None:
+        """Why the local criterion cannot serve as a first stage, or None if it can."""
+        friction = self.problem.friction
+        if friction.weakening_rate is None or "weakening_rate" in dict(self.fields):
+            return "the weakening rate is not uniform"
+        if np.ptp(friction.weakening_rate) > 0.0:
+            return "the weakening rate varies along the interface"
+        if self.problem.nucleation_length > self.problem.interface.length:
+            return "the nucleation length is longer than the interface"
+        return None
+
+    def not_alike_everywhere(self) -> str | None:
+        """Why a shifted sample would not let go at the same stress, or None if it would."""
+        if len(self.fields) > 1:
+            return "more than the strength is random"
+        load, friction = self.problem.load, self.problem.friction
+        parts = {
+            "the load profile": load.profile,
+            "the initial stress": load.initial_stress,
+            "the residual strength": friction.residual_strength,
+            "the weakening rate": friction.weakening_rate,
+        }
+        for name, value in parts.items():
+            if value is not None and np.ptp(value) > 0.0:
+                return f"{name} varies along the interface"
+        return self.no_single_length()
+
+
+def make_limit_state(
+    problem: Problem,
+    strength: RandomField,
+    method: Any,
+    seed: int,
+    fields: dict[str, RandomField | None],
+    event: str,
+    workers: int | None,
+) -> LimitState:
+    """The limit state of these arguments, or one `InputError` with all that is wrong with them."""
+    problems: list[str] = []
+    try:
+        make_plan(problem, strength, method, seed, fields)
+    except InputError as error:
+        problems += error.problems
+    if event not in ("critical_stress", "first_instability"):
+        problems.append(f"event: must be 'critical_stress' or 'first_instability', got {event!r}")
+    if workers is not None and (isinstance(workers, bool) or not workers >= 1):
+        problems.append(f"workers: must be a whole number >= 1, got {workers!r}")
+    if problems:
+        raise InputError(problems)
+    random = tuple((name, field) for name, field in fields.items() if field is not None)
+    count = usable_cores() if workers is None else int(workers)
+    kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
+    return LimitState(problem, (("strength", strength), *random), method, kind, count)

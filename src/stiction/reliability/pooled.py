@@ -1,0 +1,126 @@
+"""Independent runs, each as large as is still needed, pooled until the estimate is good enough."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from stiction.reliability.subset import Descent
+
+MARGIN = 1.1
+"""The variance known so far is itself an estimate; aim a little further."""
+
+
+class Run(Protocol):
+    """What pooling needs to know of a run."""
+
+    @property
+    def samples(self) -> int:
+        """Size; the variance falls like one over it."""
+
+    @property
+    def evaluations(self) -> int:
+        """Cost."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether it came to an estimate."""
+
+
+AnyRun = TypeVar("AnyRun", bound=Run)
+
+
+def weights(runs: Sequence[Run]) -> list[float]:
+    """Each run's part in the pooled mean: by its size, which does not depend on its outcome."""
+    total = sum(run.samples for run in runs)
+    return [run.samples / total for run in runs]
+
+
+def run_until_precise(
+    make: Callable[[int, int, int], AnyRun],
+    judge: Callable[[Sequence[AnyRun]], float],
+    *,
+    target_cov: float,
+    first: int,
+    largest: int,
+    max_evaluations: int,
+) -> list[AnyRun]:
+    """Runs until their pooled coefficient of variation is at most the target.
+
+    Parameters
+    ----------
+    make : callable
+        (samples, number of the run, evaluations left) to a run.
+    judge : callable
+        Coefficient of variation of what runs tell together.
+    target_cov : float
+    first, largest : int
+        Size of the first run and of the largest; many runs of moderate size bound the memory.
+    max_evaluations : int
+
+    Returns
+    -------
+    list of runs
+        All complete, or a single incomplete one.
+    """
+    runs: list[AnyRun] = []
+    spent, size = 0, first
+    while True:
+        run = make(size, len(runs), max_evaluations - spent)
+        spent += run.evaluations
+        if not run.complete:
+            return runs or [run]
+        runs.append(run)
+        cov = judge(runs)
+        if cov <= target_cov:
+            return runs
+        total = sum(r.samples for r in runs)
+        price = sum(r.evaluations for r in runs) / total
+        wanted = MARGIN * total * (cov / target_cov) ** 2 - total if math.isfinite(cov) else total
+        affordable = (max_evaluations - spent) / price
+        size = int(min(max(wanted, first), largest, affordable))
+        if size < first:
+            return runs
+
+
+@dataclass(frozen=True, eq=False)
+class Tail:
+    """The lower tail of the stress at onset from pooled subset runs.
+
+    Attributes
+    ----------
+    runs : tuple of Descent
+    """
+
+    runs: tuple[Descent, ...]
+
+    def probability(self, stress: float) -> float:
+        """Estimate of P(onset below `stress`)."""
+        parts = zip(weights(self.runs), self.runs, strict=True)
+        return sum(weight * run.probability(stress) for weight, run in parts)
+
+    def coefficient_of_variation(self, stress: float) -> float:
+        """Of `probability(stress)`; infinite where no sample went so low."""
+        whole = self.probability(stress)
+        if whole == 0.0:
+            return math.inf
+        variance = 0.0
+        for weight, run in zip(weights(self.runs), self.runs, strict=True):
+            part = weight * run.probability(stress)
+            if part > 0.0:
+                variance += part * part * run.relative_variance(stress)
+        return math.sqrt(variance) / whole
+
+    def quantile(self, probability: float) -> float:
+        """Stress below which the onset lies with this probability."""
+        low = min(float(run.populations[-1].values.min()) for run in self.runs)
+        high = max(float(run.populations[0].values.max()) for run in self.runs)
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            if self.probability(middle) < probability:
+                low = middle
+            else:
+                high = middle
+        return 0.5 * (low + high)

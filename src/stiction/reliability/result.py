@@ -1,0 +1,116 @@
+"""What a failure probability is reported with."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiction._typing import Array
+from stiction.ensemble.plan import PROFILES
+from stiction.errors import AccuracyWarning
+from stiction.reliability.limit_state import LimitState
+from stiction.reliability.subset import Level
+from stiction.results import ONSET_VARIABLES, POSITION, SAMPLE, to_dataset
+
+
+@dataclass(frozen=True, eq=False)
+class FailureProbability:
+    """Probability that an interface lets go below a stress, with how far it can be trusted.
+
+    Attributes
+    ----------
+    probability : float
+        Of an onset stress below `stress`.
+    coefficient_of_variation : float
+        Estimated standard error over the estimate; infinite if no failure was seen, zero if exact.
+    interval : tuple of float
+        Confidence interval of the probability.
+    evaluations : int
+        Samples that the method was asked for.
+    first_stage_evaluations : int
+        Samples that only the local criterion, as a cheap first stage, was asked for.
+    stress : float
+        Pa.
+    lower_bound, stress_above_bound : float
+        Pa; no sample lets go below `lower_bound`, so that a rare failure is told by how little
+        `stress` is above it.
+    algorithm : str
+        'plain', 'subset', 'importance', 'two_level' or 'exact' (nothing had to be sampled).
+    reason : str
+        Why this algorithm.
+    confidence : float
+        Of `interval`.
+    levels : tuple of Level
+        Of the first subset run; empty for other algorithms.
+    failing_profiles : xarray.Dataset
+        Some samples from the failure set over ('sample', 'x'), as likely as they are there:
+        `strength` (and what else is random), `critical_stress`, `critical_position`, ...
+    diagnostics : dict
+        Numbers that belong to the algorithm, by name.
+    warnings : tuple of str
+        Why the estimate is not to be trusted; empty if it is.
+    """
+
+    probability: float
+    coefficient_of_variation: float
+    interval: tuple[float, float]
+    evaluations: int
+    stress: float
+    lower_bound: float
+    algorithm: str
+    reason: str
+    confidence: float
+    first_stage_evaluations: int = 0
+    levels: tuple[Level, ...] = ()
+    failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
+    diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def stress_above_bound(self) -> float:
+        """`stress` less `lower_bound`, Pa."""
+        return self.stress - self.lower_bound
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        return (
+            f"P = {self.probability:.3g} ({100 * self.confidence:g} %: {low:.3g} to {high:.3g},"
+            f" c.o.v. {self.coefficient_of_variation:.2g}) below {self.stress / 1e6:.6g} MPa,"
+            f" {self.stress_above_bound / 1e3:.4g} kPa above the bound;"
+            f" {self.algorithm}, {self.evaluations} evaluations"
+        )
+
+
+def say(texts: list[str]) -> tuple[str, ...]:
+    """Issue texts as warnings and return them."""
+    for text in texts:
+        warnings.warn(text, AccuracyWarning, stacklevel=4)
+    return tuple(texts)
+
+
+def distinct(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Up to `count` positions with different values, in random order: chains repeat states."""
+    _, first = np.unique(values, return_index=True)
+    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
+    return chosen
+
+
+def profiles_of(state: LimitState, draws: Array) -> xr.Dataset:
+    """Profiles and onset of some draws, labelled."""
+    if draws.shape[0] == 0:
+        return xr.Dataset()
+    profiles = state.profiles(draws)
+    values: dict[str, Any] = dict(profiles)
+    onset = state.onset(profiles)
+    values |= {name: onset[name] for name in ONSET_VARIABLES}
+    coordinates = {
+        "sample": (np.arange(draws.shape[0]), SAMPLE),
+        "x": (state.problem.interface.x, POSITION),
+    }
+    return to_dataset(values, {**PROFILES, **ONSET_VARIABLES}, coordinates, {})

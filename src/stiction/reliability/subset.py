@@ -1,0 +1,276 @@
+"""Subset simulation: a rare event as a chain of less rare ones, sampled by preconditioned walks.
+
+Works on any function of standard normal draws. Level after level keeps the lowest tenth of its
+samples and grows them back to full number by Metropolis steps z' = sqrt(1 - b^2) z + b w, which
+leave the normal distribution as it is and are rejected where they leave the level.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._typing import Array
+from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
+
+Integers = NDArray[np.int64]
+Function = Callable[[Array], Array]
+
+ACCEPTANCE = 0.44
+"""Share of steps to accept; between 0.3 and 0.6 the efficiency hardly changes."""
+FIRST_STEP = 0.7
+MOST_LEVELS = 40
+KEEP = 2
+"""How many of the last populations keep their draws."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a subset simulation.
+
+    Attributes
+    ----------
+    threshold : float
+        The next level holds the samples at or below it (the last level: the failures, below it).
+    probability : float
+        Estimated share of this level that lies there.
+    acceptance : float
+        Share of Metropolis steps accepted; 1 at the first level, whose samples are independent.
+    step : float
+        b when the level was complete.
+    correlation : float
+        gamma of Au and Beck (2001, Eq. 29).
+    ancestors : int
+        Distinct first-level ancestors among the samples that go on.
+    """
+
+    threshold: float
+    probability: float
+    acceptance: float
+    step: float
+    correlation: float
+    ancestors: int
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Samples of one level: standard normal, given that the value is at most `ceiling`.
+
+    Attributes
+    ----------
+    ceiling : float
+    log_probability : float
+        Logarithm of the estimated probability of the level.
+    values : (samples,) array
+    ancestors : (samples,) int array
+    chains : int
+        Sample i belongs to chain i modulo this.
+    draws : (samples, dimension) array
+        Empty for early levels.
+    """
+
+    ceiling: float
+    log_probability: float
+    values: Array
+    ancestors: Integers
+    chains: int
+    draws: Array = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """A finished run: populations from all samples down to the rarest.
+
+    Attributes
+    ----------
+    samples : int
+        N, samples of each level.
+    populations : tuple of Population
+    levels : tuple of Level
+    evaluations : int
+        Calls of the function, counted by samples.
+    complete : bool
+        Whether the run got where it was to go.
+    """
+
+    samples: int
+    populations: tuple[Population, ...]
+    levels: tuple[Level, ...]
+    evaluations: int
+    complete: bool
+
+    def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
+        holder = self.populations[0]
+        for population in self.populations[1:]:
+            if population.ceiling < value:
+                break
+            holder = population
+        return holder, holder.values < value
+
+    def probability(self, value: float) -> float:
+        """Estimate of P(function < value); zero where no sample went so low."""
+        population, below = self._below(value)
+        return math.exp(population.log_probability) * float(below.mean())
+
+    def relative_variance(self, value: float) -> float:
+        """Squared coefficient of variation of `probability(value)`, from ancestry."""
+        population, below = self._below(value)
+        return ancestral_variance(population.ancestors[below], self.samples)
+
+    def ancestors(self, value: float) -> Integers:
+        """First-level ancestors of the samples below a value."""
+        population, below = self._below(value)
+        return population.ancestors[below]
+
+
+def _grow(
+    function: Function,
+    draws: Array,
+    values: Array,
+    ceiling: float,
+    steps: int,
+    step: float,
+    rng: np.random.Generator,
+) -> tuple[Array, Array, float, float]:
+    """Chains of `steps` states from given seeds; states, values, acceptance, last step size.
+
+    All chains move together, one call of the function a step; the step size follows the
+    acceptance over all chains, ever more slowly.
+    """
+    chains, dimension = draws.shape
+    states, found = np.empty((steps, chains, dimension)), np.empty((steps, chains))
+    states[0], found[0] = draws, values
+    accepted = 0.0
+    for t in range(1, steps):
+        noise = rng.standard_normal((chains, dimension))
+        noise *= step
+        candidate = math.sqrt(1.0 - step * step) * states[t - 1]
+        candidate += noise
+        outcome = function(candidate)
+        taken = outcome <= ceiling
+        states[t] = np.where(taken[:, None], candidate, states[t - 1])
+        found[t] = np.where(taken, outcome, found[t - 1])
+        share = float(taken.mean())
+        accepted += share
+        step = min(1.0, step * math.exp((share - ACCEPTANCE) / math.sqrt(t)))
+    acceptance = accepted / (steps - 1) if steps > 1 else 1.0
+    return states.reshape(-1, dimension), found.ravel(), acceptance, step
+
+
+def conditional_chains(
+    function: Function,
+    draws: Array,
+    values: Array,
+    ceiling: float,
+    steps: int,
+    step: float,
+    rng: np.random.Generator,
+) -> tuple[Array, Array, float, float]:
+    """The same with the seeds left out: shape (steps * chains, ...), step after step."""
+    chains = draws.shape[0]
+    states, found, acceptance, step = _grow(function, draws, values, ceiling, steps + 1, step, rng)
+    return states[chains:], found[chains:], acceptance, step
+
+
+def descend(
+    function: Function,
+    dimension: int,
+    *,
+    rng: np.random.Generator,
+    samples: int,
+    threshold: float = -math.inf,
+    probability: float = 0.0,
+    level_probability: float = 0.1,
+    max_evaluations: int | None = None,
+) -> Descent:
+    """Subset simulation down to a threshold or a probability, whichever comes first.
+
+    Parameters
+    ----------
+    function : callable
+        From draws (k, dimension) to values (k,), whose low values are rare.
+    dimension : int
+    rng : numpy Generator
+    samples : int
+        N of each level; ``samples * level_probability`` chains walk side by side.
+    threshold : float
+        Failure is a value below it; levels stop there.
+    probability : float
+        Or stop when a level's lowest share reaches this probability.
+    level_probability : float
+        Share p_0 of samples that go on.
+    max_evaluations : int, optional
+        No level is begun that would exceed it.
+
+    Returns
+    -------
+    Descent
+
+    Notes
+    -----
+    Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
+    (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.
+    """
+    count = max(2, round(samples * level_probability))
+    steps = max(2, round(samples / count))
+    samples = count * steps
+    draws = rng.standard_normal((samples, dimension))
+    values = function(draws)
+    ancestors, chains = np.arange(samples), samples
+    ceiling, log_probability = math.inf, 0.0
+    step, acceptance, evaluations = FIRST_STEP, 1.0, samples
+    populations: list[Population] = []
+    levels: list[Level] = []
+    complete = False
+    while True:
+        populations.append(Population(ceiling, log_probability, values, ancestors, chains, draws))
+        if len(populations) > KEEP:
+            old = populations[-KEEP - 1]
+            populations[-KEEP - 1] = Population(
+                old.ceiling,
+                old.log_probability,
+                old.values,
+                old.ancestors,
+                old.chains,
+                np.empty((0, dimension)),
+            )
+        order = np.argsort(values, kind="stable")
+        lowest = float(values[order[count - 1]])
+        final = lowest < threshold
+        chosen = np.zeros(samples, dtype=bool)
+        if final:
+            chosen = values < threshold
+        else:
+            chosen[order[:count]] = True
+        share = float(chosen.mean())
+        shaped = chosen.reshape(-1, chains)
+        levels.append(
+            Level(
+                threshold=threshold if final else lowest,
+                probability=share,
+                acceptance=acceptance,
+                step=step,
+                correlation=chain_correlation(shaped) if len(levels) else 0.0,
+                ancestors=int(np.unique(ancestors[chosen]).size),
+            )
+        )
+        complete = final or log_probability + math.log(share) <= math.log(max(probability, 1e-300))
+        cost = count * (steps - 1)
+        stuck = lowest >= ceiling or len(levels) >= MOST_LEVELS
+        over = max_evaluations is not None and evaluations + cost > max_evaluations
+        if complete or stuck or over:
+            break
+        log_probability += math.log(share)
+        ceiling = lowest
+        seeds = rng.permutation(order[:count])
+        family = ancestors[seeds]
+        draws, values, acceptance, step = _grow(
+            function, draws[seeds], values[seeds], ceiling, steps, step, rng
+        )
+        ancestors, chains = np.tile(family, steps), count
+        evaluations += cost
+    return Descent(samples, tuple(populations), tuple(levels), evaluations, complete)

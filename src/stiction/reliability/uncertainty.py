@@ -1,0 +1,111 @@
+"""How far an estimated probability may be off: intervals, and the variance of correlated chains."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, ndtri
+
+from stiction._typing import Array
+
+Integers = NDArray[np.int64]
+
+
+def lognormal_interval(probability: float, cov: float, confidence: float) -> tuple[float, float]:
+    """Interval of an estimate whose logarithm is about normal, within [0, 1].
+
+    Parameters
+    ----------
+    probability : float
+        Estimate.
+    cov : float
+        Its coefficient of variation.
+    confidence : float
+        Such as 0.95.
+    """
+    if not math.isfinite(cov):
+        return 0.0, 1.0
+    width = float(ndtri(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cov * cov))
+    return probability * math.exp(-width), min(1.0, probability * math.exp(width))
+
+
+def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[float, float]:
+    """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
+    tail = 0.5 * (1.0 - confidence)
+    low = betaincinv(failures, samples - failures + 1, tail) if failures else 0.0
+    high = betaincinv(failures + 1, samples - failures, 1.0 - tail) if failures < samples else 1.0
+    return float(low), float(high)
+
+
+def ancestral_variance(ancestors: Integers, samples: int) -> float:
+    """Squared coefficient of variation of a subset estimate, from the ancestry of its failures.
+
+    Families that descend from different first samples evolve independently, so the spread of
+    their shares among the failures measures the error of the whole estimate, with the
+    correlation along chains, between chains of one ancestor and from level to level: the sum of
+    (share - 1/N)^2 over the N first samples.
+
+    Parameters
+    ----------
+    ancestors : (failures,) int array
+        For each failing sample of the last level, the first-level sample it descends from.
+    samples : int
+        N.
+
+    Notes
+    -----
+    The genealogy estimator of sequential Monte Carlo, after Chan and Lai (2013) and Lee and
+    Whiteley (2018).
+    """
+    if ancestors.size == 0:
+        return math.inf
+    _, sizes = np.unique(ancestors, return_counts=True)
+    shares = sizes / ancestors.size
+    return max(0.0, float(np.sum(shares * shares)) - 1.0 / samples)
+
+
+def chain_correlation(failed: NDArray[np.bool_]) -> float:
+    """gamma of Au and Beck (2001, Eq. 29): by how much correlated steps inflate the variance.
+
+    Parameters
+    ----------
+    failed : (steps, chains) bool array
+        Whether each state of each chain fails.
+
+    Returns
+    -------
+    float
+        The variance of the mean is p (1 - p)(1 + gamma)/(steps * chains), were the chains
+        independent of each other.
+    """
+    indicator = failed.astype(np.float64)
+    mean = float(indicator.mean())
+    variance = mean * (1.0 - mean)
+    if variance == 0.0:
+        return 0.0
+    steps = indicator.shape[0]
+    total = 0.0
+    for lag in range(1, steps):
+        covariance = float(np.mean(indicator[:-lag] * indicator[lag:])) - mean * mean
+        total += 2.0 * (1.0 - lag / steps) * covariance / variance
+    return max(0.0, total)
+
+
+def effective_size(weights: Array) -> float:
+    """Number of equal weights with the same relative variance (Kish, 1965)."""
+    total = float(weights.sum())
+    return total * total / float(np.sum(weights * weights)) if total > 0.0 else 0.0
+
+
+def generator(seed: int, *key: int) -> np.random.Generator:
+    """An independent generator for each key under one seed.
+
+    The leading number of the spawn key keeps clear of the streams of random fields.
+    """
+    words: Any = (7_000_000, *key)
+    return np.random.Generator(
+        np.random.PCG64DXSM(np.random.SeedSequence(entropy=seed, spawn_key=words))
+    )
