@@ -1,7 +1,7 @@
 """The memory kernel as a short, validated sum of decaying exponentials.
 
 C(T) ~ Re sum_p w_p exp(s_p T) turns the convolution with the whole history into one recursion a
-pair. The arc quadrature already is such a sum, of some 140 terms; balanced truncation shortens it
+pair. The arc quadrature already is such a sum, of some 280 terms; balanced truncation shortens it
 (Moore 1981; its Gramians are Cauchy matrices, factorised to high relative accuracy as in Demmel
 1999), variable projection polishes the poles (Golub and Pereyra 1973), and reweighting in the way
 of Lawson (1961) levels the error. A fit counts only if its error on another, denser set of times

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_STEP = 0.05  # of the tanh-sinh rule; halving it changes the kernel by less than 2e-15
+_STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
 _RANGE = 4.4  # the outermost node lies 1e-55 from the branch point, its weight underflows any sum
 _CHUNK = 2048
 
@@ -26,7 +26,8 @@ def symbol(s: ArrayLike, mode: str, eta: float) -> NDArray[np.complex128]:
     Parameters
     ----------
     s : array_like
-        Dimensionless Laplace variable, in units of |k| c_s, Re s >= 0 (1).
+        Dimensionless Laplace variable, in units of |k| c_s (1). Cuts run from the branch points
+        +-i and +-i eta straight to the left.
     mode : {"II", "III"}
         In-plane or anti-plane slip.
     eta : float
@@ -40,11 +41,10 @@ def symbol(s: ArrayLike, mode: str, eta: float) -> NDArray[np.complex128]:
         the static stiffness G*/G at s = 0. Source: Geubelle and Rice (1995), in Laplace space.
     """
     z = np.asarray(s, dtype=np.complex128)
-    # sqrt(1 + s^2) with its cut between the branch points, not along the imaginary axis.
-    shear = np.sqrt(1.0 - 1j * z) * np.sqrt(1.0 + 1j * z)
+    shear = np.sqrt(z - 1j) * np.sqrt(z + 1j)
     if mode == "III":
         return shear
-    pressure = np.sqrt(1.0 - 1j * z / eta) * np.sqrt(1.0 + 1j * z / eta)
+    pressure = np.sqrt(z - 1j * eta) * np.sqrt(z + 1j * eta) / eta
     return ((2.0 + z * z) ** 2 - 4.0 * shear * pressure) / (z * z * shear)
 
 
@@ -73,7 +73,7 @@ def arc_quadrature(mode: str, eta: float) -> tuple[NDArray[np.complex128], NDArr
 
     Returns
     -------
-    nodes, weights : ndarrays of complex, shape (about 70 an arc,)
+    nodes, weights : ndarrays of complex, shape (about 140 an arc,)
         Re s < 0. The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across
         the arc |s| = 1 (the shear root) and |s| = eta (the dilatational root) contribute.
     """

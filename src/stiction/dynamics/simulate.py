@@ -17,12 +17,11 @@ from stiction.dynamics import track
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.frames import Frames, check_variables
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
-from stiction.dynamics.measures import rupture_speed
 from stiction.dynamics.method import (
     Rupture,
     check_finite,
     first_slip,
-    front_window,
+    front_speed,
     make_run,
     summary,
     warn_if_coarse,
@@ -323,7 +322,7 @@ def _complete(
     dataset: xr.Dataset, problem: Problem, method: Rupture, run: Run, state: State
 ) -> xr.Dataset:
     """Add what belongs to the run as a whole."""
-    speed = rupture_speed(state.arrival, run.medium.spacing, front_window(problem, run))
+    speed = front_speed(problem, run, state, 0.5)
     along: dict[str, NDArray[Any]] = {
         "peak_strength": run.rows[0],
         "arrival_time": state.arrival,

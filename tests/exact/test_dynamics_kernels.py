@@ -1,0 +1,112 @@
+"""The memory kernel against closed forms and high-precision inversion, and its short sums."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from stiction import InputError
+from stiction.dynamics.cache import kernel_sum
+from stiction.dynamics.exponentials import fit_exponentials
+from stiction.dynamics.kernels import memory_kernel, static_stiffness, symbol
+
+ETAS = {
+    "stress, nu = 0.33": np.sqrt(2.0 / 0.67),
+    "strain, nu = 0": np.sqrt(2.0),
+    "strain, nu = 0.49": np.sqrt(1.02 / 0.02),
+}
+
+
+def bessel_tail(t):
+    """W(T) = int_T^inf J1(x)/x dx, by the integral of J0."""
+    integral = t * mpmath.hyp1f2(mpmath.mpf(1) / 2, 1, mpmath.mpf(3) / 2, -t * t / 4)
+    return 1 - integral + mpmath.besselj(1, t)
+
+
+def closed_form(t, eta):
+    """C of mode II by Bessel functions; needs many digits, since its terms cancel like T^2."""
+    t, e = mpmath.mpf(t), mpmath.mpf(float(eta))
+    w, w_fast = bessel_tail(t), bessel_tail(e * t)
+    return (
+        2 * w
+        - mpmath.besselj(1, t)
+        - 2 / e**2 * (w_fast - mpmath.besselj(1, e * t))
+        - 2 * t**2 * (w_fast - w)
+        + 2 * t / e * mpmath.besselj(0, e * t)
+        - 2 * t * mpmath.besselj(0, t)
+    )
+
+
+@pytest.mark.parametrize("eta", ETAS.values(), ids=ETAS)
+@pytest.mark.parametrize("t", [1e-3, 0.3, 2.0, 7.0, 40.0, 1e3, 1e5])
+def test_mode_two_kernel_equals_its_closed_form(t, eta):
+    with mpmath.workdps(40):
+        expected = float(closed_form(t, eta))
+    # 1e-12 is asked for; round-off in phases of 1e5 rad is what is left.
+    assert abs(memory_kernel(t, "II", eta) - expected) < 1e-12
+
+
+@pytest.mark.parametrize("t", [1e-3, 0.3, 2.0, 7.0, 40.0, 1e3, 1e5])
+def test_mode_three_kernel_equals_its_closed_form(t):
+    with mpmath.workdps(40):
+        expected = float(bessel_tail(mpmath.mpf(t)))
+    assert abs(memory_kernel(t, "III", 1.0) - expected) < 1e-12
+
+
+def test_mode_three_kernel_is_the_integral_of_the_bessel_kernel():
+    t, h = 3.0, 1e-3
+    slope = (memory_kernel(t - h, "III", 1.0) - memory_kernel(t + h, "III", 1.0)) / (2 * h)
+    # Central difference: h^2/6 times a third derivative below 1.
+    assert slope == pytest.approx(float(mpmath.besselj(1, t)) / t, abs=2e-7)
+
+
+@pytest.mark.parametrize("t", [0.5, 3.0, 12.0])
+def test_kernel_equals_high_precision_laplace_inversion(t):
+    eta = ETAS["stress, nu = 0.33"]
+
+    def transform(s):
+        shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
+        fast = mpmath.sqrt(s - 1j * eta) * mpmath.sqrt(s + 1j * eta) / eta
+        stiffness = ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
+        return (static_stiffness("II", eta) + s - stiffness) / s
+
+    with mpmath.workdps(40):
+        expected = float(mpmath.invertlaplace(transform, t, method="talbot", degree=80))
+    assert abs(memory_kernel(t, "II", eta) - expected) < 1e-12
+
+
+def test_symbol_has_its_limits():
+    eta = ETAS["stress, nu = 0.33"]
+    # D - s = O(1/s) at high frequency, static stiffness at low frequency, Rayleigh's root at c_R.
+    assert abs(symbol(1e4, "II", eta) - 1e4) < 1e-3
+    assert symbol(1e-3, "II", eta).real == pytest.approx(static_stiffness("II", eta), rel=1e-5)
+    assert symbol(1e-3, "III", eta).real == pytest.approx(1.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("mode", "eta"),
+    [("II", ETAS["stress, nu = 0.33"]), ("II", ETAS["strain, nu = 0.49"]), ("III", 1.0)],
+)
+def test_short_sum_reaches_its_tolerance_on_times_it_never_saw(mode, eta):
+    kernel = kernel_sum(mode, eta, 1e-6, 1e5)
+    rng = np.random.default_rng(123)
+    times = np.concatenate([np.linspace(0.0, 60.0, 4001), 10.0 ** rng.uniform(-3, 5, 20_000)])
+    error = np.abs(kernel(times) - memory_kernel(times, mode, eta)).max()
+    # A random time can sit a little beside the worst one that was validated.
+    assert error < 1.2e-6
+    assert kernel.error < 1e-6
+    assert kernel.poles.real.max() <= -0.3 / 1e5
+    assert np.abs(kernel.weights).max() < 10.0
+    assert kernel.poles.size <= 28
+
+
+def test_a_looser_tolerance_needs_fewer_pairs():
+    loose = fit_exponentials("II", ETAS["stress, nu = 0.33"], 1e-3)
+    tight = kernel_sum("II", ETAS["stress, nu = 0.33"], 1e-6)
+    assert loose.poles.size < 0.6 * tight.poles.size
+
+
+def test_impossible_tolerances_are_refused():
+    with pytest.raises(InputError, match="tolerance"):
+        fit_exponentials("II", 1.7, 1e-14)
+    with pytest.raises(InputError, match="t_max"):
+        fit_exponentials("II", 1.7, 1e-6, 1.0)

@@ -1,0 +1,110 @@
+"""Elastodynamics with a known answer: a self-similar crack, and a wave on a free interface."""
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.special import j0, j1
+
+import stiction as st
+from stiction.dynamics import track
+from stiction.dynamics.cache import kernel_sum
+from stiction.dynamics.kernels import memory_kernel, static_stiffness, symbol
+from stiction.dynamics.loading import load_history
+from stiction.dynamics.method import Rupture, make_run
+
+ETA = np.sqrt(2.0 / 0.67)
+
+
+def kostrov_integral(speed, mode):
+    """I = b^2 int_0^inf D(s) (s^2 + b^2)^(-3/2) ds, b = v/c_s (Kostrov 1964, by mode)."""
+    # s = b tan(angle): the integrand is then smooth on a finite range.
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    angle = 0.25 * np.pi * (nodes + 1.0)
+    values = symbol(speed * np.tan(angle), mode, ETA).real * np.cos(angle)
+    return float(np.sum(0.25 * np.pi * weights * values))
+
+
+@pytest.mark.parametrize("mode", ["II", "III"])
+@pytest.mark.parametrize("speed", [0.3, 0.85])
+@pytest.mark.parametrize("short", [False, True], ids=["quadrature", "short sum"])
+def test_stress_inside_a_growing_crack_is_minus_the_drop(mode, speed, short):
+    """Slip A sqrt(v^2 t^2 - x^2) with A = 2 drop/(G I), G = c_s = 1: mode by mode, then filtered.
+
+    Slip rate of mode k: A pi v^2 t J0(k v t). A Gaussian filter of width v t/8 reaches the tips
+    with a weight of 1e-14 only.
+    """
+    amplitude = 2.0 / kostrov_integral(speed, mode)
+    width = speed / 8.0
+    x, w = np.polynomial.legendre.leggauss(160)
+    k, k_weight = 4.5 / width * (x + 1.0), 4.5 / width * w
+    x, w = np.polynomial.legendre.leggauss(300)
+    past, past_weight = 0.5 * (x + 1.0), 0.5 * w
+    scaled = np.multiply.outer(k, past)
+    kernel = kernel_sum(mode, ETA)(scaled) if short else memory_kernel(scaled, mode, ETA)
+    rate = speed**2 * (1.0 - past) * j0(np.multiply.outer(k, speed * (1.0 - past)))
+    slip = np.pi * amplitude * speed * j1(k * speed) / k
+    memory = np.pi * amplitude * (kernel * rate) @ past_weight
+    stress = 0.5 * k * (memory - static_stiffness(mode, ETA) * slip)
+    stress -= 0.5 * np.pi * amplitude * speed**2 * j0(k * speed)
+    inside = np.sum(k_weight * stress * np.exp(-0.5 * (k * width) ** 2)) / np.pi
+    # 1e-6 is the kernel's tolerance; the quadrature alone leaves 1e-8.
+    assert inside == pytest.approx(-1.0, abs=1e-6)
+
+
+def released(steps, end, mode="II"):
+    """Amplitude of a slip cos(kx) on an interface without friction law, at c_s k t = end."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
+    interface = st.Interface(length=0.1, nodes=32)
+    # Everything has slipped beyond d_c and slides on at the residual strength.
+    friction = st.SlipWeakening(weakening_rate=1e9, residual_strength=1e6)
+    problem = st.Problem(solid, interface, friction, mode=mode)
+    k = interface.wavenumbers[2]
+    unit = 1.0 / (k * solid.shear_wave_speed)
+    method = Rupture(loading_rate=1.0, implicit=False, time_step=end * unit / steps)
+    history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
+    rows = problem.rows(np.full(32, 1.001e6))
+    run = make_run(method, method.medium(problem), rows, 0, history)
+    run.control[track.SLID_STOP] = np.inf
+    state = run.start(0.0, 1e-3 + 1e-6 * np.cos(k * interface.x))
+    run.advance(state, steps)
+    return state.slip_hat[2].real / 16.0 / 1e-6
+
+
+def release_by_laplace(t, mode="II"):
+    """a/a_0 = inverse transform of (1 - D0/D)/s."""
+
+    def transform(s):
+        shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
+        if mode == "III":
+            return (1 - 1 / shear) / s
+        fast = mpmath.sqrt(s - 1j * ETA) * mpmath.sqrt(s + 1j * ETA) / ETA
+        stiffness = ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
+        return (1 - static_stiffness("II", ETA) / stiffness) / s
+
+    with mpmath.workdps(40):
+        return float(mpmath.invertlaplace(transform, t, method="talbot", degree=90))
+
+
+@pytest.mark.parametrize("mode", ["II", "III"])
+def test_released_wave_converges_to_the_laplace_solution_with_second_order(mode):
+    expected = release_by_laplace(10.0, mode)
+    errors = [abs(released(steps, 10.0, mode) - expected) for steps in (100, 200, 400)]
+    # Order 2: a factor 4 a halving, measured between 3.9 and 4.1.
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.3)
+    assert errors[1] / errors[2] == pytest.approx(4.0, abs=0.3)
+    assert errors[2] < 5e-4
+
+
+def test_a_free_interface_rings_on_as_the_rayleigh_wave_alone():
+    """Late, only the pole at s = i c_R/c_s is left: a = 2 Re(residue exp(s t)), undamped."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
+    pole = 1j * solid.rayleigh_wave_speed / solid.shear_wave_speed
+    h = 1e-5
+    slope = (symbol(pole + h, "II", ETA) - symbol(pole - h, "II", ETA)) / (2.0 * h)
+    residue = -static_stiffness("II", ETA) / (pole * slope)
+    for time in (600.0, 602.0):
+        expected = 2.0 * (residue * np.exp(pole * time)).real
+        # Waves of the branch points have faded like t^-3/2, to about 1e-4; the phase is off by
+        # the square of the step (0.02) times the time, some 1e-3.
+        assert released(30_000, time) == pytest.approx(expected, abs=2e-3)
+    assert abs(residue) > 0.3
