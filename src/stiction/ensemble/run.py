@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
@@ -12,16 +13,17 @@ import xarray as xr
 
 from stiction._model import describe, to_plain
 from stiction._progress import progress_bar
-from stiction.ensemble.gather import Gathered
+from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
-from stiction.errors import InputError, unknown_name
+from stiction.errors import AccuracyWarning, InputError, unknown_name
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.methods import Method, check_method, variables_of
 from stiction.problem import Problem
 
 KEEP_LIMIT = 2.0**30
+FEW = 4
 
 
 def make_plan(
@@ -98,9 +100,7 @@ def check_count(name: str, value: Any, smallest: int) -> None:
         raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
 
 
-def check_run(
-    samples: Any, first: Any, workers: Any, executor: Any, *, nothing_to_do: bool = False
-) -> None:
+def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> None:
     """Refuse arguments of a run that make no sense, before any work is done."""
     check_count("samples", samples, 1)
     check_count("first", first, 0)
@@ -130,10 +130,28 @@ def check_size(needed: float, limit: float) -> None:
         )
 
 
-def warn_of_fields(plan: Plan) -> None:
-    """Warn of fields that the grid or the interface cannot do justice to."""
-    for _, field in (("strength", plan.strength), *plan.fields):
-        warn_if_inaccurate(field, plan.problem.interface)
+def warn_of_fields(plans: Sequence[Plan]) -> None:
+    """Warn of fields that the grid or the interface cannot do justice to, once each."""
+    found = [
+        (field, plan.problem.interface)
+        for plan in plans
+        for _, field in (("strength", plan.strength), *plan.fields)
+    ]
+    pairs = list(dict.fromkeys(found))
+    for field, interface in pairs[:FEW]:
+        warn_if_inaccurate(field, interface)
+    if len(pairs) > FEW:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            for field, interface in pairs[FEW:]:
+                warn_if_inaccurate(field, interface)
+        if caught:
+            warnings.warn(
+                f"{len(caught)} more combinations of field and interface are inaccurate, such as:"
+                f" {caught[-1].message}",
+                AccuracyWarning,
+                stacklevel=3,
+            )
 
 
 def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
@@ -155,32 +173,39 @@ def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
     return {"study": study, "seed": plan.seed}
 
 
-def run_plan(
-    plan: Plan,
+def run_plans(
+    plans: Sequence[Plan],
     samples: int,
     *,
     first: int = 0,
+    axes: Sequence[GridAxis] = (),
+    attributes: Mapping[str, Any],
     workers: int | None = None,
     executor: Executor | None = None,
     progress: bool | Callable[[int, int], None] = False,
-    keep_limit: float = KEEP_LIMIT,
 ) -> xr.Dataset:
-    """Compute samples first .. first + samples - 1 of a plan; see `monte_carlo`."""
+    """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
     check_run(samples, first, workers, executor)
-    check_size(wide_bytes(plan, samples, first), keep_limit)
-    warn_of_fields(plan)
+    warn_of_fields(plans)
     workers = usable_cores() if workers is None else workers
-    gathered = Gathered([plan], samples, first)
-    with progress_bar(samples, plan.method.type, progress) as report:
-        spans = [Span(0, first, samples)]
-        for outcome in share_out([plan], spans, executor=executor, workers=workers):
+    gathered = Gathered(plans, samples, first)
+    total = len(plans) * samples
+    with progress_bar(total, method_name(plans), progress) as report:
+        spans = [Span(point, first, samples) for point in range(len(plans))]
+        for outcome in share_out(plans, spans, executor=executor, workers=workers):
             if outcome is None:
                 continue
             if outcome.failures:
                 raise_failure(outcome.failures[0])
             gathered.add(outcome)
             report(outcome.count)
-    return gathered.dataset(plan_attributes(plan, samples, first))
+    return gathered.dataset(attributes, axes)
+
+
+def method_name(plans: Sequence[Plan]) -> str:
+    """For the progress bar."""
+    names = {plan.method.type for plan in plans}
+    return str(names.pop()) if len(names) == 1 else "samples"
 
 
 def monte_carlo(
@@ -247,6 +272,14 @@ def monte_carlo(
     }
     assert fields.keys() == STREAMS.keys()
     plan = make_plan(problem, strength, method, seed, fields, tuple(keep))
-    return run_plan(
-        plan, samples, first=first, workers=workers, executor=executor, progress=progress
+    check_run(samples, first, workers, executor)
+    check_size(wide_bytes(plan, samples, first), KEEP_LIMIT)
+    return run_plans(
+        [plan],
+        samples,
+        first=first,
+        attributes=plan_attributes(plan, samples, first),
+        workers=workers,
+        executor=executor,
+        progress=progress,
     )

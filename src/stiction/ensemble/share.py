@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from typing import Any, NamedTuple
@@ -97,7 +97,7 @@ def share_out(
     executor: Executor | None = None,
     workers: int = 1,
     seconds: float = 0.25,
-) -> Iterator[Outcome | None]:
+) -> Generator[Outcome | None, None, None]:
     """Compute spans of samples and yield outcomes as they are done.
 
     No more than two pieces a worker are under way at once, so that memory stays bounded whatever
