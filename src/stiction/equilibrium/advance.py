@@ -14,10 +14,12 @@ from stiction._jit import jit
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
 from stiction.equilibrium.jump import AT_FLOOR
 from stiction.equilibrium.program import PIVOT, singular_direction
+from stiction.equilibrium.spaces import MOST_MEMBERS
 from stiction.equilibrium.stiffness import apply_stiffness
 
 REACHED = 0
 UNSTABLE = 1
+CROWDED = 2
 
 
 @jit
@@ -57,7 +59,7 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
     Returns
     -------
     load, status : float, int
-        REACHED or UNSTABLE.
+        REACHED, UNSTABLE, or CROWDED: more members than there is room for.
     """
     n = slip.shape[0]
     right = room.vectors[0]
@@ -72,6 +74,8 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
     for _ in range(events):
         if rebuild:
             count = build(sample, grid, slip, residual, strength, room)
+            if count > MOST_MEMBERS:
+                return load, CROWDED
             size = append(
                 room.factor, 0, room.members, room.order, count, grid.column, room.diagonal, PIVOT
             )
@@ -117,6 +121,8 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
             slip[ends] = sample.critical[ends]
             rebuild = True
         elif starts >= 0:
+            if size == MOST_MEMBERS:
+                return load, CROWDED
             room.order[0] = starts
             now = append(
                 room.factor, size, room.members, room.order, 1, grid.column, room.diagonal, PIVOT
@@ -130,4 +136,4 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
             size = now
         else:
             return load, REACHED
-    return load, REACHED
+    return load, CROWDED

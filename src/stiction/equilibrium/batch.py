@@ -22,8 +22,11 @@ FLOOR_REACHED = 3
 
 
 @jit
-def certificate(sample, grid, load, slip, stiff, multiplier, room):
-    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa."""
+def certificate(sample, grid, slip, stiff, multiplier, product, room):
+    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
+
+    K y is left in `product`.
+    """
     n = slip.shape[0]
     lower = np.inf
     count = 0
@@ -35,7 +38,6 @@ def certificate(sample, grid, load, slip, stiff, multiplier, room):
             room.order[count] = i
             values[count] = multiplier[i]
             count += 1
-    product = room.vectors[2]
     apply_stiffness(grid.strip, grid.column[0], room.order, count, values, room.halves, product)
     above = 0.0
     below = 0.0
@@ -108,6 +110,7 @@ def solve_batch(
     slip = np.empty(n)
     stiff = np.empty(n)
     multiplier = np.empty(n)
+    product = np.empty(n)
     critical = np.empty(n)
     work = np.empty((6, n))
     wide_column = np.concatenate((grid.column, grid.column, grid.column))
@@ -130,7 +133,7 @@ def solve_batch(
         line[BOUND] = bound
         line[SIZE] = size
         line[PATCHES] = count_patches(slip)
-        line[GAP] = certificate(sample, grid, load, slip, stiff, multiplier, room)
+        line[GAP] = certificate(sample, grid, slip, stiff, multiplier, product, room)
         first, length, centre = main_patch(multiplier)
         line[POSITION] = centre * spacing
         line[LENGTH] = length * spacing
@@ -151,7 +154,7 @@ def solve_batch(
                 slip,
                 stiff,
                 multiplier,
-                room.vectors[2],  # left there by `certificate`
+                product,
                 escape,
                 block,
                 reach,

@@ -8,37 +8,41 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.advance import REACHED, advance
-from stiction.equilibrium.jump import ARRESTED, UNDECIDED, escape_run, jump
+from stiction.equilibrium.advance import CROWDED, REACHED, advance
+from stiction.equilibrium.jump import ARRESTED, AT_FLOOR, UNDECIDED, escape_run, jump
 from stiction.equilibrium.patches import main_patch
-from stiction.equilibrium.spaces import Grid, Room, Sample, make_room
+from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.spaces import Sample, make_room
 from stiction.errors import AccuracyWarning
 
 JUMP_STEPS = 4000
 MARGIN = 1.5
 """Safety on the length at which a rupture counts as unstoppable."""
+MOVED = 1e-3
+"""Share of the largest added slip from which a node belongs to the patch of an event."""
+OVERSHOOT = 2.0 - AT_FLOOR
 
 
 @dataclass
 class Event:
-    """An instability: where and at which load, and what slipped if it was arrested.
+    """An instability that came to rest.
 
     `load` is tau_0 (Pa); `position` and `length` (in nodes) belong to the patch that slipped, and
-    `mean_slip` (m) is the slip added to it; `moment` is the slip added anywhere, summed over nodes.
+    `mean_slip` (m) is the slip added to it; `total_slip` is the slip added, summed over all nodes.
     """
 
     load: float
     position: float
     length: float
     mean_slip: float
-    moment: float
+    total_slip: float
 
 
 @dataclass
 class State:
     """Where the path is: load, slip, K d, and whether it has ended in global sliding.
 
-    `direction` is the last unstable direction, `onset_slip` the slip just before it.
+    `direction` is that of the last instability, and `first` the state at the first one.
     """
 
     load: float
@@ -50,28 +54,29 @@ class State:
     first: State | None = None
 
 
-def start(sample: Sample) -> State:
+def residual_nodes(sample: Sample, slip: Array) -> Array:
+    """Which nodes have reached their floor, (n,) bool."""
+    reached: Array = slip >= AT_FLOOR * sample.critical
+    return reached
+
+
+def at_rest(sample: Sample) -> State:
     """The state in which the first node is about to slip."""
     n = sample.excess.shape[0]
     load = float((sample.excess / sample.profile).min())
     return State(load, np.zeros(n), np.zeros(n), np.zeros(n))
 
 
-def fall(sample: Sample, grid: Grid, state: State, cell: float, room: Room) -> None:
-    """Let the unstable state jump: to another equilibrium, recorded as an event, or to sliding.
-
-    Parameters
-    ----------
-    cell : float
-        Effective modulus over node spacing, Pa/m.
-    """
+def fall(setting: Setting, sample: Sample, state: State) -> None:
+    """Let the unstable state jump: to another equilibrium, recorded as an event, or to sliding."""
+    n = sample.excess.shape[0]
     before, stiff_before = state.slip.copy(), state.stiff.copy()
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
-    escape = MARGIN * escape_run(sample, state.load, 1.0, cell)
+    escape = MARGIN * escape_run(sample, state.load, setting.spacing, setting.modulus)
     fate = jump(
-        sample, grid, state.load, state.slip, state.stiff, state.direction.copy(), escape,
-        JUMP_STEPS, True, room,
+        sample, setting.grid, state.load, state.slip, state.stiff, state.direction.copy(), escape,
+        JUMP_STEPS, True, make_room(n),
     )  # fmt: skip
     if fate == UNDECIDED:
         warnings.warn(
@@ -85,25 +90,58 @@ def fall(sample: Sample, grid: Grid, state: State, cell: float, room: Room) -> N
         return
     added = state.slip - before
     # The whole interface yields a little; the patch is where slip grew by a fair share of the most.
-    moved = np.where(added > 1e-3 * added.max(), added, 0.0)
+    moved = np.where(added > MOVED * added.max(), added, 0.0)
     first, length, centre = main_patch(moved)
-    nodes = (first + np.arange(length)) % added.shape[0]
+    nodes = (first + np.arange(length)) % n
     state.events.append(
         Event(state.load, centre, length, float(added[nodes].mean()), float(added.sum()))
     )
 
 
-def follow(
-    sample: Sample, grid: Grid, state: State, cell: float, target: float = np.inf
-) -> State:
-    """Carry a state on to a load, or to global sliding."""
+def leap(setting: Setting, sample: Sample, state: State) -> bool:
+    """Go straight to the next instability if no other node reaches its floor before it."""
+    residual = residual_nodes(sample, state.slip)
+    strength = np.where(residual, sample.floor, sample.excess)
+    rate = np.where(residual, 0.0, sample.rate)
+    found = setting.programme(strength, rate)
+    if found is None or found.load < state.load:
+        return False
+    weak = ~residual
+    if np.any(found.slip[weak] > OVERSHOOT * sample.critical[weak]):
+        return False
+    state.load, state.slip, state.stiff = found.load, found.slip, found.stiff
+    state.direction = found.multiplier
+    return True
+
+
+def follow(setting: Setting, sample: Sample, state: State, target: float = np.inf) -> State:
+    """Carry a state on to a load, or to global sliding.
+
+    Parameters
+    ----------
+    setting : Setting
+    sample : Sample
+    state : State
+        A stable equilibrium, changed.
+    target : float
+        Load to stop at, Pa.
+    """
     n = sample.excess.shape[0]
-    room = make_room(n)
     while not state.sliding and state.load < target:
-        state.load, status = advance(
-            sample, grid, state.load, target, state.slip, state.stiff, state.direction, 20 * n, room
-        )
-        if status == REACHED:
-            break
-        fall(sample, grid, state, cell, room)
+        if not (target == np.inf and state.events and leap(setting, sample, state)):
+            state.load, status = advance(
+                sample, setting.grid, state.load, target, state.slip, state.stiff,
+                state.direction, 20 * n, make_room(n),
+            )  # fmt: skip
+            if status == CROWDED:
+                warnings.warn(
+                    "too many slipping nodes to follow event by event; the last load that was"
+                    " reached is returned as the critical one, a lower bound",
+                    AccuracyWarning,
+                    stacklevel=2,
+                )
+                state.sliding = True
+            if status == REACHED or state.sliding:
+                break
+        fall(setting, sample, state)
     return state

@@ -19,12 +19,15 @@ from stiction.equilibrium.program import (
     singular_direction,
     stress_tolerance,
 )
-from stiction.equilibrium.spaces import make_room
+from stiction.equilibrium.spaces import MOST_MEMBERS, make_room
 from stiction.equilibrium.stiffness import apply_stiffness
 
 SLIDING = 0
 ARRESTED = 1
 UNDECIDED = 2
+
+ALL = -1
+CROWDED = -2
 
 AT_FLOOR = 1.0 - 1e-12
 """Share of d_c from which a node counts as residual."""
@@ -96,7 +99,7 @@ def unsupported(sample, load, slip):
 def relax(sample, grid, load, slip, stiff, room, size, tolerance):
     """One elastic step with frozen strengths, then the nodes it overstresses join.
 
-    Returns the members now, and -1 if they are all nodes, which nothing holds.
+    Returns as `join` does.
     """
     right = room.vectors[0]
     solution = room.vectors[1]
@@ -120,15 +123,20 @@ def relax(sample, grid, load, slip, stiff, room, size, tolerance):
 
 @jit
 def join(sample, grid, load, stiff, room, size, tolerance):
-    """Append the overstressed nodes to the elastic factor; -1 if nothing remains at rest."""
+    """Append the overstressed nodes to the elastic factor.
+
+    Returns the members now, ALL if nothing remains at rest, CROWDED if there is no room for them.
+    """
     count = overstressed(load, sample.excess, sample.profile, stiff, room, tolerance)
     if count == 0:
         return size
+    if size + count > MOST_MEMBERS:
+        return CROWDED
     now = append(
         room.factor, size, room.members, room.order, count, grid.column, room.diagonal, PIVOT
     )
     if now < size + count:
-        return -1
+        return ALL
     for t in range(size, now):
         room.inside[room.members[t]] = True
     return now
@@ -218,6 +226,8 @@ def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room)
         if room.inside[i]:
             room.order[count] = i
             count += 1
+    if count > MOST_MEMBERS:
+        return UNDECIDED
     size = append(
         room.factor, 0, room.members, room.order, count, grid.column, room.diagonal, PIVOT
     )
@@ -228,7 +238,9 @@ def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room)
         other = make_room(n)
     for k in range(steps):
         size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
-        if size < 0 or unsupported(sample, load, slip):
+        if size == CROWDED:
+            return UNDECIDED
+        if size == ALL or unsupported(sample, load, slip):
             return SLIDING
         if longest_floor_run(sample, slip) >= escape:
             return SLIDING
@@ -239,7 +251,7 @@ def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room)
             before = size
             size = join(sample, grid, load, stiff, room, size, tolerance)
             if size < 0:
-                return SLIDING
+                return UNDECIDED if size == CROWDED else SLIDING
             if status == ARRESTED and size == before:
                 return ARRESTED
     return UNDECIDED

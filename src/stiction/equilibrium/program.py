@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from stiction._jit import jit
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
+from stiction.equilibrium.spaces import MOST_MEMBERS
 from stiction.equilibrium.stiffness import apply_stiffness
 
 SOLVED = 0
 STALLED = 1
+OVERFULL = 2
 
 PIVOT = 1e-13
 """Share of the diagonal below which a pivot is round-off."""
@@ -138,6 +140,7 @@ def solve_program(excess, profile, grid, bound, cap, multiplier, slip, stiff, ro
     Returns
     -------
     load, size, cuts, status : float, int, int, int
+        SOLVED, STALLED after too many passes, or OVERFULL: more members than there is room for.
     """
     load = min(bound, cap)
     tolerance = stress_tolerance(excess, profile, load)
@@ -154,6 +157,9 @@ def solve_program(excess, profile, grid, bound, cap, multiplier, slip, stiff, ro
         count = overstressed(load, excess, profile, stiff, room, tolerance)
         if count == 0:
             status = SOLVED
+            break
+        if size + count > MOST_MEMBERS:
+            status = OVERFULL
             break
         before = size
         size = append(

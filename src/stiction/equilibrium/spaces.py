@@ -52,11 +52,16 @@ class Room(NamedTuple):
     halves: Array
 
 
+MOST_MEMBERS = 8192
+"""Slipping nodes for which a dense factor has room (268 MB if all of it is used)."""
+
+
 @jit
 def make_room(n):
     """Room for samples of n nodes. Pages of the factor that are never used cost no memory."""
+    capacity = min(n, MOST_MEMBERS)
     return Room(
-        np.empty(row_start(n + 4)),
+        np.empty(row_start(capacity + 4)),
         np.empty(n + 4, np.int64),
         np.empty(n, np.int64),
         np.empty(n, np.bool_),

@@ -1,0 +1,212 @@
+"""The solver of the equilibrium method: rows in, onset out."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._typing import Array
+from stiction.equilibrium import batch
+from stiction.equilibrium.batch import solve_batch
+from stiction.equilibrium.follow import (
+    OVERSHOOT,
+    State,
+    at_rest,
+    fall,
+    follow,
+    residual_nodes,
+)
+from stiction.equilibrium.jump import SLIDING, escape_run
+from stiction.equilibrium.large import Solution
+from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.runaway import runs_away
+from stiction.equilibrium.setting import LARGE_GRID, Setting
+from stiction.equilibrium.spaces import Sample
+from stiction.errors import AccuracyWarning, InputError
+from stiction.problem import Problem
+from stiction.rows import Rows
+
+WORST_GAP = 1e-9
+"""Certificate gap, as a share of the load, from which on there is a warning."""
+
+
+def sample_of(rows: Rows, row: int) -> Sample:
+    """One row as the kernels take it."""
+    initial = rows.initial_stress[row]
+    excess = np.ascontiguousarray(rows.strength[row] - initial)
+    floor = np.ascontiguousarray(rows.residual_strength[row] - initial)
+    rate = np.array(rows.weakening_rate[row])
+    return Sample(excess, floor, np.array(rows.load_profile), rate, (excess - floor) / rate)
+
+
+def refuse_overstressed(rows: Rows) -> None:
+    """Refuse profiles that slip before any load is applied, naming sample and node."""
+    margin = rows.strength - rows.initial_stress
+    if margin.min() <= 0.0:
+        sample, node = np.unravel_index(int(np.argmin(margin)), margin.shape)
+        raise InputError(
+            "initial_stress: must be below tau_p everywhere, or the interface slips before it is"
+            f" loaded; sample {sample}, node {node}: initial stress"
+            f" {rows.initial_stress[sample, node]:g} against {rows.strength[sample, node]:g} Pa"
+        )
+
+
+class Solver:
+    """Solves rows of a problem; safe to call from several threads.
+
+    Parameters
+    ----------
+    problem : Problem
+    sensitivity, slip : bool
+        Whether to return these as well.
+    """
+
+    def __init__(self, problem: Problem, sensitivity: bool = False, slip: bool = False) -> None:
+        self.setting = Setting(problem)
+        self.sensitivity = sensitivity
+        self.slip = slip
+
+    def __call__(self, rows: Rows) -> dict[str, NDArray[Any]]:
+        """The onset of each row; see `Equilibrium` for what comes back."""
+        refuse_overstressed(rows)
+        count, nodes = rows.count, rows.nodes
+        table = np.empty((count, batch.COLUMNS))
+        multipliers = np.empty((count, nodes))
+        slips = np.empty((count if self.slip else 0, nodes))
+        if nodes < LARGE_GRID:
+            self._batch(rows, table, slips, multipliers)
+        else:
+            for row in range(count):
+                self._one(rows, row, table, slips, multipliers)
+        self._check(table)
+        load = table[:, batch.LOAD].copy()
+        first = load.copy()
+        fate = table[:, batch.FATE].astype(np.int64)
+        events = np.zeros(count, dtype=np.int64)
+        residual = np.zeros(count, dtype=np.bool_)
+        sliding_at = table[:, batch.POSITION].copy()
+        for row in np.flatnonzero(fate != SLIDING):
+            sample = sample_of(rows, row)
+            state = self.follow_row(sample, bool(fate[row] == batch.FLOOR_REACHED))
+            load[row] = state.load
+            events[row] = len(state.events)
+            residual[row] = bool(residual_nodes(sample, state.slip).any())
+            if state.direction.any():
+                sliding_at[row] = main_patch(state.direction)[2] * rows.spacing
+            if fate[row] == batch.FLOOR_REACHED and state.first is not None:
+                self._rewrite(sample, state.first, table[row], multipliers[row])
+                first[row] = state.first.load
+                if self.slip:
+                    slips[row] = state.first.slip
+        mean_profile = rows.load_profile.mean()
+        values: dict[str, NDArray[Any]] = {
+            "critical_load": load,
+            "critical_stress": rows.mean_stress(load),
+            "first_instability": rows.mean_stress(first),
+            "critical_position": table[:, batch.POSITION].copy(),
+            "certificate_gap": table[:, batch.GAP] * mean_profile,
+            "slip_patches": table[:, batch.PATCHES].astype(np.int64),
+            "critical_patch_length": table[:, batch.LENGTH].copy(),
+            "arrested_events": events,
+            "residual_reached": residual,
+            "sliding_position": sliding_at,
+        }
+        if self.slip:
+            values["slip"] = slips
+        if self.sensitivity:
+            values["sensitivity"] = multipliers * mean_profile
+        return values
+
+    def follow_row(self, sample: Sample, from_rest: bool) -> State:
+        """Follow one sample to global sliding, from rest or from its first instability."""
+        if from_rest:
+            return follow(self.setting, sample, at_rest(sample))
+        solution = self.setting.programme(sample.excess, sample.rate)
+        if solution is None:
+            return follow(self.setting, sample, at_rest(sample))
+        state = State(solution.load, solution.slip, solution.stiff, solution.multiplier)
+        fall(self.setting, sample, state)
+        return follow(self.setting, sample, state)
+
+    def _batch(self, rows: Rows, table: Array, slips: Array, multipliers: Array) -> None:
+        """Solve the programme of all rows in one compiled loop."""
+        setting = self.setting
+        rate = np.ascontiguousarray(rows.weakening_rate)
+        unusual = rate[np.any(rate != setting.usual_rate, axis=1)]
+        solve_batch(
+            np.ascontiguousarray(rows.strength - rows.initial_stress),
+            np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
+            setting.profile, rate, setting.usual_rate, setting.grid, setting.usual,
+            setting.windows(unusual), setting.block, setting.reach, setting.spacing,
+            setting.modulus, table, slips, multipliers,
+        )  # fmt: skip
+
+    def _one(
+        self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array
+    ) -> None:
+        """Solve the programme of one row on a large grid, and test quickly for arrest."""
+        setting = self.setting
+        sample = sample_of(rows, row)
+        line = table[row]
+        solution = setting.programme(sample.excess, sample.rate)
+        if solution is None:  # followed event by event instead
+            line[:] = 0.0
+            line[batch.FATE] = batch.FLOOR_REACHED
+            return
+        multipliers[row] = solution.multiplier
+        if self.slip:
+            slips[row] = solution.slip
+        line[batch.LOAD] = solution.load
+        line[batch.STATUS] = solution.status
+        line[batch.CUTS] = solution.cuts
+        line[batch.PATCHES] = count_patches(solution.slip)
+        stiff_multiplier = np.empty(setting.nodes)
+        line[batch.GAP] = setting.gap(
+            sample.excess, sample.rate, solution, stiff_multiplier
+        )
+        _, length, centre = main_patch(solution.multiplier)
+        line[batch.POSITION] = centre * setting.spacing
+        line[batch.LENGTH] = length * setting.spacing
+        if np.any(solution.slip > OVERSHOOT * sample.critical):
+            line[batch.FATE] = batch.FLOOR_REACHED
+            return
+        line[batch.FATE] = runs_away(
+            sample, np.tile(setting.grid.column, 3), solution.load, solution.slip.copy(),
+            solution.stiff.copy(), solution.multiplier, stiff_multiplier,
+            escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
+            setting.reach, np.empty((6, setting.nodes)),
+        )  # fmt: skip
+
+    def _rewrite(
+        self, sample: Sample, state: State, line: Array, multiplier: Array
+    ) -> None:
+        """Replace what the programme said by what the path to the first instability says."""
+        residual = residual_nodes(sample, state.slip)
+        multiplier[:] = state.direction / max(state.direction @ sample.profile, 1e-300)
+        line[batch.GAP] = self.setting.gap(
+            np.where(residual, sample.floor, sample.excess),
+            np.where(residual, 0.0, sample.rate),
+            Solution(state.load, state.slip, state.stiff, multiplier),
+            np.empty(self.setting.nodes),
+        )
+        line[batch.PATCHES] = count_patches(state.slip)
+        _, length, centre = main_patch(multiplier)
+        line[batch.POSITION] = centre * self.setting.spacing
+        line[batch.LENGTH] = length * self.setting.spacing
+        multiplier[residual] = 0.0  # the strength there is tau_r, whatever tau_p
+
+    @staticmethod
+    def _check(table: Array) -> None:
+        """Warn where the bounds did not close."""
+        open_ = table[:, batch.GAP] > WORST_GAP * np.abs(table[:, batch.LOAD])
+        open_ &= table[:, batch.FATE] != batch.FLOOR_REACHED
+        if open_.any():
+            warnings.warn(
+                f"the bounds of the first instability did not close in {int(open_.sum())} of"
+                f" {table.shape[0]} samples; the largest gap is {table[:, batch.GAP].max():.3g} Pa",
+                AccuracyWarning,
+                stacklevel=3,
+            )
