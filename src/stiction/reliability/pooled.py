@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
-
-from stiction.reliability.subset import Descent
+from typing import Generic, Protocol, TypeVar
 
 MARGIN = 1.1
 """The variance known so far is itself an estimate; aim a little further."""
@@ -29,7 +27,22 @@ class Run(Protocol):
         """Whether it came to an estimate."""
 
 
+class TailRun(Run, Protocol):
+    """A run that estimates a whole stretch of the lower tail."""
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lowest and highest stress seen, Pa."""
+
+    def probability(self, value: float) -> float:
+        """Estimate of P(onset < value)."""
+
+    def relative_variance(self, value: float) -> float:
+        """Squared coefficient of variation of it."""
+
+
 AnyRun = TypeVar("AnyRun", bound=Run)
+AnyTailRun = TypeVar("AnyTailRun", bound=TailRun)
 
 
 def weights(runs: Sequence[Run]) -> list[float]:
@@ -86,15 +99,15 @@ def run_until_precise(
 
 
 @dataclass(frozen=True, eq=False)
-class Tail:
-    """The lower tail of the stress at onset from pooled subset runs.
+class Tail(Generic[AnyTailRun]):
+    """The lower tail of the stress at onset from pooled runs.
 
     Attributes
     ----------
-    runs : tuple of Descent
+    runs : sequence of runs
     """
 
-    runs: tuple[Descent, ...]
+    runs: Sequence[AnyTailRun]
 
     def probability(self, stress: float) -> float:
         """Estimate of P(onset below `stress`)."""
@@ -115,8 +128,8 @@ class Tail:
 
     def quantile(self, probability: float) -> float:
         """Stress below which the onset lies with this probability."""
-        low = min(float(run.populations[-1].values.min()) for run in self.runs)
-        high = max(float(run.populations[0].values.max()) for run in self.runs)
+        low = min(run.extent[0] for run in self.runs)
+        high = max(run.extent[1] for run in self.runs)
         for _ in range(80):
             middle = 0.5 * (low + high)
             if self.probability(middle) < probability:

@@ -104,7 +104,7 @@ def by_counting(request: Request, reason: str, seen: Count | None) -> FailurePro
     )
 
 
-def subset_diagnostics(tail: Tail, stress: float) -> dict[str, float]:
+def subset_diagnostics(tail: Tail[Descent], stress: float) -> dict[str, float]:
     """How well the chains moved, and other estimates of the same error to compare with."""
     runs = tail.runs
     chain_based = sum(
@@ -135,7 +135,7 @@ def subset_diagnostics(tail: Tail, stress: float) -> dict[str, float]:
     return found
 
 
-def subset_doubts(tail: Tail, diagnostics: dict[str, float]) -> list[str]:
+def subset_doubts(tail: Tail[Descent], diagnostics: dict[str, float]) -> list[str]:
     """Why not to trust subset runs."""
     texts = []
     if diagnostics["effective_families"] < FEWEST_FAMILIES:
@@ -162,7 +162,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         )
 
     def judge(runs: Sequence[Descent]) -> float:
-        return Tail(tuple(runs)).coefficient_of_variation(stress)
+        return Tail(runs).coefficient_of_variation(stress)
 
     runs = run_until_precise(
         make,
@@ -172,7 +172,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         largest=SUBSET_MOST,
         max_evaluations=request.budget,
     )
-    tail = Tail(tuple(runs))
+    tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
     diagnostics = subset_diagnostics(tail, stress)
     interval = lognormal_interval(probability, cov, request.confidence)
@@ -226,27 +226,19 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
             max_evaluations=left,
         )
 
-    def pooled(runs: Sequence[Bridge]) -> tuple[float, float]:
-        parts = list(zip(weights(runs), runs, strict=True))
-        whole = sum(weight * run.probability for weight, run in parts)
-        if whole == 0.0:
-            return 0.0, math.inf
-        squares = (
-            (weight * run.probability) ** 2 * run.relative_variance
-            for weight, run in parts
-            if run.probability > 0.0
-        )
-        return whole, math.sqrt(sum(squares)) / whole
+    def judge(runs: Sequence[Bridge]) -> float:
+        return Tail(runs).coefficient_of_variation(stress)
 
     runs = run_until_precise(
         make,
-        lambda runs: pooled(runs)[1],
+        judge,
         target_cov=request.target_cov,
         first=BRIDGE,
         largest=BRIDGE_MOST,
         max_evaluations=request.budget,
     )
-    probability, cov = pooled(runs)
+    tail = Tail(runs)
+    probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
     doubts = _missed(request, cov)
     interval = lognormal_interval(probability, cov, request.confidence)
     if probability == 0.0:
@@ -266,13 +258,13 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
     largest = max(runs, key=lambda run: run.samples)
     diagnostics = {
         "runs": len(runs),
-        "middle_factor": largest.middle,
+        "middle_factor": float(np.mean(largest.values < stress)),
         "last_factor": last,
         "ceiling": largest.ceiling,
         "walk_acceptance": min(run.acceptance for run in runs),
         "effective_families": 1.0 / cov**2 if cov > 0.0 else math.inf,
     }
-    chosen = distinct(largest.values, SHOWN, generator(request.seed, 2))
+    chosen = distinct(largest.failing_values, SHOWN, generator(request.seed, 2))
     return FailureProbability(
         probability=probability,
         coefficient_of_variation=cov,
@@ -285,7 +277,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         reason=reason,
         confidence=request.confidence,
         levels=largest.descent.levels,
-        failing_profiles=profiles_of(state, largest.draws[chosen]),
+        failing_profiles=profiles_of(state, largest.failing[chosen]),
         diagnostics=diagnostics,
         warnings=say(doubts),
     )

@@ -103,6 +103,11 @@ class Descent:
     evaluations: int
     complete: bool
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lowest and highest value seen."""
+        return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
+
     def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
         holder = self.populations[0]
         for population in self.populations[1:]:

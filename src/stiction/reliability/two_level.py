@@ -31,7 +31,10 @@ CHEAP = 5
 COVERED = 0.8
 """Smallest last factor: below it the walk must first find what the cheap stress does not see."""
 STEPS = 6
-"""Exact steps of each walk in the failure set; the first third is forgotten."""
+FORGOTTEN = 2
+"""Exact steps of each walk in the failure set, and how many of them are forgotten."""
+ROOM = 2.5
+"""The cheap level should be this many times likelier than the probability asked for, or more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +45,20 @@ class Bridge:
     ----------
     samples : int
         Exact evaluations meant for the middle factor.
-    probability : float
-        Estimate of P(E < s).
-    relative_variance : float
-    evaluations : int
-        Of the exact limit state.
-    first_stage_evaluations : int
-        Of the cheap one.
+    log_probability : float
+        Logarithm of the estimate of P(L < b).
+    values, ancestors : (samples,) arrays
+        Exact stress of samples with L < b, and the first cheap samples they descend from.
+    last, wobble : float
+        P(L < b | E < s), and the squared coefficient of variation of its estimate.
+    evaluations, first_stage_evaluations : int
+        Of the exact limit state and of the cheap one.
     ceiling : float
         b, Pa.
-    middle, last : float
-        P(E < s | L < b) and P(L < b | E < s).
     descent : Descent
         Of the cheap limit state.
-    draws, values : arrays
-        Failing samples, by the exact limit state.
+    failing, failing_values : arrays
+        Draws and exact stress of failing samples.
     acceptance : float
         Share of steps accepted by the walks in the failure set.
     complete : bool
@@ -64,24 +66,55 @@ class Bridge:
     """
 
     samples: int
-    probability: float
-    relative_variance: float
+    log_probability: float
+    values: Array
+    ancestors: NDArray[np.int64]
+    last: float
+    wobble: float
     evaluations: int
     first_stage_evaluations: int
     ceiling: float
-    middle: float
-    last: float
     descent: Descent
-    draws: Array
-    values: Array
+    failing: Array
+    failing_values: Array
     acceptance: float
     complete: bool
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lowest and highest stress seen."""
+        return float(self.values.min()), float(self.values.max())
 
-def _few(population: Population, samples: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """A random part of a population, for the exact limit state to look at."""
-    size = population.values.size
-    return rng.permutation(size)[: min(samples, size)]
+    def probability(self, value: float) -> float:
+        """Estimate of P(E < value), for values near the threshold of the run."""
+        share = float(np.mean(self.values < value)) if self.values.size else 0.0
+        return math.exp(self.log_probability) * share / self.last
+
+    def relative_variance(self, value: float) -> float:
+        """Squared coefficient of variation of `probability(value)`."""
+        family = self.ancestors[self.values < value]
+        return ancestral_variance(family, self.values.size) + self.wobble
+
+
+def _threshold(population: Population, values: Array, probability: float) -> float:
+    """Where the exact tail has this probability, as far as this population tells."""
+    share = probability / math.exp(population.log_probability)
+    return float(np.quantile(values, share)) if share < 1.0 else -math.inf
+
+
+def _covered(
+    states: Array, cheap: Function, ceiling: float, families: NDArray[np.int64], samples: int
+) -> tuple[float, float]:
+    """P(L < b | E < s) from walkers in the failure set, and its relative variance.
+
+    Walkers of one ancestor are alike: each family is one observation.
+    """
+    walkers = families.size
+    covered = (cheap(states) <= ceiling).reshape(-1, walkers)
+    last = max(float(covered.mean()), 1.0 / samples)
+    _, group = np.unique(families, return_inverse=True)
+    sums = np.bincount(group, weights=covered.mean(axis=0) - last)
+    return last, float(np.sum(sums * sums)) / (walkers * last) ** 2
 
 
 def bridge(
@@ -89,80 +122,84 @@ def bridge(
     exact: Function,
     dimension: int,
     *,
-    threshold: float,
     samples: int,
     rng: np.random.Generator,
     max_evaluations: int,
+    threshold: float | None = None,
+    probability: float = 0.0,
 ) -> Bridge:
-    """Estimate P(exact < threshold) with a cheap limit state that resembles the exact one.
+    """The exact lower tail near a threshold, or near a probability if no threshold is given.
 
     Parameters
     ----------
     cheap, exact : callable
         From draws (k, dimension) to values (k,).
     dimension : int
-    threshold : float
     samples : int
         Exact evaluations for the middle factor; as many again walk in the failure set.
     rng : numpy Generator
     max_evaluations : int
         Of the exact limit state.
+    threshold : float, optional
+    probability : float
     """
-    just_below = float(np.nextafter(threshold, -math.inf))
-    descent = descend(cheap, dimension, rng=rng, samples=CHEAP * samples, threshold=threshold)
+    descent = descend(
+        cheap,
+        dimension,
+        rng=rng,
+        samples=CHEAP * samples,
+        threshold=-math.inf if threshold is None else threshold,
+        probability=ROOM * probability,
+    )
     first_stage, spent = descent.evaluations, 0
     best: Bridge | None = None
     for population in reversed(descent.populations):
         if population.draws.shape[0] == 0 or spent + samples > max_evaluations:
             break
-        looked = _few(population, samples, rng)
-        draws, values = population.draws[looked], exact(population.draws[looked])
+        looked = rng.permutation(population.values.size)[:samples]
+        draws, families = population.draws[looked], population.ancestors[looked]
+        values = exact(draws)
         spent += looked.size
-        failed = values < threshold
+        limit = _threshold(population, values, probability) if threshold is None else threshold
+        failed = values < limit
         if not failed.any():
             continue
-        middle = float(failed.mean())
-        variance = ancestral_variance(population.ancestors[looked[failed]], looked.size)
         last, wobble, acceptance = 1.0, 0.0, 1.0
-        kept_draws, kept = draws[failed], values[failed]
+        kept, kept_values = draws[failed], values[failed]
         if math.isfinite(population.ceiling):
-            walkers = min(kept.size, max(8, samples // STEPS), (max_evaluations - spent) // STEPS)
+            room = (max_evaluations - spent) // STEPS
+            walkers = min(kept_values.size, max(8, samples // STEPS), room)
             if walkers < 2:
                 break
             states, found, acceptance, _ = conditional_chains(
                 exact,
-                kept_draws[:walkers],
                 kept[:walkers],
-                just_below,
+                kept_values[:walkers],
+                float(np.nextafter(limit, -math.inf)),
                 STEPS,
                 descent.levels[-1].step,
                 rng,
             )
             spent += states.shape[0]
-            later = slice(walkers * (STEPS // 3), None)
-            covered = (cheap(states[later]) <= population.ceiling).reshape(-1, walkers)
-            first_stage += covered.size
-            last = float(covered.mean())
-            shares = covered.mean(axis=0)
-            # Walkers of one ancestor are alike; take each family as one observation.
-            families = population.ancestors[looked[failed]][:walkers]
-            _, group = np.unique(families, return_inverse=True)
-            sums = np.bincount(group, weights=shares - last)
-            wobble = float(np.sum(sums * sums)) / walkers**2 / max(last, 1e-300) ** 2
-            kept_draws, kept = states[-walkers:], found[-walkers:]
-        probability = math.exp(population.log_probability) * middle / max(last, 1.0 / samples)
+            later = states[walkers * FORGOTTEN :]
+            last, wobble = _covered(
+                later, cheap, population.ceiling, families[failed][:walkers], samples
+            )
+            first_stage += later.shape[0]
+            kept, kept_values = states[-walkers:], found[-walkers:]
         best = Bridge(
             samples,
-            probability,
-            variance + wobble,
+            population.log_probability,
+            values,
+            families,
+            last,
+            wobble,
             spent,
             first_stage,
             population.ceiling,
-            middle,
-            last,
             descent,
-            kept_draws,
             kept,
+            kept_values,
             acceptance,
             True,
         )
@@ -170,19 +207,20 @@ def bridge(
             break
     if best is not None:
         return best
-    empty = np.empty((0, dimension))
+    nothing = np.zeros(0, dtype=np.int64)
     return Bridge(
         samples,
+        -math.inf,
+        np.zeros(0),
+        nothing,
+        1.0,
         0.0,
-        math.inf,
         spent,
         first_stage,
         -math.inf,
-        0.0,
-        0.0,
         descent,
-        empty,
-        np.empty(0),
+        np.empty((0, dimension)),
+        np.zeros(0),
         0.0,
         False,
     )
