@@ -13,6 +13,7 @@ from stiction.equilibrium import batch
 from stiction.equilibrium.batch import solve_batch
 from stiction.equilibrium.follow import (
     OVERSHOOT,
+    Event,
     State,
     at_rest,
     fall,
@@ -71,6 +72,10 @@ class Solver:
 
     def __call__(self, rows: Rows) -> dict[str, NDArray[Any]]:
         """The onset of each row; see `Equilibrium` for what comes back."""
+        return self.solve(rows)[0]
+
+    def solve(self, rows: Rows) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
+        """The onset of each row, and the arrested events of the rows that have any."""
         refuse_overstressed(rows)
         count, nodes = rows.count, rows.nodes
         table = np.empty((count, batch.COLUMNS))
@@ -85,14 +90,15 @@ class Solver:
         load = table[:, batch.LOAD].copy()
         first = load.copy()
         fate = table[:, batch.FATE].astype(np.int64)
-        events = np.zeros(count, dtype=np.int64)
+        events: dict[int, list[Event]] = {}
         residual = np.zeros(count, dtype=np.bool_)
         sliding_at = table[:, batch.POSITION].copy()
         for row in np.flatnonzero(fate != SLIDING):
             sample = sample_of(rows, row)
             state = self.follow_row(sample, bool(fate[row] == batch.FLOOR_REACHED))
             load[row] = state.load
-            events[row] = len(state.events)
+            if state.events:
+                events[int(row)] = state.events
             residual[row] = bool(residual_nodes(sample, state.slip).any())
             if state.direction.any():
                 sliding_at[row] = main_patch(state.direction)[2] * rows.spacing
@@ -110,7 +116,7 @@ class Solver:
             "certificate_gap": table[:, batch.GAP] * mean_profile,
             "slip_patches": table[:, batch.PATCHES].astype(np.int64),
             "critical_patch_length": table[:, batch.LENGTH].copy(),
-            "arrested_events": events,
+            "arrested_events": np.array([len(events.get(row, ())) for row in range(count)]),
             "residual_reached": residual,
             "sliding_position": sliding_at,
         }
@@ -118,7 +124,7 @@ class Solver:
             values["slip"] = slips
         if self.sensitivity:
             values["sensitivity"] = multipliers * mean_profile
-        return values
+        return values, events
 
     def follow_row(self, sample: Sample, from_rest: bool) -> State:
         """Follow one sample to global sliding, from rest or from its first instability."""

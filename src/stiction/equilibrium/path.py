@@ -1,0 +1,148 @@
+"""The path itself: slip and stress at given loads, up to the onset of global sliding."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction._model import to_plain
+from stiction._typing import Array
+from stiction.equilibrium.follow import State, at_rest, follow, residual_nodes
+from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.solver import refuse_overstressed, sample_of
+from stiction.equilibrium.spaces import Sample
+from stiction.errors import InputError
+from stiction.problem import Problem
+from stiction.results import POSITION, Variable, to_dataset
+
+LOAD = Variable("Pa", "load factor tau_0", ("load",))
+VARIABLES = {
+    "slip": Variable("m", "slip", ("load", "x")),
+    "stress": Variable("Pa", "shear stress on the interface", ("load", "x")),
+    "mean_stress": Variable("Pa", "mean shear stress on the interface", ("load",)),
+    "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
+    "sliding": Variable("1", "whether the interface as a whole has let go", ("load",)),
+}
+
+
+class Path:
+    """Equilibria of one sample at rising loads.
+
+    Up to the first instability, and while no node is at its residual strength, each is the least
+    solution of one complementarity problem; beyond, the path is followed event by event.
+    """
+
+    def __init__(self, setting: Setting, sample: Sample) -> None:
+        self.setting, self.sample = setting, sample
+        self.state = at_rest(sample)
+        onset = setting.programme(sample.excess, sample.rate)
+        self.simple_to = -np.inf if onset is None else onset.load
+
+    def at(self, load: float) -> State:
+        """The state at a load not below the last one asked for."""
+        if load <= self.state.load:
+            return self.state
+        if load < self.simple_to:
+            found = self.setting.programme(self.sample.excess, self.sample.rate, load)
+            if found is not None and not residual_nodes(self.sample, found.slip).any():
+                self.state = State(load, found.slip, found.stiff, self.state.direction)
+                return self.state
+            self.simple_to = -np.inf
+        follow(self.setting, self.sample, self.state, load)
+        return self.state
+
+
+def _check_loads(loads: Any) -> Array:
+    try:
+        given = np.atleast_1d(np.asarray(loads, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(
+            f"loads: must be an array of numbers (Pa), got {type(loads).__name__}"
+        ) from None
+    if given.ndim != 1 or given.size == 0 or not np.all(np.isfinite(given)):
+        raise InputError(
+            f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
+        )
+    if np.any(np.diff(given) <= 0.0):
+        worst = int(np.argmin(np.diff(given)))
+        raise InputError(
+            f"loads: must rise; entries {worst} and {worst + 1} are {given[worst]:g} and"
+            f" {given[worst + 1]:g} Pa"
+        )
+    if given[0] < 0.0:
+        raise InputError(f"loads: must not be negative, got {given[0]:g} Pa")
+    return given
+
+
+def equilibrium_path(
+    problem: Problem,
+    tau_p: Any,
+    loads: Any,
+    *,
+    residual_strength: Any = None,
+    initial_stress: Any = None,
+    weakening_rate: Any = None,
+) -> xr.Dataset:
+    """Slip and stress of one interface at rising loads: patches grow, merge and become unstable.
+
+    Parameters
+    ----------
+    problem : Problem
+    tau_p : (nodes,) array
+        Peak strength of one sample, Pa.
+    loads : (loads,) array
+        Load factors tau_0, rising, Pa.
+    residual_strength, initial_stress, weakening_rate : array, optional
+        As in `onset`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ('load', 'x'): `slip` (m) and `stress` (Pa); over 'load': `mean_stress` (Pa),
+        `arrested_events` so far, and `sliding`. From the onset of global sliding on slip and
+        stress are NaN and `sliding` is true.
+
+    Raises
+    ------
+    InputError
+        If there is more than one profile or the loads do not rise, and as `onset` does.
+    """
+    given = _check_loads(loads)
+    rows = problem.rows(
+        tau_p,
+        residual_strength=residual_strength,
+        initial_stress=initial_stress,
+        weakening_rate=weakening_rate,
+    )
+    if rows.count != 1:
+        raise InputError(f"tau_p: must be one profile of shape (nodes,), got {rows.count} samples")
+    refuse_overstressed(rows)
+    setting = Setting(problem)
+    sample = sample_of(rows, 0)
+    path = Path(setting, sample)
+    initial = rows.initial_stress[0]
+    slip = np.full((given.size, rows.nodes), np.nan)
+    stress = np.full((given.size, rows.nodes), np.nan)
+    events = np.zeros(given.size, dtype=np.int64)
+    sliding = np.zeros(given.size, dtype=np.bool_)
+    for i, load in enumerate(given):
+        state = path.at(float(load))
+        events[i] = len(state.events)
+        sliding[i] = state.sliding
+        if not state.sliding:
+            slip[i] = state.slip
+            stress[i] = initial + load * setting.profile - state.stiff
+    values = {
+        "slip": slip,
+        "stress": stress,
+        "mean_stress": stress.mean(axis=1),
+        "arrested_events": events,
+        "sliding": sliding,
+    }
+    coordinates = {
+        "load": (given, LOAD),
+        "x": (problem.interface.x, POSITION),
+    }
+    return to_dataset(values, VARIABLES, coordinates, {"study": {"problem": to_plain(problem)}})
