@@ -6,12 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 # Public name -> module; on first use, so that the system does not cost the plotting library.
-_HOMES = {"problem": "setting", "strength": "setting"}
+_HOMES = {
+    "problem": "setting",
+    "strength": "setting",
+    "Setting": "setting",
+    "run": "pipeline",
+}
 
-__all__ = ["problem", "strength"]
+__all__ = ["Setting", "problem", "run", "strength"]
 
 if TYPE_CHECKING:
-    from stiction.paper.setting import problem, strength
+    from stiction.paper.pipeline import run
+    from stiction.paper.setting import Setting, problem, strength
 
 
 def __getattr__(name: str) -> Any:

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiction.paper.data import Data
+from stiction.paper.derived import variance_ratio
 from stiction.report.style import INK, PAGE, PALE, QUIET, color, new_figure, panel, series
 from stiction.report.tables import Table
-from stiction.statistics.estimates import Estimate, pooled_moments
 
 name = "variance"
 number = "7"
@@ -31,21 +31,12 @@ def caption(data: Data) -> str:
     )
 
 
-def measured(data: Data, ratio: float) -> Estimate:
-    """Var[tau_n]/Var[tau_p] from the Monte Carlo study."""
-    moments = data.at(ratio)["nucleation_moments"].values
-    _, deviation, _ = pooled_moments(moments)
-    own = data.setting.field(ratio).standard_deviation / data.setting.mean
-    value = (deviation.value / own) ** 2
-    return Estimate(value, 2.0 * value * deviation.error / deviation.value)
-
-
 def tables(data: Data) -> list[Table]:
     """Variance ratios by theory and by Monte Carlo; the whole curve."""
     theory = data["theory"]
     rows = []
     for i, ratio in enumerate(data.ratios):
-        found = measured(data, ratio)
+        found = variance_ratio(data, ratio)
         rows.append((ratio, float(theory["variance_ratio"].values[i]), found.value, found.error))
     curve = zip(
         theory["ratio"].values,
@@ -140,7 +131,7 @@ def _variance(axes: Axes, data: Data, largest: float) -> None:
     axes.plot(ratio[1:], periodic, color=INK, label="periodic interface")
     axes.plot(ratio, infinite, color=QUIET, linestyle=(0, (4, 1.5)), label="infinite interface")
     shown = [each for each in data.ratios if each <= largest]
-    found = [measured(data, each) for each in shown]
+    found = [variance_ratio(data, each) for each in shown]
     axes.errorbar(
         shown,
         [each.value for each in found],

@@ -15,8 +15,8 @@ from stiction.fields.random_field import RandomField
 from stiction.paper.setting import Setting
 from stiction.problem import Problem
 
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, samples done and samples in all."""
+def _unheard(count: int) -> None:
+    pass
 
 
 @dataclass
@@ -30,40 +30,26 @@ class Context:
         For each point of the main study; side studies take a quarter.
     seed : int
     workers : int, optional
-    progress : callable, optional
-        Gets (title, samples done, samples in all).
+    report : callable
+        Gets the number of samples just finished.
     warnings : dict of str to int
-        Accuracy warnings that came up, with how often; the report shows them.
+        Accuracy warnings that came up, with how often; the page shows them.
+    title : str
+        Of the study that is running.
     """
 
     setting: Setting
     samples: int
     seed: int
     workers: int | None = None
-    progress: Progress | None = None
+    report: Callable[[int], None] = _unheard
     warnings: dict[str, int] = field(default_factory=dict)
-    _title: str = ""
-    _done: int = 0
-    _total: int = 0
+    title: str = ""
 
     @property
     def fewer(self) -> int:
         """Samples of a side study."""
         return max(self.samples // 4, min(self.samples, 250))
-
-    def expect(self, total: int) -> None:
-        """Set the number of samples that progress counts up to."""
-        self._done, self._total = 0, total
-
-    def begin(self, title: str) -> None:
-        """Name what is being done."""
-        self._title = title
-        self._tell(0)
-
-    def _tell(self, count: int) -> None:
-        self._done += count
-        if self.progress is not None:
-            self.progress(self._title, self._done, max(self._total, self._done))
 
     def monte_carlo(
         self, problem: Problem, strength: RandomField, method: Any, samples: int
@@ -71,9 +57,9 @@ class Context:
         """An ensemble of this seed, its accuracy warnings kept for the report."""
         seen = 0
 
-        def report(done: int, total: int) -> None:
+        def tell(done: int, total: int) -> None:
             nonlocal seen
-            self._tell(done - seen)
+            self.report(done - seen)
             seen = done
 
         with warnings.catch_warnings(record=True) as caught:
@@ -85,11 +71,11 @@ class Context:
                 samples=samples,
                 seed=self.seed,
                 workers=self.workers,
-                progress=report,
+                progress=tell,
             )
         for warning in caught:
             if issubclass(warning.category, AccuracyWarning):
-                text = f"{self._title}: {warning.message}"
+                text = f"{self.title}: {warning.message}"
                 self.warnings[text] = self.warnings.get(text, 0) + 1
             else:
                 warnings.warn_explicit(

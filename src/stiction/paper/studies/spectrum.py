@@ -10,6 +10,7 @@ from scipy.stats import ks_2samp
 from stiction.criterion.method import LocalCriterion
 from stiction.paper.studies.context import Context
 from stiction.paper.studies.summary import stack, summarise
+from stiction.statistics.estimates import Estimate
 
 name = "spectrum"
 title = "Other spectral exponents at equal e-folding length"
@@ -41,8 +42,34 @@ def compute(context: Context) -> xr.Dataset:
             )
             stress = result["critical_stress"].values
             part = summarise(stress)
-            distance = ks_2samp(stress, reference.setdefault(ratio, stress)).statistic
-            part["distance"] = ((), float(distance))
+            usual = reference.setdefault(ratio, stress)
+            part["distance"] = ((), float(ks_2samp(stress, usual).statistic))
+            for key, change in _changes(stress, usual).items():
+                part[f"{key}_change"] = ((), change.value, {"units": "1"})
+                part[f"{key}_change_error"] = ((), change.error, {"units": "1"})
             by_ratio[ratio] = part
         by_exponent[exponent] = stack(by_ratio, "correlation_ratio", "xi_0/h_n")
     return stack(by_exponent, "exponent", "exponent of the spectrum").sortby("exponent")
+
+
+def _changes(stress: NDArray[np.float64], usual: NDArray[np.float64]) -> dict[str, Estimate]:
+    """Relative changes of mean and standard deviation between samples of the same draws.
+
+    The draws are shared, so most of the sampling error cancels; the errors come from the
+    difference of the influence functions.
+    """
+
+    def influence(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0.5 * ((values - values.mean()) ** 2 / values.var() - 1.0)
+
+    def error(differences: NDArray[np.float64]) -> float:
+        return float(differences.std(ddof=1) / np.sqrt(differences.size))
+
+    shift = stress / usual.mean() - usual / usual.mean()
+    widening = float(stress.std() / usual.std())
+    return {
+        "mean": Estimate(float(shift.mean()), error(shift)),
+        "deviation": Estimate(
+            widening - 1.0, widening * error(influence(stress) - influence(usual))
+        ),
+    }

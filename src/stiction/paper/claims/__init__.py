@@ -1,0 +1,39 @@
+"""The paper's statements, each with a rule that judges it by what was computed.
+
+A claim is a function from data to `Finding` under the decorator `claim`, which says where the
+paper makes it and what it says, in our own words. To add one, write the function in the module of
+its subject; to add a subject, write the module and import it here.
+"""
+
+from __future__ import annotations
+
+from stiction.paper.claims import (  # importing them registers their claims
+    nucleation,
+    onset,
+    parameters,
+    rupture,
+)
+from stiction.paper.claims.claim import CLAIMS, Claim, Finding, Quantity, Verdict, claim, judged
+
+SUBJECTS = {
+    "parameters": "Parameters and theory",
+    "nucleation": "Nucleation stress",
+    "onset": "Critical stress and position of onset",
+    "rupture": "Run-away propagation",
+}
+"""Titles of the subjects, in the order in which they are shown."""
+
+__all__ = [
+    "SUBJECTS",
+    "CLAIMS",
+    "Claim",
+    "Finding",
+    "Quantity",
+    "Verdict",
+    "claim",
+    "judged",
+    "nucleation",
+    "onset",
+    "parameters",
+    "rupture",
+]

@@ -1,0 +1,195 @@
+"""What stands on the report page: summary, key numbers, claims, parameters, provenance."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from stiction import __version__
+from stiction.paper.claims import SUBJECTS, Claim, Finding, Verdict
+from stiction.paper.claims.claim import rounded
+from stiction.paper.claims.rules import kilopascal, megapascal
+from stiction.paper.data import Data
+from stiction.report.page import ShownClaim, ShownFigure, render
+from stiction.report.tables import Table
+from stiction.statistics.estimates import mean, standard_deviation
+from stiction.statistics.quantiles import quantiles
+
+TITLE = "Stochastic properties of static friction, recomputed"
+SOURCE = (
+    "Albertini, Karrer, Grigoriu and Kammer (2020) asked how the strength of an interface varies"
+    " when its local strength is random. This page computes their study again and holds their"
+    " statements against the results."
+)
+_PACKAGES = ("numpy", "scipy", "numba", "rocket-fft", "xarray", "netCDF4", "pydantic", "matplotlib")
+Judged = Sequence[tuple[Claim, Finding]]
+
+
+def assemble(
+    data: Data,
+    figures: Sequence[ShownFigure],
+    findings: Judged,
+    warnings: Mapping[str, int],
+    seconds: float,
+) -> str:
+    """The page as HTML."""
+    return render(
+        title=TITLE,
+        lead=SOURCE,
+        headline=_tally(findings),
+        points=_points(data, findings),
+        key_table=_key_table(data) if "monte_carlo" in data.studies else None,
+        figures=figures,
+        claims=_claims(findings),
+        parameters=_parameters(data),
+        notes=[f"{text} ({count} times)" if count > 1 else text for text, count in warnings.items()],
+        provenance=_provenance(data, seconds),
+    )
+
+
+def claims_table(findings: Judged) -> Table:
+    """The claims as a file."""
+    return Table.of(
+        "claims",
+        "Claims",
+        ("claim", "where", "what it says", "printed", "computed", "verdict", "comment"),
+        (
+            (
+                claim.name,
+                claim.where,
+                claim.says,
+                claim.printed,
+                "; ".join(quantity.text for quantity in finding.computed),
+                str(finding.verdict),
+                finding.comment,
+            )
+            for claim, finding in findings
+        ),
+    )
+
+
+def _tally(findings: Judged) -> list[tuple[str, int]]:
+    counts = [
+        (str(verdict), sum(finding.verdict is verdict for _, finding in findings))
+        for verdict in Verdict
+    ]
+    return [(verdict, count) for verdict, count in counts if count]
+
+
+def _points(data: Data, findings: Judged) -> list[str]:
+    points = []
+    if findings:
+        points.append(
+            f"{len(findings)} statements of the paper were judged by {data.samples:,} samples at"
+            f" each of {len(data.ratios)} correlation lengths (seed {data.seed})."
+        )
+    wrong = [(claim, finding) for claim, finding in findings if finding.verdict is Verdict.FAILS]
+    partly = [
+        (claim, finding) for claim, finding in findings if finding.verdict is Verdict.CORRECTED
+    ]
+    for word, group in (("Does not hold", wrong), ("Holds with a correction", partly)):
+        for claim, finding in group:
+            comment = f" \N{EM DASH} {finding.comment}" if finding.comment else ""
+            points.append(f"{word}: \N{LEFT DOUBLE QUOTATION MARK}{claim.says.rstrip('.')}\N{RIGHT DOUBLE QUOTATION MARK} ({claim.where}){comment}.")
+    return points
+
+
+def _key_table(data: Data) -> Table:
+    rows = []
+    for ratio in data.ratios:
+        stress = data.at(ratio)["critical_stress"].values
+        q = quantiles(stress, (0.05, 0.5, 0.95))
+        rows.append(
+            (
+                f"{ratio:g}",
+                rounded(megapascal(mean(stress))),
+                rounded(kilopascal(standard_deviation(stress))),
+                *(f"{value * 1e-6:.4f}" for value in q.value),
+                f"{float(np.mean(stress)) / data.setting.mean:.4f}",
+            )
+        )
+    return Table.of(
+        "critical-stress",
+        "Critical stress tau_cr by the local criterion",
+        ("xi_0/h_n", "mean (MPa)", "st. dev. (kPa)", "5 % (MPa)", "median", "95 %", "mean/<tau_p>"),
+        rows,
+    )
+
+
+def _claims(findings: Judged) -> list[tuple[str, list[ShownClaim]]]:
+    groups: dict[str, list[ShownClaim]] = {subject: [] for subject in SUBJECTS}
+    for claim, finding in findings:
+        groups.setdefault(claim.subject, []).append(
+            ShownClaim(
+                claim.where,
+                claim.says,
+                claim.printed,
+                tuple(quantity.text for quantity in finding.computed),
+                str(finding.verdict),
+                finding.comment,
+            )
+        )
+    return [(SUBJECTS.get(key, key), members) for key, members in groups.items() if members]
+
+
+def _parameters(data: Data) -> list[tuple[str, str]]:
+    setting = data.setting
+    problem = setting.problem
+    solid, interface = problem.solid, problem.interface
+    rate = float(np.max(problem.friction.weakening_rate))
+    length = problem.nucleation_length
+    return [
+        ("Solid", f"G = {solid.shear_modulus:g} Pa, nu = {solid.poisson_ratio:g},"
+         f" rho = {solid.density:g} kg/m^3, plane {solid.plane}"),
+        ("Effective modulus", f"G* = {problem.effective_modulus:.6g} Pa (mode {problem.mode})"),
+        ("Interface", f"L = {interface.length:g} m, {interface.nodes} nodes"),
+        ("Friction", f"W = {rate:g} Pa/m, residual strength"
+         f" {float(np.mean(problem.friction.residual_strength)):g} Pa"),
+        ("Nucleation length", f"h_n = {length * 1e3:.4g} mm, L/h_n = {interface.length / length:.4g},"
+         f" {length / interface.spacing:.1f} nodes"),
+        ("Strength", f"{_marginal(setting.marginal)}; mean {setting.mean * 1e-6:.6g} MPa,"
+         f" standard deviation {setting.field(data.ratios[0]).standard_deviation * 1e-6:.4g} MPa"),
+        ("Spectrum", f"(k^2 + lambda^2)^-{setting.exponent:g}, truncated at"
+         f" {setting.truncation:g} lambda, {'with' if setting.mean_mode else 'without'} the mean"
+         " mode"),
+        ("Correlation lengths", "xi_0/h_n = " + ", ".join(f"{ratio:g}" for ratio in data.ratios)),
+        ("Samples", f"{data.samples:,} at each correlation length, seed {data.seed}"),
+    ]
+
+
+def _marginal(marginal: Any) -> str:
+    if hasattr(marginal, "alpha"):
+        return (
+            f"Beta({marginal.alpha:g}, {marginal.beta:g}) on"
+            f" [{marginal.low * 1e-6:g}, {marginal.high * 1e-6:g}] MPa"
+        )
+    return f"{marginal.type} with " + ", ".join(f"{key} = {value:g}" for key, value in marginal.parameters)
+
+
+def _provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
+    versions = []
+    for package in _PACKAGES:
+        try:
+            versions.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            continue
+    times = ", ".join(
+        f"{dataset.attrs['title']} {dataset.attrs['seconds']:.1f} s"
+        for dataset in data.studies.values()
+    )
+    return [
+        ("Computed", time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())),
+        ("stiction", __version__),
+        ("Python", f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
+        ("Packages", ", ".join(versions)),
+        ("Time taken", f"{seconds:.1f} s before this page was written"),
+        ("Studies", times or "none"),
+        ("Results", "results.nc (one group a study), tables/*.csv, figures/*.png and *.pdf"),
+        ("Method", "local criterion of Uenishi and Rice (2003), exact eigenfunction, minimum"
+         " between the nodes"),
+    ]
