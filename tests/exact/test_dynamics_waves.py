@@ -107,4 +107,4 @@ def test_a_free_interface_rings_on_as_the_rayleigh_wave_alone():
         # Waves of the branch points have faded like t^-3/2, to about 1e-4; the phase is off by
         # the square of the step (0.02) times the time, some 1e-3.
         assert released(30_000, time) == pytest.approx(expected, abs=2e-3)
-    assert abs(residue) > 0.3
+    assert abs(residue) > 0.1

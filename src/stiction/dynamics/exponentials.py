@@ -14,6 +14,7 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from stiction.dynamics.kernels import arc_quadrature, exponential_sum
 from stiction.errors import InputError
@@ -197,6 +198,13 @@ def fit_exponentials(
         problems.append(f"kernel t_max: must lie in [10, 1e8], got {t_max!r}")
     if problems:
         raise InputError(problems)
+    # The matrices are small: more BLAS threads only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _search(mode, eta, tolerance, t_max)
+
+
+def _search(mode: str, eta: float, tolerance: float, t_max: float) -> ExponentialSum:
+    """Add pairs until a fit is good."""
     arcs = arc_quadrature(mode, eta)
     fit_times = sample_times(t_max, 40 if tolerance > 3e-8 else 80, 8, seed=0)
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs), _DAMPING / t_max)

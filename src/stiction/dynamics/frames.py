@@ -80,7 +80,8 @@ class Frames:
         spacing = medium.spacing
         dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
         fracture = float(dissipated.sum()) * spacing
-        strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
+        with np.errstate(over="ignore"):  # just before a run becomes non-finite
+            strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
         friction = fracture + float((rows[1] * state.slip).sum()) * spacing
         work = float(watch[track.WORK])
         frame: dict[str, Any] = {

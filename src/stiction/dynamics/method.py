@@ -95,8 +95,8 @@ class Rupture:
     memory_range: Positive = 1e5
     courant: Fraction = 0.9
     time_step: Positive | None = None
-    slip_step: Fraction = 0.03
-    load_step: Fraction = 2e-3
+    slip_step: Fraction = 0.02
+    load_step: Fraction = 1e-3
     event_drop: Fraction = 1e-4
     implicit: bool = True
     max_steps: Count = 5_000_000
@@ -155,10 +155,11 @@ def warn_if_coarse(problem: Problem, rows: Rows) -> None:
     resolution = problem.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
     if resolution < 15.0:
         percent = 3.0 * (16.0 / resolution) ** 3.3
+        expected = f"about {percent:.0f} %" if percent < 15.0 else "more than 15 %"
         warnings.warn(
-            f"the nucleation length spans {resolution:.1f} nodes: expect about {percent:.2g} % "
-            "error in slip just after onset (3 % at 16 nodes, 0.3 % at 32; the critical load is "
-            "far less sensitive)",
+            f"the nucleation length spans {resolution:.1f} nodes: expect {expected} error in slip "
+            "just after onset (3 % at 16 nodes, 0.3 % at 32; the critical load is far less "
+            "sensitive)",
             AccuracyWarning,
             stacklevel=3,
         )

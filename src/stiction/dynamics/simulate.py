@@ -258,14 +258,14 @@ def simulate_rupture(
             part = record[:count] if steps else NOTHING
             taken, code = run.advance(state, count, part)
             frames.add_steps(part[:taken])
+            if code == track.NOT_FINITE:
+                check_finite(run, state, code)
             ended = _reason(code, state, stop, end_time)
             if ended or interval is None or state.time - last_frame >= interval:
                 frames.add(state)
                 last_frame = state.time
             if progress is not None:
                 progress(_progress(state))
-            if code == track.NOT_FINITE:
-                check_finite(run, state, code)
             if ended:
                 reason = ended
                 break
@@ -305,8 +305,6 @@ def _quietly(action: Callable[[], None]) -> None:
 
 def _reason(code: int, state: State, stop: str, end_time: float | None) -> str | None:
     """Why the run ends here, or None."""
-    if code == track.NOT_FINITE:
-        return "not finite"
     if code == track.ALL_SLID:
         return "sliding"
     if code == track.DROPPED:
@@ -332,7 +330,9 @@ def _complete(
         variable = _ALONG[name]
         attrs = {"units": variable.units, "long_name": variable.long_name}
         dataset[name] = (variable.dims, values, attrs)
-    for name, value in summary(problem, run, state).items():
+    with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
+        scalars = summary(problem, run, state)
+    for name, value in scalars.items():
         variable = method.variables[name]
         label = {"units": variable.units, "long_name": variable.long_name}
         # Energies and moment are already there over 'time'; their last value is the total.
