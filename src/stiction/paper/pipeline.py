@@ -91,15 +91,11 @@ def run(
     return _write(folder / "report.html", html)
 
 
-def _checked(
-    out: Any, samples: Any, seed: Any, workers: Any, only: Any
-) -> tuple[Path, list[Any]]:
+def _checked(out: Any, samples: Any, seed: Any, workers: Any, only: Any) -> tuple[Path, list[Any]]:
     problems = []
     for name, value, smallest in (("samples", samples, FEWEST), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < smallest:
-            problems.append(
-                f"{name}: must be a whole number >= {smallest}, got {describe(value)}"
-            )
+            problems.append(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     figures: list[Any] = []
@@ -148,5 +144,3 @@ def _write(path: Path, text: str) -> Path:
     aside.write_text(text, encoding="utf-8")
     aside.replace(path)
     return path
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import model_validator
@@ -101,8 +102,8 @@ class Setting:
         xi_0/h_n of the Monte Carlo study, rising, two to six of them.
     """
 
-    problem: Problem = problem()  # noqa: RUF009 - frozen, so one default instance may be shared
-    marginal: Marginal = Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)  # noqa: RUF009 - same
+    problem: Problem = problem()
+    marginal: Marginal = Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
     exponent: Positive = 4.0
     truncation: Positive = 2.5
     mean_mode: bool = False
@@ -111,9 +112,7 @@ class Setting:
     @model_validator(mode="after")
     def _rising(self) -> Setting:
         ratios = self.correlation_ratios
-        if not 2 <= len(ratios) <= 6 or any(
-            left >= right for left, right in zip(ratios[:-1], ratios[1:], strict=True)
-        ):
+        if not 2 <= len(ratios) <= 6 or any(left >= right for left, right in pairwise(ratios)):
             raise InputError(f"correlation_ratios: must be 2 to 6 rising numbers, got {ratios!r}")
         return self
 
@@ -127,18 +126,21 @@ class Setting:
             `marginal`, `exponent`, `truncation`, `power_kept`, `mean_mode`, or
             `nucleation_length` (m) in place of the problem's own.
         """
+        return RandomField(
+            marginal=changes.get("marginal", self.marginal),
+            spectrum=self.spectrum(correlation_ratio, **changes),
+            mean_mode=changes.get("mean_mode", self.mean_mode),
+        )
+
+    def spectrum(self, correlation_ratio: float, **changes: Any) -> PowerLawSpectrum:
+        """The spectrum of `field`."""
         length = changes.get("nucleation_length", self.problem.nucleation_length)
         kept = changes.get("power_kept")
-        spectrum = PowerLawSpectrum(
+        return PowerLawSpectrum(
             correlation_length=correlation_ratio * length,
             exponent=changes.get("exponent", self.exponent),
             truncation=None if kept else changes.get("truncation", self.truncation),
             power_kept=kept,
-        )
-        return RandomField(
-            marginal=changes.get("marginal", self.marginal),
-            spectrum=spectrum,
-            mean_mode=changes.get("mean_mode", self.mean_mode),
         )
 
     @property

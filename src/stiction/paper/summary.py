@@ -43,11 +43,14 @@ def assemble(
         lead=SOURCE,
         headline=_tally(findings),
         points=_points(data, findings),
+        exceptions=_exceptions(findings),
         key_table=_key_table(data) if "monte_carlo" in data.studies else None,
         figures=figures,
         claims=_claims(findings),
         parameters=_parameters(data),
-        notes=[f"{text} ({count} times)" if count > 1 else text for text, count in warnings.items()],
+        notes=[
+            f"{text} ({count} times)" if count > 1 else text for text, count in warnings.items()
+        ],
         provenance=_provenance(data, seconds),
     )
 
@@ -85,18 +88,39 @@ def _points(data: Data, findings: Judged) -> list[str]:
     points = []
     if findings:
         points.append(
-            f"{len(findings)} statements of the paper were judged by {data.samples:,} samples at"
-            f" each of {len(data.ratios)} correlation lengths (seed {data.seed})."
+            f"{len(findings)} statements of the paper were judged, by {data.samples:,} samples at"
+            f" each of {len(data.ratios)} correlation lengths."
         )
-    wrong = [(claim, finding) for claim, finding in findings if finding.verdict is Verdict.FAILS]
-    partly = [
-        (claim, finding) for claim, finding in findings if finding.verdict is Verdict.CORRECTED
-    ]
-    for word, group in (("Does not hold", wrong), ("Holds with a correction", partly)):
-        for claim, finding in group:
-            comment = f" \N{EM DASH} {finding.comment}" if finding.comment else ""
-            points.append(f"{word}: \N{LEFT DOUBLE QUOTATION MARK}{claim.says.rstrip('.')}\N{RIGHT DOUBLE QUOTATION MARK} ({claim.where}){comment}.")
+    if "monte_carlo" in data.studies:
+        first, last = data.ratios[0], data.ratios[-1]
+        stress = {ratio: data.at(ratio)["critical_stress"].values for ratio in data.ratios}
+        share = [float(np.mean(stress[ratio])) / data.setting.mean for ratio in (first, last)]
+        spread = [float(np.std(stress[ratio])) / data.setting.mean for ratio in data.ratios]
+        points.append(
+            f"The interface lets go at {100 * share[0]:.1f} % of its mean strength if the"
+            f" correlation length is {first:g} of the nucleation length, at {100 * share[1]:.1f} %"
+            f" if it is {last:g} times as long; from one interface to the next this varies by"
+            f" {100 * min(spread):.1f} to {100 * max(spread):.1f} % (standard deviation)."
+        )
     return points
+
+
+def _exceptions(findings: Judged) -> list[tuple[str, list[str]]]:
+    groups = []
+    for verdict, heading in (
+        (Verdict.FAILS, "What does not hold"),
+        (Verdict.CORRECTED, "What holds with a correction"),
+        (Verdict.OPEN, "What these samples cannot decide"),
+    ):
+        texts = []
+        for claim, finding in findings:
+            if finding.verdict is not verdict:
+                continue
+            comment = f": {finding.comment}" if finding.comment else ""
+            texts.append(f"{claim.says.rstrip('.')} ({claim.where}){comment}.")
+        if texts:
+            groups.append((heading, texts))
+    return groups
 
 
 def _key_table(data: Data) -> Table:
@@ -144,19 +168,35 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
     rate = float(np.max(problem.friction.weakening_rate))
     length = problem.nucleation_length
     return [
-        ("Solid", f"G = {solid.shear_modulus:g} Pa, nu = {solid.poisson_ratio:g},"
-         f" rho = {solid.density:g} kg/m^3, plane {solid.plane}"),
+        (
+            "Solid",
+            f"G = {solid.shear_modulus:g} Pa, nu = {solid.poisson_ratio:g},"
+            f" rho = {solid.density:g} kg/m^3, plane {solid.plane}",
+        ),
         ("Effective modulus", f"G* = {problem.effective_modulus:.6g} Pa (mode {problem.mode})"),
         ("Interface", f"L = {interface.length:g} m, {interface.nodes} nodes"),
-        ("Friction", f"W = {rate:g} Pa/m, residual strength"
-         f" {float(np.mean(problem.friction.residual_strength)):g} Pa"),
-        ("Nucleation length", f"h_n = {length * 1e3:.4g} mm, L/h_n = {interface.length / length:.4g},"
-         f" {length / interface.spacing:.1f} nodes"),
-        ("Strength", f"{_marginal(setting.marginal)}; mean {setting.mean * 1e-6:.6g} MPa,"
-         f" standard deviation {setting.field(data.ratios[0]).standard_deviation * 1e-6:.4g} MPa"),
-        ("Spectrum", f"(k^2 + lambda^2)^-{setting.exponent:g}, truncated at"
-         f" {setting.truncation:g} lambda, {'with' if setting.mean_mode else 'without'} the mean"
-         " mode"),
+        (
+            "Friction",
+            f"W = {rate:g} Pa/m, residual strength"
+            f" {float(np.mean(problem.friction.residual_strength)):g} Pa",
+        ),
+        (
+            "Nucleation length",
+            f"h_n = {length * 1e3:.4g} mm, L/h_n ="
+            f" {interface.length / length:.4g},"
+            f" {length / interface.spacing:.1f} nodes",
+        ),
+        (
+            "Strength",
+            f"{_marginal(setting.marginal)}; mean {setting.mean * 1e-6:.6g} MPa,"
+            f" standard deviation {setting.field(data.ratios[0]).standard_deviation * 1e-6:.4g} MPa",
+        ),
+        (
+            "Spectrum",
+            f"(k^2 + lambda^2)^-{setting.exponent:g}, truncated at"
+            f" {setting.truncation:g} lambda, {'with' if setting.mean_mode else 'without'} the mean"
+            " mode",
+        ),
         ("Correlation lengths", "xi_0/h_n = " + ", ".join(f"{ratio:g}" for ratio in data.ratios)),
         ("Samples", f"{data.samples:,} at each correlation length, seed {data.seed}"),
     ]
@@ -168,7 +208,8 @@ def _marginal(marginal: Any) -> str:
             f"Beta({marginal.alpha:g}, {marginal.beta:g}) on"
             f" [{marginal.low * 1e-6:g}, {marginal.high * 1e-6:g}] MPa"
         )
-    return f"{marginal.type} with " + ", ".join(f"{key} = {value:g}" for key, value in marginal.parameters)
+    given = ", ".join(f"{key} = {value:g}" for key, value in marginal.parameters)
+    return f"{marginal.type} with {given}"
 
 
 def _provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
@@ -190,6 +231,9 @@ def _provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
         ("Time taken", f"{seconds:.1f} s before this page was written"),
         ("Studies", times or "none"),
         ("Results", "results.nc (one group a study), tables/*.csv, figures/*.png and *.pdf"),
-        ("Method", "local criterion of Uenishi and Rice (2003), exact eigenfunction, minimum"
-         " between the nodes"),
+        (
+            "Method",
+            "local criterion of Uenishi and Rice (2003), exact eigenfunction, minimum"
+            " between the nodes",
+        ),
     ]

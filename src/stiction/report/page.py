@@ -78,6 +78,7 @@ def render(
     lead: str,
     headline: Sequence[tuple[str, int]],
     points: Sequence[str],
+    exceptions: Sequence[tuple[str, Sequence[str]]],
     key_table: Table | None,
     figures: Sequence[ShownFigure],
     claims: Sequence[tuple[str, Sequence[ShownClaim]]],
@@ -93,6 +94,8 @@ def render(
     headline : sequence of (verdict, count)
     points : sequence of str
         What a busy reader should know.
+    exceptions : sequence of (heading, texts)
+        What does not hold as it stands.
     key_table : Table, optional
         The results in one table.
     figures : sequence of ShownFigure
@@ -115,6 +118,7 @@ def render(
         "lead": lead,
         "headline": headline,
         "points": points,
+        "exceptions": exceptions,
         "key_table": key_table,
         "figures": figures,
         "claims": claims,

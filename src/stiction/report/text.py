@@ -15,20 +15,37 @@ _GREEK = {
     "rho": "\N{GREEK SMALL LETTER RHO}",
     "Gamma": "\N{GREEK CAPITAL LETTER GAMMA}",
 }
-_SUBSCRIPTED = re.compile(
-    r"\b(tau|xi|lambda|Gamma|[hxcvdCSL])_(p,max|p|n|cr|r|kin|0|s|d|R|c|z|tau|max|i)\b"
+_MINUS = "\N{MINUS SIGN}"
+# One pass, longest first, so that nothing is set twice.
+_SYMBOL = re.compile(
+    r"\b(?P<base>tau|xi|lambda|Gamma|[hxcvdCSL])_(?P<index>p,max|kin|max|cr|tau|[pnr0sdRczi])\b"
+    r"|\b(?P<greek>lambda|Gamma|tau|rho|xi|nu|pi)\b"
+    r"|(?<![\w.'-])(?P<letter>[GWLCFzk])(?![\w'])"
+    r"|\^(?P<power>-?\d+)"
+    r"|&lt;(?P<mean>[a-zA-Z]+_[a-z]+|tau)&gt;"
+    r"|(?P<much>&gt;&gt;)"
+    r"|(?<![\w.)])-(?P<negative>\d)"
 )
-_PLAIN = re.compile(r"\b(lambda|Gamma|nu|pi|xi|tau|rho)\b")
-_POWER = re.compile(r"\^(\d+|-\d+|\*)")
+
+
+def _set(match: re.Match[str]) -> str:
+    part = match.groupdict()
+    if part["base"]:
+        base, index = (_GREEK.get(part[key], part[key]) for key in ("base", "index"))
+        return f"<i>{base}</i><sub>{index}</sub>"
+    if part["greek"] or part["letter"]:
+        name = part["greek"] or part["letter"]
+        return f"<i>{_GREEK.get(name, name)}</i>"
+    if part["power"]:
+        return f"<sup>{part['power'].replace('-', _MINUS)}</sup>"
+    if part["mean"]:
+        inner = _SYMBOL.sub(_set, part["mean"])
+        return f"\N{MATHEMATICAL LEFT ANGLE BRACKET}{inner}\N{MATHEMATICAL RIGHT ANGLE BRACKET}"
+    if part["much"]:
+        return "\N{MUCH GREATER-THAN}"
+    return _MINUS + part["negative"]
 
 
 def mathematics(text: str) -> Markup:
-    """Plain text as HTML, with symbols such as tau_cr, xi_0/h_n, G*, c_s^2 set as such."""
-    html = str(escape(text))
-    html = _SUBSCRIPTED.sub(
-        lambda m: f"<i>{_GREEK.get(m[1], m[1])}</i><sub>{_GREEK.get(m[2], m[2])}</sub>", html
-    )
-    html = _PLAIN.sub(lambda m: f"<i>{_GREEK[m[1]]}</i>", html)
-    html = _POWER.sub(lambda m: f"<sup>{m[1].replace('-', chr(0x2212))}</sup>", html)
-    html = html.replace("G*", "<i>G</i>*").replace("&lt;", "\N{LEFT-POINTING ANGLE BRACKET}")
-    return Markup(html.replace("&gt;", "\N{RIGHT-POINTING ANGLE BRACKET}"))
+    """Plain text as HTML, with symbols such as tau_cr, <tau_p>, xi_0/h_n, G*, k^-8 set as such."""
+    return Markup(_SYMBOL.sub(_set, str(escape(text))))

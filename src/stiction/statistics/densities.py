@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ class Density:
 
 @jit
 def count_into(values: Array, low: float, high: float, counts: NDArray[np.int64]) -> None:
-    """Add flat `values` to the counts of equal cells of [low, high]; the ends take what is beyond."""
+    """Add flat `values` to counts in equal cells of [low, high]; the ends take what is beyond."""
     cells = counts.size
     scale = cells / (high - low)
     for i in range(values.size):
@@ -174,7 +175,7 @@ def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
     if excess(finest) >= 0.0:
         return finest
     times = np.geomspace(finest, coarsest, 60)
-    for left, right in zip(times[:-1], times[1:], strict=True):
+    for left, right in pairwise(times):
         if excess(float(right)) > 0.0:  # the smallest root is the one that is meant
             root: float = brentq(excess, float(left), float(right), rtol=1e-6)
             return root

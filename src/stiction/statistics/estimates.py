@@ -49,7 +49,8 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
     if not np.all(np.isfinite(array)):
-        raise InputError(f"values: must be finite; entry {int(np.argmin(np.isfinite(array)))} is not")
+        entry = int(np.argmin(np.isfinite(array)))
+        raise InputError(f"values: must be finite; entry {entry} is not")
     return array
 
 

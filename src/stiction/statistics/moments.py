@@ -181,7 +181,8 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
         h = problem.nucleation_length
         wave = 2.0 * math.pi / problem.interface.length
         x = np.linspace(0.0, 1.0, 4096, endpoint=False)
-        c = correlation_of_mapped(np.cos(2.0 * math.pi * x), hermite_coefficients(strength.marginal))
+        wave_correlation = np.cos(2.0 * math.pi * x)
+        c = correlation_of_mapped(wave_correlation, hermite_coefficients(strength.marginal))
         power = np.abs(np.fft.rfft(c)) / x.size
         power[1:-1] *= 2.0
         multiplier = weight.multiplier(np.arange(64) * wave * h / 2.0)

@@ -15,6 +15,7 @@ from stiction.paper.claims import (  # importing them registers their claims
 )
 from stiction.paper.claims.claim import CLAIMS, Claim, Finding, Quantity, Verdict, claim, judged
 
+# Keyed by module; `judged` follows this order.
 SUBJECTS = {
     "parameters": "Parameters and theory",
     "nucleation": "Nucleation stress",

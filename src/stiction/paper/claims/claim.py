@@ -129,7 +129,7 @@ def rounded(estimate: Estimate) -> str:
     if not math.isfinite(value):
         return str(value)
     if not error > 0.0 or not math.isfinite(error):
-        return f"{value:.5g}"
+        return f"{value:.6g}"
     place = math.floor(math.log10(error))
     if error / 10.0**place < 2.95:  # a leading 1 or 2 deserves a second digit
         place -= 1

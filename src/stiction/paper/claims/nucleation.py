@@ -206,7 +206,9 @@ def weakest_point(data: Data) -> Finding:
     low = data.setting.bounds[0]
     reference = low if np.isfinite(low) else 0.0
     series = [
-        (mean(data.at(ratio)["weakest_strength"].values) - reference).scaled(1.0 / data.setting.mean)
+        (mean(data.at(ratio)["weakest_strength"].values) - reference).scaled(
+            1.0 / data.setting.mean
+        )
         for ratio in data.ratios
     ]
     return Finding(at_each(data, series), rising(series), "mean of min tau_p above its bound")

@@ -186,9 +186,7 @@ def near_the_bound(data: Data) -> Finding:
     low = data.setting.bounds[0]
     if not np.isfinite(low):
         return Finding((), Verdict.FAILS, "this strength has no lower bound")
-    series = [
-        (each - low).scaled(1.0 / data.setting.mean) for each in estimates(trend, "mean")
-    ]
+    series = [(each - low).scaled(1.0 / data.setting.mean) for each in estimates(trend, "mean")]
     ratios = trend["ratio"].values
     lowest = int(np.argmin([each.value for each in series]))
     turned = (series[-1] - series[lowest]).value > 0.0 and lowest < len(series) - 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from stiction.paper.claims.claim import Quantity, Verdict
 from stiction.paper.data import Data
@@ -38,7 +39,7 @@ def above(found: Estimate, limit: float) -> Verdict:
 
 def falling(series: Sequence[Estimate]) -> Verdict:
     """Whether each number is below the one before, undecided where errors overlap."""
-    steps = [right - left for left, right in zip(series[:-1], series[1:], strict=True)]
+    steps = [right - left for left, right in pairwise(series)]
     if all(step.value < -SIGMAS * step.error for step in steps):
         return Verdict.HOLDS
     if any(step.value > SIGMAS * step.error for step in steps):
@@ -53,7 +54,7 @@ def rising(series: Sequence[Estimate]) -> Verdict:
 
 def steps_down(series: Sequence[Estimate]) -> tuple[int, int]:
     """How many steps certainly fall, and how many certainly rise."""
-    steps = [right - left for left, right in zip(series[:-1], series[1:], strict=True)]
+    steps = [right - left for left, right in pairwise(series)]
     return (
         sum(step.value < -SIGMAS * step.error for step in steps),
         sum(step.value > SIGMAS * step.error for step in steps),

@@ -43,7 +43,8 @@ def runaway_length(data: Data) -> Finding:
     if all(near):
         verdict, comment = Verdict.HOLDS, ""
     else:
-        verdict = Verdict.CORRECTED if any(near) or min(values) < 3.0 < max(values) else Verdict.FAILS
+        partly = any(near) or min(values) < 3.0 < max(values)
+        verdict = Verdict.CORRECTED if partly else Verdict.FAILS
         comment = f"{min(values):.2g} to {max(values):.2g} h_n"
     return Finding(at_each(data, series, "h_n"), verdict, comment)
 

@@ -21,7 +21,7 @@ _PAIRS = (-1.2, 0.9)
 
 def caption(data: Data) -> str:
     """What is seen."""
-    kept = data.setting.field(data.ratios[0]).spectrum.power_kept_by_truncation
+    kept = data.setting.spectrum(data.ratios[0]).power_kept_by_truncation
     return (
         "(a, b) A value z of the Gaussian field becomes the strength of equal cumulative"
         " probability; two such pairs are marked. (c) Power spectral density of z against the"
@@ -36,7 +36,7 @@ def tables(data: Data) -> list[Table]:
     """The mapping and the spectrum at a few points."""
     z = np.arange(-4.0, 4.01, 0.25)
     tau = quantile_of_normal(data.setting.marginal.distribution, z)
-    spectrum = data.setting.field(data.ratios[0]).spectrum
+    spectrum = data.setting.spectrum(data.ratios[0])
     k = np.geomspace(0.1, 10.0, 41)
     return [
         Table.of(
@@ -87,13 +87,15 @@ def draw(data: Data) -> Figure:
         strength.plot([mapped], [share], symbol, color=shade)
         normal.set_xlim(right=edge_left)
         strength.set_xlim(left=edge_right)
-    spectrum = setting.field(data.ratios[0]).spectrum
+    spectrum = setting.spectrum(data.ratios[0])
     unit = spectrum.cutoff_wavenumber
     k = np.geomspace(0.1, 10.0, 400)
     end = spectrum.cutoff / unit
     inside = k <= end
     spectral.loglog(k[inside], spectrum.density(k[inside] * unit), color=INK)
-    spectral.loglog(k, spectrum.density(k * unit), color=QUIET, linewidth=0.8, linestyle=(0, (4, 2)))
+    spectral.loglog(
+        k, spectrum.density(k * unit), color=QUIET, linewidth=0.8, linestyle=(0, (4, 2))
+    )
     spectral.axvline(1.0, color=PALE, linewidth=0.8, zorder=0)
     spectral.axvline(end, color=PALE, linewidth=0.8, zorder=0)
     bottom = float(spectrum.density(np.array([10.0 * unit]))[0])

@@ -26,9 +26,10 @@ def caption(data: Data) -> str:
     """What is seen."""
     ratio = ", ".join(f"{ratio:g}" for ratio in data.ratios)
     return (
-        f"(a) Peak strength of one and the same draws at four correlation lengths ({ratio} times the"
-        " nucleation length), (b) its density, the same for all, and (c) the density of the weakest"
-        " point of each sample, on an enlarged axis. (d) Nucleation stress of the samples in (a) and (e) its density."
+        "(a) Peak strength of one and the same draws at correlation lengths of"
+        f" {ratio} times the nucleation length, (b) its density, the same for all, and (c) the"
+        " density of the weakest point of each sample, on an enlarged axis. (d) Nucleation stress"
+        " of the samples in (a) and (e) its density."
         " (f) Density of the critical stress. (g) Density of the position of onset with its"
         f" 95 % interval for a uniform one. {data.samples:,} samples each. Densities by the"
         " diffusion estimator (Botev et al., 2010) with no flux through the bounds of the strength"
@@ -68,9 +69,8 @@ def _density_table(data: Data) -> Table:
         for label, estimate in _densities(data, ratio).items():
             keep = np.flatnonzero(estimate.value > 1e-3 * estimate.value.max())
             for i in keep[:: max(keep.size // 60, 1)]:
-                rows.append(
-                    (ratio, label, *(float(v[i]) for v in (estimate.x, estimate.value, estimate.error)))
-                )
+                numbers = (estimate.x[i], estimate.value[i], estimate.error[i])
+                rows.append((ratio, label, *(float(number) for number in numbers)))
     return Table.of(
         "figure-5-densities",
         "Densities, in units of the mean strength",
@@ -104,7 +104,8 @@ def _label(ratio: float) -> str:
 def draw(data: Data) -> Figure:
     """Profiles on the left, densities beside them, onset below."""
     figure = new_figure(PAGE, 6.3)
-    upper, lower = figure.subfigures(2, 1, height_ratios=(2.0, 0.95))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(2.0, 0.95))
+    upper, lower = parts
     grid = upper.subplots(2, 3, width_ratios=(2.5, 0.8, 0.8))
     densities = {ratio: _densities(data, ratio) for ratio in data.ratios}
     limits = _limits(data)

@@ -53,7 +53,8 @@ def tables(data: Data) -> list[Table]:
 def draw(data: Data) -> Figure:
     """Sketches above, the field with correlation and density below."""
     figure = new_figure(PAGE, 4.1)
-    top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 0.95))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, 0.95))
+    top, bottom = parts
     sketch, history, law = top.subplots(1, 3, width_ratios=(1.5, 1.0, 1.0))
     _sketch(sketch)
     _history(history)
@@ -62,7 +63,8 @@ def draw(data: Data) -> Figure:
     _field(field, data)
     _correlation(correlation, data)
     _density(probability, data, field.get_ylim())
-    for axes, letter in zip((sketch, history, law, field, correlation, probability), "abcdef", strict=True):
+    panels = (sketch, history, law, field, correlation, probability)
+    for axes, letter in zip(panels, "abcdef", strict=True):
         panel(axes, letter)
     return figure
 
@@ -149,7 +151,9 @@ def _field(axes: Axes, data: Data) -> None:
     axes.set_ylim(low, high + 0.16 * (high - low))
     length = setting.problem.nucleation_length / interface.length
     level = high + 0.05 * (high - low)
-    axes.plot([0.04, 0.04 + length], [level, level], color=INK, linewidth=2.0, solid_capstyle="butt")
+    axes.plot(
+        [0.04, 0.04 + length], [level, level], color=INK, linewidth=2.0, solid_capstyle="butt"
+    )
     axes.text(0.05 + length, level, r"$h_\mathrm{n}$", va="center", ha="left")
     axes.set_xlabel("position $x/L$")
     axes.set_ylabel(r"strength $\tau_\mathrm{p}/\langle\tau_\mathrm{p}\rangle$")
@@ -157,7 +161,7 @@ def _field(axes: Axes, data: Data) -> None:
 
 def _correlation(axes: Axes, data: Data) -> None:
     setting, ratio = data.setting, data.ratios[SHOWN]
-    xi = setting.field(ratio).spectrum.correlation_length
+    xi = setting.spectrum(ratio).correlation_length
     theory = data["theory"].sel(correlation_ratio=ratio)
     lag = setting.problem.interface.x / xi
     seen = lag <= 2.0
@@ -179,7 +183,10 @@ def _density(axes: Axes, data: Data, limits: tuple[float, float]) -> None:
     setting = data.setting
     y = np.linspace(*limits, 400)
     axes.plot(
-        setting.marginal.distribution.pdf(y * setting.mean) * setting.mean, y, color=INK, linewidth=1.0
+        setting.marginal.distribution.pdf(y * setting.mean) * setting.mean,
+        y,
+        color=INK,
+        linewidth=1.0,
     )
     sample = data.relative(data.at(data.ratios[SHOWN])["profile_strength"].values)
     value, edges = np.histogram(sample, bins=18, range=_range(data, sample), density=True)

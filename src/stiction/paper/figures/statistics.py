@@ -156,9 +156,7 @@ def _series(axes: Axes, data: Data, key: str, index: int) -> None:
                 linestyle=(0, (2, 2)),
             )
     axes.set_xlim(left * 0.85, right * 1.25)
-    axes.set_xticks(
-        [left, *ratios, right], ["0", *(f"{ratio:g}" for ratio in ratios), r"$\infty$"]
-    )
+    axes.set_xticks([left, *ratios, right], ["0", *(f"{ratio:g}" for ratio in ratios), r"$\infty$"])
     axes.minorticks_off()
     axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$")
     if key == "critical_stress":
@@ -207,7 +205,12 @@ def _wide(axes: Axes, data: Data) -> None:
         mean = data.relative(chosen["mean"].values)
         spread = data.relative(chosen["standard_deviation"].values)
         axes.fill_between(
-            chosen["ratio"].values, mean - spread, mean + spread, color=shade, alpha=0.12, linewidth=0
+            chosen["ratio"].values,
+            mean - spread,
+            mean + spread,
+            color=shade,
+            alpha=0.12,
+            linewidth=0,
         )
         axes.plot(
             chosen["ratio"].values,

@@ -15,6 +15,7 @@ from stiction.fields.random_field import RandomField
 from stiction.paper.setting import Setting
 from stiction.problem import Problem
 
+
 def _unheard(count: int) -> None:
     pass
 

@@ -29,9 +29,7 @@ def compute(context: Context) -> xr.Dataset:
     setting = context.setting
     problem = setting.problem
     # The printed modulus G/(1 - nu) is that of plane strain, whatever the setting's plane.
-    printed = dataclasses.replace(
-        problem, solid=dataclasses.replace(problem.solid, plane="strain")
-    )
+    printed = dataclasses.replace(problem, solid=dataclasses.replace(problem.solid, plane="strain"))
     own = dataclasses.replace(problem, solid=dataclasses.replace(problem.solid, plane="stress"))
     parts = {}
     for ratio in setting.correlation_ratios:

@@ -43,9 +43,7 @@ def compute(context: Context) -> xr.Dataset:
         by_ratio = {}
         for ratio in setting.correlation_ratios:
             field = setting.field(ratio, marginal=marginal)
-            result = context.monte_carlo(
-                setting.problem, field, LocalCriterion(), context.fewer
-            )
+            result = context.monte_carlo(setting.problem, field, LocalCriterion(), context.fewer)
             by_ratio[ratio] = summarise(result["critical_stress"].values)
         parts[skew] = stack(by_ratio, "correlation_ratio", "xi_0/h_n")
         parts[skew]["point_skewness"] = float(

@@ -37,9 +37,7 @@ def compute(context: Context) -> xr.Dataset:
             length = setting.field(ratio).efolding_length()
             field = setting.field(ratio, exponent=exponent, power_kept=POWER_KEPT)
             field = field.with_efolding_length(length)
-            result = context.monte_carlo(
-                setting.problem, field, LocalCriterion(), context.fewer
-            )
+            result = context.monte_carlo(setting.problem, field, LocalCriterion(), context.fewer)
             stress = result["critical_stress"].values
             part = summarise(stress)
             usual = reference.setdefault(ratio, stress)

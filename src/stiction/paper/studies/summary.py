@@ -27,8 +27,8 @@ def summarise(values: Any) -> xr.Dataset:
         numbers[f"quantile_{name}"] = ("probability", getattr(q, name))
     numbers["smallest"] = float(np.min(values))
     dataset = xr.Dataset(numbers, coords={"probability": list(PROBABILITIES)})
-    for name, variable in dataset.variables.items():
-        pure = str(name) in ("probability", "skewness", "skewness_error")
+    for key, variable in dataset.variables.items():
+        pure = str(key) in ("probability", "skewness", "skewness_error")
         variable.attrs["units"] = "1" if pure else "Pa"
     return dataset
 

@@ -36,9 +36,7 @@ def compute(context: Context) -> xr.Dataset:
         by_ratio = {}
         for ratio in _ratios(context):
             field = setting.field(ratio, mean_mode=bool(mean_mode))
-            result = context.monte_carlo(
-                setting.problem, field, LocalCriterion(), context.fewer
-            )
+            result = context.monte_carlo(setting.problem, field, LocalCriterion(), context.fewer)
             by_ratio[ratio] = summarise(result["critical_stress"].values)
         by_mode[mean_mode] = stack(by_ratio, "ratio", "xi_0/h_n")
     return stack(by_mode, "mean_mode", "whether z has the mode k = 0")
