@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe
-from stiction.ensemble.files import Lock, StoreError, cannot_write, sync_folder
+from stiction.ensemble.files import Lock, cannot_write, sync_folder
 from stiction.ensemble.gather import Gathered
 from stiction.ensemble.run import check_run, warn_of_fields
 from stiction.ensemble.store import (
@@ -31,6 +31,7 @@ from stiction.ensemble.store import (
     writing,
 )
 from stiction.ensemble.stored import run_stored
+from stiction.ensemble.trouble import StoreError
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
 from stiction.study import Study
@@ -129,6 +130,13 @@ class StoredRun:
             sum(chunk.seconds for chunk in store.chunks),
             _is_active(store.path),
         )
+
+    @property
+    def versions(self) -> list[str]:
+        """Versions of the package that computed it."""
+        if self._store is not None:
+            return self._store.versions
+        return [str(self._result.attrs["stiction_version"])]
 
     @property
     def failures(self) -> tuple[Failure, ...]:

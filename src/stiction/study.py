@@ -36,7 +36,7 @@ METHODS = {
 }
 
 
-def _known_methods() -> list[type]:
+def known_methods() -> list[type]:
     """The methods of the rooms that are there."""
     found = []
     for module, name in METHODS.items():
@@ -48,7 +48,7 @@ def _known_methods() -> list[type]:
 if TYPE_CHECKING:
     AnyMethod: TypeAlias = Any
 else:
-    _found = _known_methods()
+    _found = known_methods()
     AnyMethod = _found[0]
     if len(_found) > 1:
         AnyMethod = Annotated[functools.reduce(operator.or_, _found), Field(discriminator="type")]

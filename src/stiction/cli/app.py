@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import sys
 import warnings
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
 
 from stiction import __version__
+from stiction.cli.onset import onset
 from stiction.cli.paper import paper
+from stiction.cli.runs import export, plot, report, status
 from stiction.cli.studies import check, run, schema
+from stiction.ensemble.trouble import RunError
 from stiction.errors import InputError
 
 app = typer.Typer(
@@ -39,8 +44,22 @@ def _options(
     pass
 
 
-for command in (paper, run, check, schema):
-    app.command()(command)
+def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
+    """Ctrl-C ends a command with exit code 130, as shells expect."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except KeyboardInterrupt:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(130) from None
+
+    return wrapped
+
+
+for command in (paper, run, onset, check, schema, status, export, plot, report):
+    app.command()(_interruptible(command))
 
 
 def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
@@ -57,6 +76,6 @@ def main() -> None:
         for text in error.problems:
             typer.echo(f"error: {text}", err=True)
         sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
-        sys.exit(130)
+    except RunError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(1)

@@ -13,6 +13,9 @@ from stiction.errors import InputError
 StudyFile = Annotated[
     Path, typer.Argument(metavar="STUDY.toml", help="Study file; `stiction schema` describes it.")
 ]
+RunPath = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Folder of a run, or the .nc file of a finished one.")
+]
 Workers = Annotated[
     int | None, typer.Option(help="Threads; all cores by default.", show_default=False)
 ]
@@ -30,11 +33,24 @@ def writable(path: Path, what: str) -> Path:
     return path
 
 
+def writable_folder(path: Path) -> Path:
+    """A folder for several files, made if need be, or refused before any work is done."""
+    if path.exists() and not path.is_dir():
+        raise InputError(f"--out: {path} is a file; give the name of a folder")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out: {path} cannot be made: {error}") from None
+    if not os.access(path, os.W_OK):
+        raise InputError(f"--out: {path} cannot be written")
+    return path
+
+
 def summary(result: Any) -> str:
     """A few lines about the onset, for people."""
     lines = []
     for name in ("critical_stress", "friction_coefficient"):
-        if name in result:
+        if name in result and bool(result[name].notnull().any()):
             variable = result[name]
             low, middle, high = (float(variable.quantile(q)) for q in (0.05, 0.5, 0.95))
             scale, unit = (1e-6, "MPa") if variable.attrs["units"] == "Pa" else (1.0, "")
@@ -44,3 +60,25 @@ def summary(result: Any) -> str:
                 f" 5/50/95 % {low * scale:.5g} / {middle * scale:.5g} / {high * scale:.5g}"
             )
     return "\n".join(lines)
+
+
+def duration(seconds: float) -> str:
+    """Seconds for people."""
+    if seconds < 1.0:
+        return f"{seconds * 1e3:.2g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.2g} us"
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    if seconds < 7200.0:
+        return f"{seconds / 60.0:.3g} min"
+    if seconds < 48 * 3600.0:
+        return f"{seconds / 3600.0:.3g} h"
+    return f"{seconds / 86400.0:.3g} days"
+
+
+def size(count: float) -> str:
+    """Bytes for people."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000.0:
+            return f"{count:.3g} {unit}"
+        count /= 1000.0
+    return f"{count:.3g} TB"

@@ -1,63 +1,217 @@
-"""Commands that work with study files."""
+"""Commands that work with study files: run, check, schema."""
 
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, Workers, summary, writable
+from stiction.cli.common import StudyFile, Workers, duration, size, summary
 from stiction.errors import InputError
+
+SHOWN = 12
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored."""
+
+    def stop(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def run(
     study: StudyFile,
-    out: Annotated[Path, typer.Option(help="NetCDF file for the result.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="RUN",
+            help="Folder in which results are stored as they are done, or a .nc file (with such a"
+            " folder beside it until it is complete).",
+        ),
+    ],
     workers: Workers = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://host:8786."),
+    ] = None,
+    slurm: Annotated[
+        bool,
+        typer.Option(
+            "--slurm",
+            help="Submit SLURM jobs; what they ask for is in [cluster] of the study or in"
+            " dask-jobqueue's own configuration.",
+        ),
+    ] = False,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Compute stored samples that failed again.")
+    ] = False,
 ) -> None:
-    """Run the Monte Carlo study of a file and write its result.
+    """Run the study of a file, or what is missing of it.
 
-    The result is one NetCDF file over 'sample', with units, the study and the seed in its
-    attributes. The numbers do not depend on the number of workers.
+    The same command goes on where a run was interrupted, however it ended, and computes only the
+    new samples if `samples` was raised in the study. The numbers do not depend on workers,
+    machines or interruptions.
+
+    Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
+    or the command; 130: interrupted.
     """
+    from stiction.runs import StoredRun, check_target, run_into
     from stiction.study import Study
 
-    writable(out, "the result")
+    if sum((workers is not None, scheduler is not None, slurm)) > 1:
+        raise InputError("--workers, --scheduler, --slurm: give one of them")
     loaded = Study.from_toml(study)
     loaded.to_dict()
-    result = loaded.run(workers=workers, progress=True)
-    aside = out.with_name(out.name + ".part")
-    result.to_netcdf(aside)
-    aside.replace(out)
-    typer.echo(summary(result))
-    typer.echo(f"{result.sizes['sample']} samples written to {out}")
+    check_target(out)
+    try:
+        with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
+            stored = run_into(
+                loaded, out, workers=workers, executor=executor, progress=True, retry=retry
+            )
+    except KeyboardInterrupt:
+        try:
+            state = StoredRun(out).status()
+            done = f"{state.done} of {state.samples} samples are stored in {out}"
+        except RuntimeError:
+            done = "nothing is stored yet"
+        typer.echo(f"interrupted: {done}; the same command goes on", err=True)
+        raise typer.Exit(130) from None
+    names = ["critical_stress", "friction_coefficient"]
+    _show_results(loaded, stored.dataset(only=names))
+    samples = len(loaded.plans) * loaded.ensemble.samples
+    typer.echo(f"{samples - len(stored.failures)} samples in {out}")
+    if stored.failures:
+        _show_failures(stored.failures, f"stiction run {study} --out {out} --retry")
+        raise typer.Exit(1)
 
 
-def check(study: StudyFile) -> None:
-    """Say what a study file would do, or everything that is wrong with it."""
+def _executor(study: Any, scheduler: str | None, slurm: bool) -> Any:
+    if scheduler is None and not slurm:
+        return nullcontext()
+    from stiction.ensemble.distributed import dask_executor
+
+    return dask_executor(scheduler, study.cluster)
+
+
+def _show_failures(failures: Any, command: str) -> None:
+    typer.echo(f"{len(failures)} samples failed:", err=True)
+    for failure in failures[:SHOWN]:
+        typer.echo(f"  {failure}", err=True)
+    if len(failures) > SHOWN:
+        typer.echo(f"  and {len(failures) - SHOWN} more", err=True)
+    typer.echo(f"compute them again with: {command}", err=True)
+
+
+def _show_results(study: Any, result: Any) -> None:
+    from stiction.sweep import name_point
+
+    if not study.sweep:
+        typer.echo(summary(result))
+        return
+    dims = [axis.dim for axis in study.axes]
+    flat = result.stack(point=dims)
+    for point in study.points[:SHOWN]:
+        typer.echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
+    if len(study.points) > SHOWN:
+        typer.echo(f"and {len(study.points) - SHOWN} more points")
+
+
+def check(
+    study: StudyFile,
+    probe: Annotated[
+        bool, typer.Option(help="Time a few samples (about two seconds) to estimate the time.")
+    ] = True,
+) -> None:
+    """Say what a study file would do, how long and how big, or everything that is wrong with it."""
     from stiction.study import Study
 
     loaded = Study.from_toml(study)
-    problem, field = loaded.problem, loaded.strength
-    modes = field.modes(problem.interface)
     typer.echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
-    typer.echo(f"  method               {loaded.method.type}")
-    typer.echo(f"  samples              {loaded.ensemble.samples} (seed {loaded.ensemble.seed})")
-    typer.echo(f"  effective modulus    {problem.effective_modulus:.6g} Pa")
-    try:
-        length = problem.nucleation_length
-        nodes = length / problem.interface.spacing
-        ratio = problem.interface.length / length
-        typer.echo(f"  nucleation length    {length:.4g} m: {nodes:.1f} nodes, L/h_n = {ratio:.1f}")
-    except InputError:
-        typer.echo("  nucleation length    varies along the interface")
-    typer.echo(
-        f"  strength             mean {field.mean:.6g} Pa, standard deviation"
-        f" {field.standard_deviation:.4g} Pa, {modes.count} modes"
+    for name, text in _description(loaded):
+        typer.echo(f"  {name:20s} {text}")
+    if probe:
+        for name, text in _cost(loaded):
+            typer.echo(f"  {name:20s} {text}")
+
+
+def _description(study: Any) -> list[tuple[str, str]]:
+    plans, ensemble = study.plans, study.ensemble
+    samples = f"{ensemble.samples} (seed {ensemble.seed})"
+    if study.sweep:
+        samples += f" at each of {len(plans)} points: {len(plans) * ensemble.samples} in all"
+    methods = list(dict.fromkeys(plan.method.type for plan in plans))
+    lines = [("method", ", ".join(methods)), ("samples", samples)]
+    for axis in study.axes:
+        keys = " with ".join(variable.long_name for _, variable in axis.coordinates.values())
+        values = next(iter(axis.coordinates.values()))[0]
+        lines.append(("sweep", f"{keys}: {axis.size} values, {values[0]} to {values[-1]}"))
+    lines.append(("effective modulus", _range([p.problem.effective_modulus for p in plans], "Pa")))
+    lines += _resolution([plan.problem for plan in plans])
+    means = _range([plan.strength.mean for plan in plans], "Pa")
+    deviations = _range([plan.strength.standard_deviation for plan in plans], "Pa")
+    modes = _range([plan.strength.modes(plan.problem.interface).count for plan in plans], "modes")
+    lines.append(("strength", f"mean {means}, standard deviation {deviations}, {modes}"))
+    fields = {plan.strength for plan in plans}
+    lines.append(
+        (
+            "correlation 1/e at",
+            _range([field.efolding_length() for field in fields], "m") + " (of the strength)",
+        )
     )
-    typer.echo(f"  correlation 1/e at   {field.efolding_length():.4g} m (of the strength)")
+    if plans[0].wide:
+        chosen = "all" if ensemble.keep_samples is None else str(len(ensemble.keep_samples))
+        lines.append(("kept", f"{', '.join(plans[0].wide)} of {chosen} samples"))
+    return lines
+
+
+def _range(values: Any, unit: str) -> str:
+    low, high = min(values), max(values)
+    text = f"{low:.6g}" if low == high else f"{low:.4g} to {high:.4g}"
+    return f"{text} {unit}"
+
+
+def _resolution(problems: Any) -> list[tuple[str, str]]:
+    try:
+        lengths = [problem.nucleation_length for problem in problems]
+    except InputError:
+        return [("nucleation length", "varies along the interface")]
+    pairs = list(zip(problems, lengths, strict=True))
+    nodes = _range([length / problem.interface.spacing for problem, length in pairs], "nodes")
+    ratio = _range([problem.interface.length / length for problem, length in pairs], "h_n")
+    return [("nucleation length", f"{_range(lengths, 'm')}: {nodes}, L = {ratio}")]
+
+
+def _cost(study: Any) -> list[tuple[str, str]]:
+    from stiction.ensemble.probe import probe_time, stored_bytes
+    from stiction.ensemble.share import usable_cores
+
+    ensemble, plans = study.ensemble, study.plans
+    cost = probe_time(plans, ensemble.samples, ensemble.first)
+    low, high = (duration(seconds) for seconds in cost.per_sample)
+    each = low if low == high else f"{low} to {high}"
+    cores = usable_cores()
+    lines = [
+        (
+            "time",
+            f"about {duration(cost.seconds)} on one core, {duration(cost.seconds / cores)} on the"
+            f" {cores} here ({each} a sample, probed at {cost.probed} of {len(plans)} points)",
+        ),
+        ("size", f"about {size(stored_bytes(plans, ensemble.samples, ensemble.first))}"),
+    ]
+    lines += [("failed in the probe", text) for text in cost.failures[:SHOWN]]
+    return lines
 
 
 def schema() -> None:

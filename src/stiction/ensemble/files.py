@@ -18,13 +18,10 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.ensemble.trouble import StoreError
 from stiction.results import Variable
 
 Arrays = dict[str, NDArray[Any]]
-
-
-class StoreError(RuntimeError):
-    """A folder or file cannot be used or written; the message says what to do."""
 
 
 def digest(data: bytes) -> str:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.trouble import WorkerError
 from stiction.ensemble.work import Outcome, do_work, process_mark
 from stiction.fields.draws import BLOCK
 
@@ -148,10 +149,6 @@ def share_out(
         finally:
             for future in running:
                 future.cancel()
-
-
-class WorkerError(RuntimeError):
-    """Workers died or could not be reached; what was stored stays."""
 
 
 def _result(future: Future[Any], span: Span, plans: Sequence[Plan]) -> Outcome:

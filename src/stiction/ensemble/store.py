@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from stiction.ensemble.files import (
     Lock,
-    StoreError,
     cannot_write,
     decode,
     digest,
@@ -31,6 +30,7 @@ from stiction.ensemble.files import (
     write_whole,
 )
 from stiction.ensemble.share import Span
+from stiction.ensemble.trouble import StoreError
 from stiction.ensemble.work import Failure, Outcome
 from stiction.results import Variable
 

@@ -1,0 +1,124 @@
+"""The command that asks every method about one profile."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from stiction.cli.common import StudyFile, duration, writable
+from stiction.errors import InputError
+
+COLUMNS = ("method", "critical stress", "critical load", "first instability", "position", "time")
+
+
+def onset(
+    study: StudyFile,
+    strength: Annotated[
+        Path,
+        typer.Option(
+            metavar="PROFILE",
+            help="Peak strength, Pa: .npy, .csv (with or without x in m) or NetCDF.",
+        ),
+    ],
+    method: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this method; may be given several times.", show_default=False),
+    ] = None,
+    loading_rate: Annotated[
+        float, typer.Option(help="Of the dynamic method, Pa/s, unless the study gives one.")
+    ] = 2e7,
+    out: Annotated[
+        Path | None, typer.Option(help="Figure to write (.png, .pdf or .svg).", show_default=False)
+    ] = None,
+) -> None:
+    """At which load, and where, does one interface of given strength let go?
+
+    Takes the problem from a study file and the strength from PROFILE, asks every method that
+    applies, and prints a table; with --out also draws the profile and where each method sees it
+    let go. The method of the study keeps its options, the others take their defaults.
+    """
+    from stiction.profile_file import read_profile
+    from stiction.study import Study
+
+    if out is not None:
+        if out.suffix not in (".png", ".pdf", ".svg"):
+            raise InputError(f"--out: a figure must end in .png, .pdf or .svg, got {out}")
+        writable(out, "the figure")
+    loaded = Study.from_toml(study)
+    problem = loaded.problem
+    methods = _methods(loaded.method, method, loading_rate)
+    profile = read_profile(strength, problem.interface)
+    problem.rows(profile)
+    results: dict[str, Any] = {}
+    refused: list[tuple[str, str]] = []
+    for one in methods:
+        try:
+            results[one.type] = _ask(problem, profile, one)
+        except InputError as error:
+            refused.append((one.type, str(error)))
+    _print_table(results, problem.load.normal_pressure is not None)
+    for name, text in refused:
+        typer.echo(f"{name} does not apply: {text}")
+    if not results:
+        raise typer.Exit(1)
+    if out is not None:
+        from stiction.report.onset_figure import write_onset_figure
+
+        write_onset_figure(problem, profile, {n: r for n, (r, _) in results.items()}, out)
+        typer.echo(f"figure: {out}")
+
+
+def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
+    """The methods to ask: the study's own as it is, the others with their defaults."""
+    from stiction.errors import unknown_name
+    from stiction.study import known_methods
+
+    classes = {cls.__dataclass_fields__["type"].default: cls for cls in known_methods()}
+    unknown = [
+        unknown_name("--method", name, classes) for name in names or () if name not in classes
+    ]
+    if unknown:
+        raise InputError(unknown)
+    found = []
+    for name, cls in classes.items():
+        if names and name not in names:
+            continue
+        if name == own.type:
+            found.append(own)
+        elif name == "rupture":
+            found.append(cls(loading_rate=loading_rate))
+        else:
+            found.append(cls())
+    return found
+
+
+def _ask(problem: Any, profile: Any, method: Any) -> tuple[Any, float]:
+    from stiction.methods import onset as ask
+
+    begin = time.perf_counter()
+    result = ask(problem, profile, method=method)
+    return result, time.perf_counter() - begin
+
+
+def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
+    rows = []
+    for name, (result, seconds) in results.items():
+        stress, load, first = (
+            f"{float(result[key][0]) * 1e-6:.6f} MPa"
+            for key in ("critical_stress", "critical_load", "first_instability")
+        )
+        place = f"{float(result['critical_position'][0]) * 1e3:.4f} mm"
+        row = [name, stress, load, first, place, duration(seconds)]
+        if with_coefficient:
+            row.insert(2, f"{float(result['friction_coefficient'][0]):.6f}")
+        rows.append(row)
+    head = list(COLUMNS)
+    if with_coefficient:
+        head.insert(2, "coefficient")
+    widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
+    for line in [head, *rows]:
+        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        typer.echo("  ".join(cells).rstrip())

@@ -1,0 +1,100 @@
+"""Commands that look at a run on disk: status, export, plot, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiction.cli.common import RunPath, duration, size, writable, writable_folder
+
+SHOWN = 20
+
+
+def status(run: RunPath) -> None:
+    """Say how far a run is, which samples failed and which chunks are damaged.
+
+    Every chunk is read and compared with its checksum.
+    """
+    from stiction.runs import StoredRun
+    from stiction.sweep import name_point
+
+    stored = StoredRun(run)
+    state, study = stored.status(), stored.study
+    share = 100.0 * state.done / state.samples
+    typer.echo(f"{run}" + (f": {study.title}" if study.title else ""))
+    typer.echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
+    typer.echo(f"  chunks    {state.chunks}, {size(state.bytes)}")
+    if state.seconds:
+        typer.echo(f"  computed  {duration(state.seconds)} of one core")
+    if state.active:
+        typer.echo("  a run is writing to it now")
+    if study.sweep and not state.complete:
+        open_points = [
+            p for p in study.points if state.done_by_point[p.number] < (study.ensemble.samples)
+        ]
+        for point in open_points[:SHOWN]:
+            done = state.done_by_point[point.number]
+            typer.echo(f"  {name_point(point)}: {done} of {study.ensemble.samples}")
+        if len(open_points) > SHOWN:
+            typer.echo(f"  and {len(open_points) - SHOWN} more points that are not complete")
+    for file in state.damaged[:SHOWN]:
+        typer.echo(f"  damaged   {file}: running the study again computes it again")
+    if state.failures:
+        typer.echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
+        for failure in state.failures[:SHOWN]:
+            typer.echo(f"    {failure}")
+
+
+def export(
+    run: RunPath,
+    out: Annotated[Path, typer.Argument(metavar="RESULT.nc", help="NetCDF file to write.")],
+) -> None:
+    """Write a run as one NetCDF file over the sweep and the samples; missing samples are NaN."""
+    from stiction.runs import StoredRun
+
+    writable(out, "the result")
+    stored = StoredRun(run)
+    stored.export(out)
+    state = stored.status()
+    missing = state.samples - state.done
+    if missing:
+        typer.echo(f"warning: {missing} of {state.samples} samples are missing (NaN)", err=True)
+    typer.echo(f"{state.done} samples written to {out}")
+
+
+def plot(
+    run: RunPath,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the figures; the run's own by default.")
+    ] = None,
+) -> None:
+    """Draw densities of the onset, and its quantiles against what is swept (PNG and PDF)."""
+    from stiction.report.run_figures import write_figures
+    from stiction.runs import StoredRun
+
+    stored = StoredRun(run)
+    folder = writable_folder(out or _beside(run, "figures"))
+    for path in write_figures(stored, folder):
+        typer.echo(str(path))
+
+
+def report(
+    run: RunPath,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file; report.html in the run's folder by default.")
+    ] = None,
+) -> None:
+    """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
+    from stiction.report.run_report import write_report
+    from stiction.runs import StoredRun
+
+    stored = StoredRun(run)
+    path = writable(out or _beside(run, "report.html"), "the report")
+    write_report(stored, path)
+    typer.echo(f"report: {path}")
+
+
+def _beside(run: Path, name: str) -> Path:
+    return run / name if run.is_dir() else run.with_name(f"{run.stem}-{name}")
