@@ -36,7 +36,7 @@ METHODS = {
 }
 
 
-def known_methods() -> list[type]:
+def known_methods() -> list[Any]:
     """The methods of the rooms that are there."""
     found = []
     for module, name in METHODS.items():

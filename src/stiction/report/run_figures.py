@@ -58,11 +58,11 @@ def run_figures(stored: StoredRun) -> Iterator[Drawn]:
         chosen = dict(zip(others[1:], steps, strict=True))
         part = result.isel(chosen)
         suffix = f"-{number}" if chosen else ""
-        fixed = ", ".join(f"{_label(part[dim])} {_shown(part[dim].item())}" for dim in chosen)
+        fixed = ", ".join(f"{_label(part[dim])} {_shown(part[dim])}" for dim in chosen)
         note = f" Held fixed: {fixed}." if fixed else ""
         densities = part if not within else part.isel({within[0]: 0})
         if within:
-            first = f"{_label(part[within[0]])} {_shown(part[within[0]].values[0])}"
+            first = f"{_label(part[within[0]])} {_shown(part[within[0]][0])}"
             held = f" At {first}." + note
         else:
             held = note
@@ -74,8 +74,10 @@ def run_figures(stored: StoredRun) -> Iterator[Drawn]:
         yield Drawn(
             f"quantiles{suffix}",
             _quantiles(part, along, within),
-            "Median of the critical stress with its 95 % confidence interval; dark band: between"
-            " quartiles, pale band: between the 5 % and 95 % quantiles." + note,
+            "Median of the critical stress with its 95 % confidence interval; band: between"
+            " quartiles"
+            + (". " if within else ", pale band: between the 5 % and 95 % quantiles.")
+            + note,
         )
 
 
@@ -99,7 +101,7 @@ def _densities(result: xr.Dataset, along: str) -> Figure:
     steps = np.unique(np.linspace(0, result.sizes[along] - 1, CURVES).round().astype(int))
     for number, step in enumerate(steps):
         part = result.isel({along: step})
-        label = _shown(result[along].values[step])
+        label = _shown(result[along][step])
         _density_curve(left, _finite(part["critical_stress"]) * 1e-6, label, number)
         _histogram(right, _finite(part["critical_position"]) * 1e3, label, number)
     _finish(left, right)
@@ -139,7 +141,7 @@ def _finish(left: Axes, right: Axes) -> None:
 def _quantiles(result: xr.Dataset, along: str, within: list[str]) -> Figure:
     figure = new_figure(PAGE * 0.75, 3.2)
     axes = figure.subplots()
-    place, ticks = _places(result[along].values)
+    place, ticks = _places(result[along])
     steps: list[int | None] = [None]
     if within:
         last = result.sizes[within[0]] - 1
@@ -149,16 +151,15 @@ def _quantiles(result: xr.Dataset, along: str, within: list[str]) -> Figure:
         label = None
         if step is not None:
             part = part.isel({within[0]: step})
-            label = _shown(result[within[0]].values[step])
+            label = _shown(result[within[0]][step])
         table = _table(part, along)
-        # Neighbouring curves would hide each other's error bars: move them aside a little.
-        here = place + (number - 0.5 * (len(steps) - 1)) * 0.004 * np.ptp(place)
         if step is None:
             axes.fill_between(place, table[0], table[4], color=color(0), alpha=0.12, linewidth=0)
-            axes.fill_between(place, table[1], table[3], color=color(0), alpha=0.25, linewidth=0)
+        band = 0.25 if step is None else 0.12
+        axes.fill_between(place, table[1], table[3], color=color(number), alpha=band, linewidth=0)
         errors = np.abs(table[5:] - table[2])
         axes.errorbar(
-            here, table[2], yerr=errors, capsize=2, label=label, **series(number, marker=True)
+            place, table[2], yerr=errors, capsize=2, label=label, **series(number, marker=True)
         )
     axes.set_xlabel(_label(result[along]))
     axes.set_ylabel("critical stress (MPa)")
@@ -186,11 +187,14 @@ def _table(part: xr.DataArray, along: str) -> NDArray[np.float64]:
     return np.array(columns).T
 
 
-def _places(values: NDArray[Any]) -> tuple[NDArray[np.float64], list[str] | None]:
+def _places(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], list[str] | None]:
     """Where on the axis the steps are, and their names if they are no numbers."""
+    values = coordinate.values
     if values.dtype.kind in "if" and np.unique(values).size == values.size:
-        return values.astype(np.float64), None
-    return np.arange(values.size, dtype=np.float64), [_shown(value) for value in values]
+        return values.astype(np.float64) * _unit(coordinate)[0], None
+    return np.arange(values.size, dtype=np.float64), [
+        _shown(coordinate[i]) for i in range(len(values))
+    ]
 
 
 def _is_log(place: NDArray[np.float64]) -> bool:
@@ -202,15 +206,27 @@ def _is_log(place: NDArray[np.float64]) -> bool:
     return bool(np.std(log) / np.mean(log) < np.std(linear) / np.mean(linear))
 
 
+def _unit(coordinate: xr.DataArray) -> tuple[float, str]:
+    """Factor and unit in which a swept quantity is shown."""
+    unit = str(coordinate.attrs.get("units", "1"))
+    if unit == "m" and np.max(np.abs(coordinate.values)) < 1.0:
+        return 1e3, "mm"
+    if unit == "Pa" and np.max(np.abs(coordinate.values)) >= 1e4:
+        return 1e-6, "MPa"
+    return 1.0, unit
+
+
 def _label(coordinate: xr.DataArray) -> str:
     name = str(coordinate.name).replace("_", " ")
-    unit = coordinate.attrs.get("units", "1")
+    unit = _unit(coordinate)[1]
     return name if unit == "1" else f"{name} ({unit})"
 
 
-def _shown(value: Any) -> str:
-    if isinstance(value, float | np.floating):
-        return f"{value:.4g}"
+def _shown(step: xr.DataArray) -> str:
+    """The value of one step of a sweep."""
+    value = step.item()
+    if isinstance(value, float):
+        return f"{value * _unit(step)[0]:.4g}"
     text = str(value)
     return text if len(text) <= 40 else text[:37] + "..."
 
