@@ -115,18 +115,33 @@ def convolution_time(nodes: int, history: int) -> float:
 def main() -> None:
     """Print the table."""
     print("explicit step at a kernel error of 1e-6, one core, median; times in us")
-    print(f"{'nodes':>6} {'step':>7} {'target':>7} {'4 FFTs':>7} {'pass':>6} {'x floor':>8}"
-          f" {'conv. 1000':>11} {'ratio':>7}")
+    print(
+        f"{'nodes':>6} {'step':>7} {'target':>7} {'4 FFTs':>7} {'pass':>6} {'x floor':>8}"
+        f" {'conv. 1000':>11} {'ratio':>7}"
+    )
     for nodes, target in TARGETS.items():
         step, floor = step_time(nodes), (fft_time(nodes), pass_time(nodes))
         direct = convolution_time(nodes, 1000)
-        print(f"{nodes:6d} {step:7.1f} {target:7.0f} {floor[0]:7.1f} {floor[1]:6.1f} "
-              f"{step / sum(floor):8.2f} {direct:11.0f} {direct / step:7.1f}")
+        print(
+            f"{nodes:6d} {step:7.1f} {target:7.0f} {floor[0]:7.1f} {floor[1]:6.1f} "
+            f"{step / sum(floor):8.2f} {direct:11.0f} {direct / step:7.1f}"
+        )
     early, late = step_time(1024, before=100), step_time(1024, before=1_000_000)
     print(f"1024 nodes: {early:.1f} us after 100 steps, {late:.1f} us after 1,000,000")
     run, state = prepared(1024)
-    arrays = [state.slip, state.rate, state.stress, state.slip_hat, state.memory, state.carried,
-              state.arrival, run.medium.table, run.medium.gain, run.medium.stiffness, run.rows]
+    arrays = [
+        state.slip,
+        state.rate,
+        state.stress,
+        state.slip_hat,
+        state.memory,
+        state.carried,
+        state.arrival,
+        run.medium.table,
+        run.medium.gain,
+        run.medium.stiffness,
+        run.rows,
+    ]
     print(f"memory of a run at 1024 nodes: {sum(a.nbytes for a in arrays) / 1e6:.2f} MB, constant")
 
 

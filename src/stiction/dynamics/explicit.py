@@ -6,7 +6,35 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction.dynamics.layout import advance_memory, pack
-from stiction.dynamics.track import observe
+from stiction.dynamics.track import (
+    ALL_SLID,
+    BAD_NODE,
+    CALM_COUNT,
+    CALM_RATE,
+    CALM_STEPS,
+    DONE,
+    DROP_STOP,
+    DROPPED,
+    EXPLICIT_STEPS,
+    LOAD,
+    LOCAL_STRESS,
+    NOT_FINITE,
+    REC_LOAD,
+    REC_MEAN_SLIP,
+    REC_MEAN_STRESS,
+    REC_STEP,
+    REC_TIME,
+    REC_TOP_RATE,
+    REC_WORK,
+    SLID,
+    SLID_STOP,
+    STEP,
+    TIME,
+    TO_IMPLICIT,
+    TOP_RATE,
+    WORK,
+    observe,
+)
 
 
 @jit
@@ -25,7 +53,7 @@ def load_at(times, values, t):  # type: ignore[no-untyped-def]
 
 @jit
 def _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out):  # type: ignore[no-untyped-def]
-    """Stress transferred along the interface, in Fourier space, if the slip rate acts for a step."""
+    """Stress transferred along the interface, in Fourier space, if the rate acts for a step."""
     pack(rate_hat, packed)
     out[0] = 0.0
     for j in range(out.size - 1):
@@ -87,9 +115,9 @@ def explicit_steps(  # type: ignore[no-untyped-def]
     strength, residual, weakening = rows[0], rows[1], rows[2]
     critical, profile, initial = rows[3], rows[4], rows[5]
     keep = record.shape[0] > 0
-    load_before = watch[1]
+    load_before = watch[LOAD]
     for taken in range(count):
-        time = watch[0] + step
+        time = watch[TIME] + step
         load = load_at(load_times, load_values, time)
         rate_hat = np.fft.rfft(rate)
         _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
@@ -120,10 +148,10 @@ def explicit_steps(  # type: ignore[no-untyped-def]
         if not np.isfinite(total):
             for i in range(n):
                 if not np.isfinite(guess[i]):
-                    watch[15] = i
+                    watch[BAD_NODE] = i
                     break
-            watch[0] = time
-            return taken, 4
+            watch[TIME] = time
+            return taken, NOT_FINITE
         top, node, slip_sum = -1.0, 0, 0.0
         for i in range(n):
             if guess[i] > top:
@@ -139,21 +167,25 @@ def explicit_steps(  # type: ignore[no-untyped-def]
         advance_memory(memory, table, packed, carried, pairs)
         radiated = impedance * total / n
         mean_stress = medium[3] + load * medium[2] - radiated
-        watch[0], watch[1], watch[13], watch[14] = time, load, top, slid
-        watch[2] += work * spacing
-        watch[16] += 1.0
-        watch[20] = step
+        watch[TIME], watch[LOAD], watch[TOP_RATE], watch[SLID] = time, load, top, slid
+        watch[WORK] += work * spacing
+        watch[EXPLICIT_STEPS] += 1.0
+        watch[STEP] = step
         load_before = load
         observe(watch, time, load, mean_stress, radiated, node)
         if keep:
-            record[taken, 0], record[taken, 1], record[taken, 2] = time, load, mean_stress
-            record[taken, 3], record[taken, 4] = slip_sum / n, top
-            record[taken, 5], record[taken, 6] = step, watch[2]
-        if slid >= control[0]:
-            return taken + 1, 1
-        if watch[8] - mean_stress > control[1]:
-            return taken + 1, 5
-        watch[19] = watch[19] + 1.0 if top < control[2] else 0.0
-        if watch[19] >= control[3]:
-            return taken + 1, 3
-    return count, 0
+            record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
+                time,
+                load,
+                mean_stress,
+            )
+            record[taken, REC_MEAN_SLIP], record[taken, REC_TOP_RATE] = slip_sum / n, top
+            record[taken, REC_STEP], record[taken, REC_WORK] = step, watch[WORK]
+        if slid >= control[SLID_STOP]:
+            return taken + 1, ALL_SLID
+        if watch[LOCAL_STRESS] - mean_stress > control[DROP_STOP]:
+            return taken + 1, DROPPED
+        watch[CALM_STEPS] = watch[CALM_STEPS] + 1.0 if top < control[CALM_RATE] else 0.0
+        if watch[CALM_STEPS] >= control[CALM_COUNT]:
+            return taken + 1, TO_IMPLICIT
+    return count, DONE

@@ -7,7 +7,43 @@ import numpy as np
 from stiction._jit import jit
 from stiction.dynamics.complementarity import solve_increment
 from stiction.dynamics.explicit import load_at
-from stiction.dynamics.track import observe
+from stiction.dynamics.track import (
+    ALL_SLID,
+    BAD_NODE,
+    DONE,
+    DROP_STOP,
+    DROPPED,
+    END_TIME,
+    GROWTH,
+    IMPLICIT_STEPS,
+    LARGEST_STEP,
+    LOAD,
+    LOAD_STEP,
+    LOCAL_STRESS,
+    NOT_FINITE,
+    NOTICED,
+    PAST_STEP,
+    RADIATED,
+    REC_LOAD,
+    REC_MEAN_SLIP,
+    REC_MEAN_STRESS,
+    REC_STEP,
+    REC_TIME,
+    REC_TOP_RATE,
+    REC_WORK,
+    REJECTED_STEPS,
+    RESIDUAL,
+    SLID,
+    SLID_STOP,
+    SLIP_STEP,
+    SMALLEST_STEP,
+    STEP,
+    TIME,
+    TO_EXPLICIT,
+    TOP_RATE,
+    WORK,
+    observe,
+)
 
 
 @jit
@@ -110,7 +146,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
 
     Parameters as in `explicit_steps`; `memory` holds psi itself, `step` is the size to try first.
     Second order: the slip rate at the end of a step follows from the mean rates of this step and
-    of the one before (`past`, (nodes,) m/s, of length watch[23]; 0 for none), as in the two-step
+    of the one before (`past`, (nodes,), m/s; none if PAST_STEP is 0), as in the two-step
     backward differences, and the memory sees it rise or fall linearly.
     Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
     stays. A step is repeated at half the size if no slip increments are found (negative
@@ -134,19 +170,19 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         clipped = False
         size = step
         while True:
-            rise = load_at(load_times, load_values, watch[0] + size) - watch[1]
-            if size <= control[6] or abs(rise) <= control[5]:
+            rise = load_at(load_times, load_values, watch[TIME] + size) - watch[LOAD]
+            if size <= control[SMALLEST_STEP] or abs(rise) <= control[LOAD_STEP]:
                 break
             size /= root
             step = size
-        if watch[0] + size > control[9]:
-            size = control[9] - watch[0]
+        if watch[TIME] + size > control[END_TIME]:
+            size = control[END_TIME] - watch[TIME]
             clipped = True
-        if size < control[6] and not clipped:
-            return taken, step, 2
+        if size < control[SMALLEST_STEP] and not clipped:
+            return taken, step, TO_EXPLICIT
         # V at the end = mean + share (mean - past mean); its slope in the step, a second
         # difference of slip, is (mean - past mean) bend.
-        share = size / (size + watch[23]) if watch[23] > 0.0 else 0.0
+        share = size / (size + watch[PAST_STEP]) if watch[PAST_STEP] > 0.0 else 0.0
         bend = 2.0 * share / size
         if size != tabulated:
             tabulate(poles, weights, pace, size, table, tilt, fresh, turn)
@@ -158,7 +194,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             for j in range(modes + 1):
                 inverse[j] = 1.0 / symbol[j]
             tabulated, paired = size, share
-        time = watch[0] + size
+        time = watch[TIME] + size
         load = load_at(load_times, load_values, time)
         _carry(memory, table, weights, carried)
         past_hat = np.fft.rfft(past)
@@ -175,29 +211,31 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             pushed[i] += load * profile[i] + initial[i]
             u[i] = past[i] * size
             state[i] = 1 if rate[i] > 0.0 else 0
-        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, control[7])
+        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, control[RESIDUAL])
         largest, total = 0.0, 0.0
         if solved:
             for i in range(n):
                 largest = max(largest, u[i] / critical[i])
                 total += u[i]
             if not np.isfinite(total):
-                watch[15] = 0.0
-                return taken, step, 4
+                watch[BAD_NODE] = 0.0
+                return taken, step, NOT_FINITE
         radiated = 0.0
         for i in range(n):
             radiated += max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
         radiated *= impedance / n
-        before = watch[22]
-        racing = radiated > control[12] and radiated > control[13] * max(before, control[12])
-        if not solved or largest > 2.0 * control[4] or (racing and share > 0.0):
-            watch[18] += 1.0
+        before = watch[RADIATED]
+        racing = radiated > control[NOTICED] and radiated > control[GROWTH] * max(
+            before, control[NOTICED]
+        )
+        if not solved or largest > 2.0 * control[SLIP_STEP] or (racing and share > 0.0):
+            watch[REJECTED_STEPS] += 1.0
             step = size / 2.0
-            if step < control[6]:
-                return taken, step, 2
+            if step < control[SMALLEST_STEP]:
+                return taken, step, TO_EXPLICIT
             continue
         work, slid, slip_sum, top, node = 0.0, 0, 0.0, -1.0, 0
-        mean_load = 0.5 * (load + watch[1])
+        mean_load = 0.5 * (load + watch[LOAD])
         rate_hat = np.fft.rfft(u)
         for j in range(modes + 1):
             slip_hat[j] += rate_hat[j]
@@ -224,30 +262,34 @@ def implicit_steps(  # type: ignore[no-untyped-def]
                 beyond = slip[i] - 0.5 * critical[i]
                 arrival[i] = time - size * min(1.0, beyond / max(u[i], 1e-300))
         mean_stress = medium[3] + load * medium[2] - radiated
-        watch[0], watch[1], watch[13], watch[14] = time, load, top, slid
-        watch[2] += work * spacing
-        watch[17] += 1.0
-        watch[20] = watch[23] = size
-        watch[22] = radiated
+        watch[TIME], watch[LOAD], watch[TOP_RATE], watch[SLID] = time, load, top, slid
+        watch[WORK] += work * spacing
+        watch[IMPLICIT_STEPS] += 1.0
+        watch[STEP] = watch[PAST_STEP] = size
+        watch[RADIATED] = radiated
         observe(watch, time, load, mean_stress, radiated, node)
         if record.shape[0] > 0:
-            record[taken, 0], record[taken, 1], record[taken, 2] = time, load, mean_stress
-            record[taken, 3], record[taken, 4] = slip_sum / n, top
-            record[taken, 5], record[taken, 6] = size, watch[2]
+            record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
+                time,
+                load,
+                mean_stress,
+            )
+            record[taken, REC_MEAN_SLIP], record[taken, REC_TOP_RATE] = slip_sum / n, top
+            record[taken, REC_STEP], record[taken, REC_WORK] = size, watch[WORK]
         taken += 1
-        if slid >= control[0]:
-            return taken, step, 1
-        if watch[8] - mean_stress > control[1]:
-            return taken, step, 5
-        if clipped or watch[0] >= control[9]:
-            return taken, step, 0
-        growing = radiated > control[12] and radiated > np.sqrt(control[13]) * before
-        if largest > control[4]:
+        if slid >= control[SLID_STOP]:
+            return taken, step, ALL_SLID
+        if watch[LOCAL_STRESS] - mean_stress > control[DROP_STOP]:
+            return taken, step, DROPPED
+        if clipped or watch[TIME] >= control[END_TIME]:
+            return taken, step, DONE
+        growing = radiated > control[NOTICED] and radiated > np.sqrt(control[GROWTH]) * before
+        if largest > control[SLIP_STEP]:
             step = size / root
-        elif largest < 0.25 * control[4] and not growing:
-            step = min(2.0 * size, control[8])
-        elif largest < 0.7 * control[4] and not growing:
-            step = min(root * size, control[8])
-        if step < control[6]:
-            return taken, step, 2
-    return taken, step, 0
+        elif largest < 0.25 * control[SLIP_STEP] and not growing:
+            step = min(2.0 * size, control[LARGEST_STEP])
+        elif largest < 0.7 * control[SLIP_STEP] and not growing:
+            step = min(root * size, control[LARGEST_STEP])
+        if step < control[SMALLEST_STEP]:
+            return taken, step, TO_EXPLICIT
+    return taken, step, DONE

@@ -25,6 +25,7 @@ def uniform_rate(rate: float) -> History:
 
 def _sampled(function: Callable[[float], float], end: float) -> History:
     """Straight pieces that follow a callable, halved until they do."""
+
     def value(t: float) -> float:
         result = float(function(t))
         if not np.isfinite(result):

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def fracture_energy(
-    slip: Floats, strength: Floats, residual: Floats, weakening: Floats
-) -> Floats:
+def fracture_energy(slip: Floats, strength: Floats, residual: Floats, weakening: Floats) -> Floats:
     """Energy dissipated above the residual strength at each node, J/m2.
 
     Parameters

@@ -86,8 +86,9 @@ def prepare_medium(
     wavenumbers = interface.wavenumbers[1:]
     pace = wavenumbers * speed
     table, gain, fresh = step_table(kernel, pace, step)
-    stiffness = 0.5 * np.stack([problem.effective_modulus * wavenumbers,
-                                solid.shear_modulus * wavenumbers])
+    stiffness = 0.5 * np.stack(
+        [problem.effective_modulus * wavenumbers, solid.shear_modulus * wavenumbers]
+    )
     return Medium(
         nodes=interface.nodes,
         spacing=interface.spacing,

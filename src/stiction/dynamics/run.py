@@ -157,9 +157,7 @@ class Run:
         state.watch[track.CALM_STEPS] = 0.0
 
     def _to_implicit(self, state: State) -> None:
-        scale_memory(
-            state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False
-        )
+        scale_memory(state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False)
         state.explicit = False
         state.past = state.rate.copy()
         state.watch[track.PAST_STEP] = 0.0  # the first implicit step is one of first order

@@ -21,9 +21,7 @@ def phi(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return np.where(small, series, np.expm1(safe) / safe)
 
 
-def amplification(
-    kappa: float, kernel: ExponentialSum, stiffness: float
-) -> NDArray[np.float64]:
+def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> NDArray[np.float64]:
     """One predictor-corrector step of a frictionless mode as a matrix, kappa = |k| c_s dt."""
     pairs = kernel.poles.size
     z = kernel.poles * kappa

@@ -112,9 +112,7 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
     try:
         manifest: dict[str, Any] = json.loads((folder / _MANIFEST).read_text())
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"store: {str(folder)!r} is not a streamed rupture ({error})"
-        ) from None
+        raise InputError(f"store: {str(folder)!r} is not a streamed rupture ({error})") from None
     if manifest.get("format") != FORMAT:
         raise InputError(
             f"store: {str(folder)!r} has format version {manifest.get('format')!r}, this version "
@@ -166,7 +164,12 @@ def open_rupture(
     )
     if steps and any("step" in p.sizes for p in parts):
         names = [v for v in STEPS if v in parts[0]]
-        framed = framed.merge(xr.concat([p[names].drop_vars(("time", "x"), errors="ignore")
-                                         for p in parts], dim="step", join="override"))
+        framed = framed.merge(
+            xr.concat(
+                [p[names].drop_vars(("time", "x"), errors="ignore") for p in parts],
+                dim="step",
+                join="override",
+            )
+        )
     framed.attrs = parts[-1].attrs
     return framed

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from stiction._jit import jit
 
-# Fields of the `watch` array; a plain float64 array, so that compiled steps and checkpoints share it.
-TIME, LOAD, WORK, MEAN_STRESS = 0, 1, 2, 3
+# Fields of the `watch` array: plain float64, so that compiled steps and checkpoints share it.
+TIME, LOAD, WORK, MEAN_STRESS = 0, 1, 2, 3  # s, Pa, J/m, Pa
 PEAK_STRESS, PEAK_TIME, PEAK_LOAD, PEAK_NODE = 4, 5, 6, 7
 LOCAL_STRESS, IN_EVENT, FIRST_STRESS, ARRESTED = 8, 9, 10, 11
 EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
@@ -14,7 +14,7 @@ STEP, EVENT_START, RADIATED, PAST_STEP = 20, 21, 22, 23
 FIELDS = 24
 
 # Why a compiled phase returned.
-DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, FULL, NO_SOLUTION = range(8)
+DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED = range(6)
 
 # Columns of the record of every step.
 REC_TIME, REC_LOAD, REC_MEAN_STRESS, REC_MEAN_SLIP, REC_TOP_RATE, REC_STEP, REC_WORK = range(7)
@@ -49,17 +49,22 @@ def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-
     was arrested if the stress radiated by slip, Z <V>, then falls below a tenth of that drop or
     the mean stress rises above that maximum again before the whole interface slides.
     """
-    watch[3] = mean_stress
-    if mean_stress > watch[4]:
-        watch[4], watch[5], watch[6], watch[7] = mean_stress, time, load, node
-    if watch[9] > 0.0:
-        if mean_stress > watch[8] or radiated < 0.1 * watch[12]:
-            watch[9] = 0.0
-            watch[11] += 1.0
-            watch[8] = mean_stress
-    elif mean_stress > watch[8]:
-        watch[8], watch[21] = mean_stress, time
-    elif watch[8] - mean_stress > watch[12]:
-        watch[9] = 1.0
-        if watch[10] < 0.0:
-            watch[10] = watch[8]
+    watch[MEAN_STRESS] = mean_stress
+    if mean_stress > watch[PEAK_STRESS]:
+        watch[PEAK_STRESS], watch[PEAK_TIME], watch[PEAK_LOAD], watch[PEAK_NODE] = (
+            mean_stress,
+            time,
+            load,
+            node,
+        )
+    if watch[IN_EVENT] > 0.0:
+        if mean_stress > watch[LOCAL_STRESS] or radiated < 0.1 * watch[EVENT_DROP]:
+            watch[IN_EVENT] = 0.0
+            watch[ARRESTED] += 1.0
+            watch[LOCAL_STRESS] = mean_stress
+    elif mean_stress > watch[LOCAL_STRESS]:
+        watch[LOCAL_STRESS], watch[EVENT_START] = mean_stress, time
+    elif watch[LOCAL_STRESS] - mean_stress > watch[EVENT_DROP]:
+        watch[IN_EVENT] = 1.0
+        if watch[FIRST_STRESS] < 0.0:
+            watch[FIRST_STRESS] = watch[LOCAL_STRESS]
