@@ -11,6 +11,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
+
+ZERO = np.int64(0)
+"""A zero that is not a literal: numba compiles a kernel again for each literal it is called with."""
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
 from stiction.equilibrium.jump import AT_FLOOR
 from stiction.equilibrium.program import PIVOT, singular_direction
-from stiction.equilibrium.spaces import MOST_MEMBERS
+from stiction.equilibrium.spaces import MOST_MEMBERS, Grid, Room, Sample
 from stiction.equilibrium.stiffness import apply_stiffness
 
 REACHED = 0
@@ -23,9 +25,11 @@ CROWDED = 2
 
 
 @jit
-def build(sample, grid, slip, residual, strength, room):
+def build(
+    sample: Sample, grid: Grid, slip: Array, residual: Array, strength: Array, room: Room
+) -> int:
     """Factor of A on the slipping nodes for their present states; returns how many there are."""
-    count = 0
+    count = ZERO
     for i in range(slip.shape[0]):
         room.inside[i] = slip[i] > 0.0
         residual[i] = room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i]
@@ -38,7 +42,17 @@ def build(sample, grid, slip, residual, strength, room):
 
 
 @jit
-def advance(sample, grid, load, target, slip, stiff, direction, events, room):
+def advance(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    target: float,
+    slip: Array,
+    stiff: Array,
+    direction: Array,
+    events: int,
+    room: Room,
+) -> tuple[float, int]:
     """Follow the stable path from one load towards another.
 
     Parameters
@@ -69,7 +83,7 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
     residual = np.zeros(n, np.bool_)
     strength = np.empty(n)
     own = grid.column[0]
-    size = 0
+    size = ZERO
     rebuild = True
     for _ in range(events):
         if rebuild:
@@ -77,14 +91,14 @@ def advance(sample, grid, load, target, slip, stiff, direction, events, room):
             if count > MOST_MEMBERS:
                 return load, CROWDED
             size = append(
-                room.factor, 0, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+                room.factor, ZERO, room.members, room.order, count, grid.column, room.diagonal, PIVOT
             )
             if size < count:
                 # Stability was lost exactly as the floor was reached.
                 singular_direction(room, size, direction)
                 return load, UNSTABLE
-            extend_forward(room.factor, 0, size, room.members, sample.profile, room.forward[0])
-            extend_forward(room.factor, 0, size, room.members, strength, room.forward[1])
+            extend_forward(room.factor, ZERO, size, room.members, sample.profile, room.forward[0])
+            extend_forward(room.factor, ZERO, size, room.members, strength, room.forward[1])
             rebuild = False
         for t in range(size):
             right[t] = room.forward[0, t]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
-from stiction.equilibrium.bound import window_bound
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO
+from stiction.equilibrium.bound import Windows, window_bound
 from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.program import solve_program
 from stiction.equilibrium.runaway import runs_away
-from stiction.equilibrium.spaces import Sample, make_room
+from stiction.equilibrium.spaces import Grid, Room, Sample, make_room
 from stiction.equilibrium.stiffness import apply_stiffness
 
 LOAD, GAP, PATCHES, POSITION, LENGTH, FATE, STATUS, CUTS, BOUND, SIZE = range(10)
@@ -22,14 +24,22 @@ FLOOR_REACHED = 3
 
 
 @jit
-def certificate(sample, grid, slip, stiff, multiplier, product, room):
+def certificate(
+    sample: Sample,
+    grid: Grid,
+    slip: Array,
+    stiff: Array,
+    multiplier: Array,
+    product: Array,
+    room: Room,
+) -> float:
     """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
 
     K y is left in `product`.
     """
     n = slip.shape[0]
     lower = np.inf
-    count = 0
+    count = ZERO
     values = room.vectors[1]
     for i in range(n):
         balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
@@ -51,7 +61,9 @@ def certificate(sample, grid, slip, stiff, multiplier, product, room):
 
 
 @jit
-def start_from_bound(start, width, mode, multiplier, profile):
+def start_from_bound(
+    start: int, width: int, mode: Array, multiplier: Array, profile: Array
+) -> None:
     """Write the multiplier of a window (or, width 0, of the uniform field), <p, y> = 1."""
     n = multiplier.shape[0]
     if width == 0:
@@ -69,22 +81,23 @@ def start_from_bound(start, width, mode, multiplier, profile):
 
 @jit
 def solve_batch(
-    excess,
-    floor,
-    profile,
-    rate,
-    usual_rate,
-    grid,
-    usual,
-    others,
-    block,
-    reach,
-    spacing,
-    modulus,
-    results,
-    slips,
-    multipliers,
-):
+    excess: Array,
+    floor: Array,
+    profile: Array,
+    rate: Array,
+    usual_rate: float,
+    grid: Grid,
+    wide_column: Array,
+    usual: Windows,
+    others: Windows,
+    block: Array,
+    reach: int,
+    spacing: float,
+    modulus: float,
+    results: Array,
+    slips: Array,
+    multipliers: Array,
+) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
     Parameters
@@ -95,6 +108,8 @@ def solve_batch(
     usual_rate : float
         The problem's uniform weakening rate, or NaN.
     grid : Grid
+    wide_column : (3 n,) array
+        Its column, three times over.
     usual, others : Windows
         For samples with the usual rate everywhere, and for all others.
     block, reach : array and int
@@ -113,13 +128,16 @@ def solve_batch(
     product = np.empty(n)
     critical = np.empty(n)
     work = np.empty((6, n))
-    wide_column = np.concatenate((grid.column, grid.column, grid.column))
     for row in range(samples):
         for i in range(n):
             critical[i] = (excess[row, i] - floor[row, i]) / rate[row, i]
             room.diagonal[i] = grid.column[0] - rate[row, i]
         sample = Sample(excess[row], floor[row], profile, rate[row], critical)
-        windows = usual if np.all(rate[row] == usual_rate) else others
+        windows = usual
+        for i in range(n):
+            if rate[row, i] != usual_rate:
+                windows = others
+                break
         bound, start, choice = window_bound(excess[row], profile, rate[row], windows, work)
         width = 0 if choice < 0 else windows.widths[choice]
         start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, profile)
@@ -134,13 +152,15 @@ def solve_batch(
         line[SIZE] = size
         line[PATCHES] = count_patches(slip)
         line[GAP] = certificate(sample, grid, slip, stiff, multiplier, product, room)
-        first, length, centre = main_patch(multiplier)
+        _, length, centre = main_patch(multiplier)
         line[POSITION] = centre * spacing
         line[LENGTH] = length * spacing
         if slips.shape[0] > 0:
-            slips[row] = slip
+            for i in range(n):
+                slips[row, i] = slip[i]
         if multipliers.shape[0] > 0:
-            multipliers[row] = multiplier
+            for i in range(n):
+                multipliers[row, i] = multiplier[i]
         line[FATE] = UNDECIDED
         for i in range(n):
             if slip[i] > critical[i] * (2.0 - AT_FLOOR):

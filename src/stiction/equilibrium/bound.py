@@ -1,8 +1,8 @@
 """The discrete local criterion: the lowest window that is unstable by itself bounds the onset.
 
-A window of w nodes is unstable if the smallest eigenvalue of its block of K is at most the weakening
-rate in it. The eigenvector y is positive, A y <= 0, so <s, y>/<p, y> bounds the critical load from
-above: the grid's form of the criterion of Uenishi and Rice (2003), and strict on the grid.
+A window of w nodes is unstable if the smallest eigenvalue of its block of K is at most the
+weakening rate in it. The eigenvector y is positive, A y <= 0, so <s, y>/<p, y> bounds the critical
+load from above: the criterion of Uenishi and Rice (2003) in the form that is strict on the grid.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.equilibrium.stiffness import stiffness_column
-
-Array = NDArray[np.float64]
 
 GROWTH = 1.04
 """Ratio of successive widths tried where the weakening rate varies."""
@@ -131,7 +130,9 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
 
 
 @jit
-def window_bound(excess, profile, rate, windows, work):
+def window_bound(
+    excess: Array, profile: Array, rate: Array, windows: Windows, work: Array
+) -> tuple[float, int, int]:
     """Lowest bound over all windows and the uniform field.
 
     Parameters
@@ -147,11 +148,18 @@ def window_bound(excess, profile, rate, windows, work):
         Load (Pa), first node of the window, and its number; -1 is the uniform field.
     """
     n = excess.shape[0]
-    best = excess.sum() / profile.sum()
     start = 0
     choice = -1
-    lowest = rate.min()
-    highest = rate.max()
+    above_all = 0.0
+    below_all = 0.0
+    lowest = rate[0]
+    highest = rate[0]
+    for i in range(n):
+        above_all += excess[i]
+        below_all += profile[i]
+        lowest = min(lowest, rate[i])
+        highest = max(highest, rate[i])
+    best = above_all / below_all
     thresholds = windows.thresholds
     modes = windows.modes
     for c in range(thresholds.shape[0]):

@@ -7,6 +7,7 @@ numbers: half the memory of a square, and no two rows compete for the same cache
 from __future__ import annotations
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.equilibrium._compile import jit_sums
 
 GROUP = 4
@@ -14,14 +15,14 @@ GROUP = 4
 
 
 @jit
-def row_start(row):
+def row_start(row: int) -> int:
     """Where a row begins in the flat array."""
     block = row >> 3
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
 @jit_sums
-def _dot(first, second, count):
+def _dot(first: Array, second: Array, count: int) -> float:
     total = 0.0
     for t in range(count):
         total += first[t] * second[t]
@@ -29,7 +30,7 @@ def _dot(first, second, count):
 
 
 @jit_sums
-def _solve_one(factor, start, size):
+def _solve_one(factor: Array, start: int, size: int) -> None:
     """Forward substitution of one new row, in place."""
     row = factor[start : start + size]
     for k in range(size):
@@ -42,7 +43,7 @@ def _solve_one(factor, start, size):
 
 
 @jit_sums
-def _solve_four(factor, size):
+def _solve_four(factor: Array, size: int) -> None:
     """Forward substitution of four new rows that follow row `size` - 1, in place.
 
     Two columns at a time: eight running sums keep the processor's vector units busy.
@@ -102,7 +103,16 @@ def _solve_four(factor, size):
 
 
 @jit
-def append(factor, size, members, nodes, count, coupling, diagonal, tolerance):
+def append(
+    factor: Array,
+    size: int,
+    members: Array,
+    nodes: Array,
+    count: int,
+    coupling: Array,
+    diagonal: Array,
+    tolerance: float,
+) -> int:
     """Append nodes to the factor of A on the members, until done or a pivot fails.
 
     Parameters
@@ -163,7 +173,9 @@ def append(factor, size, members, nodes, count, coupling, diagonal, tolerance):
 
 
 @jit
-def extend_forward(factor, first, last, members, values, forward):
+def extend_forward(
+    factor: Array, first: int, last: int, members: Array, values: Array, forward: Array
+) -> None:
     """Forward substitution of node values, for rows first..last-1 of the factor."""
     for r in range(first, last):
         start = row_start(r)
@@ -172,7 +184,7 @@ def extend_forward(factor, first, last, members, values, forward):
 
 
 @jit_sums
-def substitute(factor, size, values, forward):
+def substitute(factor: Array, size: int, values: Array, forward: Array) -> None:
     """Solve L forward = values, both in the order of the rows."""
     for r in range(size):
         start = row_start(r)
@@ -184,7 +196,7 @@ def substitute(factor, size, values, forward):
 
 
 @jit_sums
-def back_substitute(factor, size, right, solution):
+def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> None:
     """Solve L^T solution = right, rows of L taken four at a time; `right` is used up."""
     i = size
     while i >= 4:

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
 from stiction.equilibrium.program import (
     PIVOT,
@@ -19,7 +21,7 @@ from stiction.equilibrium.program import (
     singular_direction,
     stress_tolerance,
 )
-from stiction.equilibrium.spaces import MOST_MEMBERS, make_room
+from stiction.equilibrium.spaces import MOST_MEMBERS, Grid, Room, Sample, make_room
 from stiction.equilibrium.stiffness import apply_stiffness
 
 SLIDING = 0
@@ -34,7 +36,7 @@ AT_FLOOR = 1.0 - 1e-12
 
 
 @jit
-def strength_at(sample, slip, i):
+def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip."""
     if slip[i] >= AT_FLOOR * sample.critical[i]:
         return sample.floor[i]
@@ -42,7 +44,7 @@ def strength_at(sample, slip, i):
 
 
 @jit
-def step_to_floor(sample, slip, direction, longest):
+def step_to_floor(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
     """Move along a direction until the first node reaches its floor, at most `longest` of it."""
     step = longest
     for i in range(slip.shape[0]):
@@ -56,7 +58,7 @@ def step_to_floor(sample, slip, direction, longest):
 
 
 @jit
-def escape_run(sample, load, spacing, modulus):
+def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> float:
     """Nodes of residual strength in a row that no fracture energy of the interface can stop.
 
     A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith);
@@ -74,7 +76,7 @@ def escape_run(sample, load, spacing, modulus):
 
 
 @jit
-def longest_floor_run(sample, slip):
+def longest_floor_run(sample: Sample, slip: Array) -> int:
     """Longest run of residual nodes on the circle."""
     n = slip.shape[0]
     longest = 0
@@ -87,7 +89,7 @@ def longest_floor_run(sample, slip):
 
 
 @jit
-def unsupported(sample, load, slip):
+def unsupported(sample: Sample, load: float, slip: Array) -> bool:
     """Whether the whole interface, at its present strengths, cannot carry the load."""
     balance = 0.0
     for i in range(slip.shape[0]):
@@ -96,7 +98,16 @@ def unsupported(sample, load, slip):
 
 
 @jit
-def relax(sample, grid, load, slip, stiff, room, size, tolerance):
+def relax(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    room: Room,
+    size: int,
+    tolerance: float,
+) -> int:
     """One elastic step with frozen strengths, then the nodes it overstresses join.
 
     Returns as `join` does.
@@ -107,7 +118,7 @@ def relax(sample, grid, load, slip, stiff, room, size, tolerance):
     for t in range(size):
         i = room.members[t]
         drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
-    extend_forward(room.factor, 0, size, room.members, drive, room.forward[0])
+    extend_forward(room.factor, ZERO, size, room.members, drive, room.forward[0])
     for t in range(size):
         right[t] = room.forward[0, t]
     back_substitute(room.factor, size, right, solution)
@@ -115,14 +126,14 @@ def relax(sample, grid, load, slip, stiff, room, size, tolerance):
         i = room.members[t]
         slip[i] = max(slip[i], solution[t])
         solution[t] = slip[i]
-    apply_stiffness(
-        grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff
-    )
+    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
     return join(sample, grid, load, stiff, room, size, tolerance)
 
 
 @jit
-def join(sample, grid, load, stiff, room, size, tolerance):
+def join(
+    sample: Sample, grid: Grid, load: float, stiff: Array, room: Room, size: int, tolerance: float
+) -> int:
     """Append the overstressed nodes to the elastic factor.
 
     Returns the members now, ALL if nothing remains at rest, CROWDED if there is no room for them.
@@ -143,7 +154,16 @@ def join(sample, grid, load, stiff, room, size, tolerance):
 
 
 @jit
-def settle(sample, grid, load, slip, stiff, room, other, size):
+def settle(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    room: Room,
+    other: Room,
+    size: int,
+) -> int:
     """One step with the true states: along the unstable direction, or towards equilibrium.
 
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
@@ -156,7 +176,7 @@ def settle(sample, grid, load, slip, stiff, room, other, size):
         residual = slip[i] >= AT_FLOOR * sample.critical[i]
         other.diagonal[i] = grid.column[0] - (0.0 if residual else sample.rate[i])
     now = append(
-        other.factor, 0, other.members, other.order, size, grid.column, other.diagonal, PIVOT
+        other.factor, ZERO, other.members, other.order, size, grid.column, other.diagonal, PIVOT
     )
     direction = other.vectors[3]
     longest = 1.0
@@ -167,7 +187,7 @@ def settle(sample, grid, load, slip, stiff, room, other, size):
         drive = other.vectors[2]
         for i in range(n):
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-        extend_forward(other.factor, 0, size, other.members, drive, other.forward[0])
+        extend_forward(other.factor, ZERO, size, other.members, drive, other.forward[0])
         right = other.vectors[0]
         solution = other.vectors[1]
         for t in range(size):
@@ -182,14 +202,23 @@ def settle(sample, grid, load, slip, stiff, room, other, size):
     solution = room.vectors[1]
     for t in range(size):
         solution[t] = slip[room.members[t]]
-    apply_stiffness(
-        grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff
-    )
+    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
     return ARRESTED if step == 1.0 and longest == 1.0 else UNDECIDED
 
 
 @jit
-def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room):
+def jump(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    direction: Array,
+    escape: float,
+    steps: int,
+    exact: bool,
+    room: Room,
+) -> int:
     """Follow an instability at a fixed load to the next least equilibrium, or to none.
 
     Parameters
@@ -220,7 +249,7 @@ def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room)
     if not np.isfinite(step_to_floor(sample, slip, direction, np.inf)):
         return SLIDING
     room.diagonal[:] = grid.column[0]
-    count = 0
+    count = ZERO
     for i in range(n):
         room.inside[i] = slip[i] > 0.0
         if room.inside[i]:
@@ -229,7 +258,7 @@ def jump(sample, grid, load, slip, stiff, direction, escape, steps, exact, room)
     if count > MOST_MEMBERS:
         return UNDECIDED
     size = append(
-        room.factor, 0, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+        room.factor, ZERO, room.members, room.order, count, grid.column, room.diagonal, PIVOT
     )
     if size < count:
         return SLIDING

@@ -49,7 +49,12 @@ class Solution:
 
 
 def window_solution(
-    excess: Array, profile: Array, diagonal: Array, grid: Grid, centre: int, bound: float,
+    excess: Array,
+    profile: Array,
+    diagonal: Array,
+    grid: Grid,
+    centre: int,
+    bound: float,
     multiplier: Array,
 ) -> tuple[float, Array, Array]:
     """Critical load of a window if nothing outside slips, its multiplier and slipping nodes."""
@@ -70,9 +75,7 @@ def window_solution(
     local[:WINDOW] = multiplier[nodes]
     slip, stiff = np.empty(2 * WINDOW), np.empty(2 * WINDOW)
     small = Grid(column, coupling_strip(column))
-    load, _, _, _ = solve_program(
-        strength, load_profile, small, bound, np.inf, local, slip, stiff, room
-    )
+    solve_program(strength, load_profile, small, bound, np.inf, local, slip, stiff, room)
     result = np.zeros(n)
     result[nodes] = local[:WINDOW]
     result /= result @ profile
@@ -83,8 +86,14 @@ class LargeProgram:
     """One sample on a large grid; arguments as of `solve_program`."""
 
     def __init__(
-        self, excess: Array, profile: Array, rate: Array, grid: Grid, bound: float,
-        multiplier: Array, cap: float = np.inf,
+        self,
+        excess: Array,
+        profile: Array,
+        rate: Array,
+        grid: Grid,
+        bound: float,
+        multiplier: Array,
+        cap: float = np.inf,
     ) -> None:
         n = excess.shape[0]
         self.excess, self.profile, self.rate = excess, profile, rate

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from stiction._jit import jit
+from stiction._typing import Array
 
 
 @jit
-def count_patches(slip):
+def count_patches(slip: Array) -> int:
     """Number of runs of slipping nodes on the circle."""
     n = slip.shape[0]
     count = 0
@@ -19,7 +20,7 @@ def count_patches(slip):
 
 
 @jit
-def main_patch(field):
+def main_patch(field: Array) -> tuple[int, int, float]:
     """First node, length and centroid (in nodes, from 0 to n) of the run with the largest entry.
 
     Parameters

@@ -10,8 +10,10 @@ there. A load that is an upper bound and has an equilibrium is the critical one.
 from __future__ import annotations
 
 from stiction._jit import jit
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
-from stiction.equilibrium.spaces import MOST_MEMBERS
+from stiction.equilibrium.spaces import MOST_MEMBERS, Grid, Room
 from stiction.equilibrium.stiffness import apply_stiffness
 
 SOLVED = 0
@@ -26,8 +28,8 @@ PASSES = 10_000
 
 
 @jit
-def sort_by(keys, order, count):
-    """Sort `order[:count]` by rising `keys[:count]`, both in place (Shell's method, Ciura's gaps)."""
+def sort_by(keys: Array, order: Array, count: int) -> None:
+    """Sort `order[:count]` by rising `keys[:count]`, both in place (Shell, Ciura's gaps)."""
     for gap in (1750, 701, 301, 132, 57, 23, 10, 4, 1):
         for i in range(gap, count):
             key = keys[i]
@@ -42,7 +44,7 @@ def sort_by(keys, order, count):
 
 
 @jit
-def solve_forward(room, size, load, solution):
+def solve_forward(room: Room, size: int, load: float, solution: Array) -> None:
     """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
     right = room.vectors[0]
     for t in range(size):
@@ -51,7 +53,7 @@ def solve_forward(room, size, load, solution):
 
 
 @jit
-def singular_direction(room, size, direction):
+def singular_direction(room: Room, size: int, direction: Array) -> None:
     """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
 
     It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
@@ -70,9 +72,11 @@ def singular_direction(room, size, direction):
 
 
 @jit
-def overstressed(load, excess, profile, stiff, room, tolerance):
+def overstressed(
+    load: float, excess: Array, profile: Array, stiff: Array, room: Room, tolerance: float
+) -> int:
     """Nodes at rest above their strength, most overstressed first; returns how many."""
-    count = 0
+    count = ZERO
     keys = room.vectors[2]
     for i in range(excess.shape[0]):
         margin = excess[i] - load * profile[i] + stiff[i]
@@ -85,7 +89,7 @@ def overstressed(load, excess, profile, stiff, room, tolerance):
 
 
 @jit
-def stress_tolerance(excess, profile, load):
+def stress_tolerance(excess: Array, profile: Array, load: float) -> float:
     """Overstress, Pa, that is round-off."""
     scale = 0.0
     for i in range(excess.shape[0]):
@@ -94,7 +98,16 @@ def stress_tolerance(excess, profile, load):
 
 
 @jit
-def back_off(load, excess, profile, grid, room, size, solution, stiff):
+def back_off(
+    load: float,
+    excess: Array,
+    profile: Array,
+    grid: Grid,
+    room: Room,
+    size: int,
+    solution: Array,
+    stiff: Array,
+) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
@@ -117,7 +130,17 @@ def back_off(load, excess, profile, grid, room, size, solution, stiff):
 
 
 @jit
-def solve_program(excess, profile, grid, bound, cap, multiplier, slip, stiff, room):
+def solve_program(
+    excess: Array,
+    profile: Array,
+    grid: Grid,
+    bound: float,
+    cap: float,
+    multiplier: Array,
+    slip: Array,
+    stiff: Array,
+    room: Room,
+) -> tuple[float, int, int, int]:
     """Critical load with slip and multiplier, from an upper bound and its multiplier.
 
     Parameters
@@ -150,7 +173,7 @@ def solve_program(excess, profile, grid, bound, cap, multiplier, slip, stiff, ro
     own = grid.column[0]
     inside[:] = False
     stiff[:] = 0.0
-    size = 0
+    size = ZERO
     cuts = 0
     status = STALLED
     for _ in range(PASSES):

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
-from stiction.equilibrium._compile import jit_sums
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO, jit_sums
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
 from stiction.equilibrium.jump import (
     AT_FLOOR,
@@ -21,6 +22,7 @@ from stiction.equilibrium.jump import (
     strength_at,
 )
 from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.spaces import Sample
 
 STEPS = 30
 """Elastic steps; most samples need five to eight."""
@@ -29,18 +31,18 @@ SHARE = 1e-3
 
 
 @jit
-def block_factor(column, width):
+def block_factor(column: Array, width: int) -> Array:
     """Cholesky factor of the leading block of K, for runs of up to `width` nodes."""
     factor = np.empty(row_start(width + 4))
     members = np.empty(width + 4, np.int64)
     nodes = np.arange(width)
     diagonal = np.full(column.shape[0], column[0])
-    append(factor, 0, members, nodes, width, column, diagonal, 0.0)
+    append(factor, ZERO, members, nodes, width, column, diagonal, 0.0)
     return factor
 
 
 @jit_sums
-def _add_scaled(target, source, first, count, factor):
+def _add_scaled(target: Array, source: Array, first: int, count: int, factor: float) -> None:
     part = source[first : first + count]
     for i in range(count):
         target[i] += factor * part[i]
@@ -48,8 +50,18 @@ def _add_scaled(target, source, first, count, factor):
 
 @jit
 def runs_away(
-    sample, wide_column, load, slip, stiff, direction, stiff_direction, escape, factor, width, work
-):
+    sample: Sample,
+    wide_column: Array,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    direction: Array,
+    stiff_direction: Array,
+    escape: float,
+    factor: Array,
+    width: int,
+    work: Array,
+) -> int:
     """Whether the patch of an instability certainly becomes global sliding.
 
     Parameters

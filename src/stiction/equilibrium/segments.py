@@ -5,14 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
 from stiction.equilibrium.program import PIVOT
 
 
 @jit
 def append_by_segment(
-    factors, members, sizes, inside, origin, width, nodes, column, diagonal, order
-):
+    factors: Array,
+    members: Array,
+    sizes: Array,
+    inside: Array,
+    origin: int,
+    width: int,
+    nodes: Array,
+    column: Array,
+    diagonal: Array,
+    order: Array,
+) -> int:
     """Append nodes, in the order given, to the factors of their segments.
 
     Parameters
@@ -55,7 +65,16 @@ def append_by_segment(
 
 
 @jit
-def precondition(factors, members, sizes, values, result, right, forward, solution):
+def precondition(
+    factors: Array,
+    members: Array,
+    sizes: Array,
+    values: Array,
+    result: Array,
+    right: Array,
+    forward: Array,
+    solution: Array,
+) -> None:
     """Solve the block-diagonal part of A on the slipping nodes; zero elsewhere."""
     result[:] = 0.0
     for segment in range(sizes.shape[0]):
@@ -83,7 +102,7 @@ class Segments:
         Nodes of a segment.
     """
 
-    def __init__(self, column, diagonal, origin: int, width: int) -> None:
+    def __init__(self, column: Array, diagonal: Array, origin: int, width: int) -> None:
         n = column.shape[0]
         count = -(-n // width)
         self.column, self.diagonal = column, diagonal
@@ -95,7 +114,7 @@ class Segments:
         self._order = np.empty(width + 4, dtype=np.int64)
         self._room = np.empty((3, width + 4))
 
-    def append(self, nodes) -> int:
+    def append(self, nodes: Array) -> int:
         """Append nodes in this order; the segment that fails, or -1."""
         failed: int = append_by_segment(
             self.factors, self.members, self.sizes, self.inside, self.origin, self.width,
@@ -103,14 +122,14 @@ class Segments:
         )  # fmt: skip
         return failed
 
-    def truncate(self, sizes) -> None:
+    def truncate(self, sizes: Array) -> None:
         """Go back to earlier sizes."""
         self.sizes[:] = sizes
         self.inside[:] = False
         for segment, size in enumerate(sizes):
             self.inside[self.members[segment, :size]] = True
 
-    def remove(self, negative) -> None:
+    def remove(self, negative: Array) -> None:
         """Take out the marked nodes; factors of their segments are rebuilt from there on."""
         again = []
         sizes = self.sizes.copy()
@@ -125,7 +144,7 @@ class Segments:
         if again:
             self.append(np.concatenate(again))
 
-    def solve(self, values):
+    def solve(self, values: Array) -> Array:
         """The preconditioner applied to a field."""
         result = np.empty_like(values)
         precondition(

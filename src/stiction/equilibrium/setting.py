@@ -47,6 +47,7 @@ class Setting:
         self.unit = np.pi * self.modulus / problem.interface.length
         column = stiffness_column(self.nodes, problem.interface.length, self.modulus)
         self.grid = Grid(column, coupling_strip(column))
+        self.wide_column = np.tile(column, 3)
         self.profile = np.array(
             np.broadcast_to(problem.load.profile, (self.nodes,)), dtype=np.float64
         )
@@ -84,9 +85,7 @@ class Setting:
             return False
         return bool(np.count_nonzero(excess < bound.load * self.profile) > MANY_NODES)
 
-    def programme(
-        self, excess: Array, rate: Array, cap: float = np.inf
-    ) -> Solution | None:
+    def programme(self, excess: Array, rate: Array, cap: float = np.inf) -> Solution | None:
         """Critical load, slip and multiplier of one sample (below `cap`), or None if it stalled.
 
         Parameters

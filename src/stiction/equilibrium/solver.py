@@ -93,12 +93,12 @@ class Solver:
         events: dict[int, list[Event]] = {}
         residual = np.zeros(count, dtype=np.bool_)
         sliding_at = table[:, batch.POSITION].copy()
-        for row in np.flatnonzero(fate != SLIDING):
+        for row in map(int, np.flatnonzero(fate != SLIDING)):
             sample = sample_of(rows, row)
             state = self.follow_row(sample, bool(fate[row] == batch.FLOOR_REACHED))
             load[row] = state.load
             if state.events:
-                events[int(row)] = state.events
+                events[row] = state.events
             residual[row] = bool(residual_nodes(sample, state.slip).any())
             if state.direction.any():
                 sliding_at[row] = main_patch(state.direction)[2] * rows.spacing
@@ -145,14 +145,12 @@ class Solver:
         solve_batch(
             np.ascontiguousarray(rows.strength - rows.initial_stress),
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-            setting.profile, rate, setting.usual_rate, setting.grid, setting.usual,
+            setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column, setting.usual,
             setting.windows(unusual), setting.block, setting.reach, setting.spacing,
             setting.modulus, table, slips, multipliers,
         )  # fmt: skip
 
-    def _one(
-        self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array
-    ) -> None:
+    def _one(self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array) -> None:
         """Solve the programme of one row on a large grid, and test quickly for arrest."""
         setting = self.setting
         sample = sample_of(rows, row)
@@ -170,9 +168,7 @@ class Solver:
         line[batch.CUTS] = solution.cuts
         line[batch.PATCHES] = count_patches(solution.slip)
         stiff_multiplier = np.empty(setting.nodes)
-        line[batch.GAP] = setting.gap(
-            sample.excess, sample.rate, solution, stiff_multiplier
-        )
+        line[batch.GAP] = setting.gap(sample.excess, sample.rate, solution, stiff_multiplier)
         _, length, centre = main_patch(solution.multiplier)
         line[batch.POSITION] = centre * setting.spacing
         line[batch.LENGTH] = length * setting.spacing
@@ -180,15 +176,13 @@ class Solver:
             line[batch.FATE] = batch.FLOOR_REACHED
             return
         line[batch.FATE] = runs_away(
-            sample, np.tile(setting.grid.column, 3), solution.load, solution.slip.copy(),
+            sample, setting.wide_column, solution.load, solution.slip.copy(),
             solution.stiff.copy(), solution.multiplier, stiff_multiplier,
             escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
             setting.reach, np.empty((6, setting.nodes)),
         )  # fmt: skip
 
-    def _rewrite(
-        self, sample: Sample, state: State, line: Array, multiplier: Array
-    ) -> None:
+    def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""
         residual = residual_nodes(sample, state.slip)
         multiplier[:] = state.direction / max(state.direction @ sample.profile, 1e-300)

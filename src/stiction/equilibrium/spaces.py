@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.equilibrium.cholesky import row_start
-
-Array = NDArray[np.float64]
 
 
 class Sample(NamedTuple):
@@ -57,7 +56,7 @@ MOST_MEMBERS = 8192
 
 
 @jit
-def make_room(n):
+def make_room(n: int) -> Room:
     """Room for samples of n nodes. Pages of the factor that are never used cost no memory."""
     capacity = min(n, MOST_MEMBERS)
     return Room(

@@ -10,13 +10,13 @@ so that nodes of one parity act on those of the other only: half of each product
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
-from stiction.equilibrium._compile import jit_sums
+from stiction._typing import Array
+from stiction.equilibrium._compile import ZERO, jit_sums
 
 
-def stiffness_column(nodes: int, length: float, modulus: float) -> NDArray[np.float64]:
+def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     """First column of K, shape (nodes,), Pa/m.
 
     Parameters
@@ -36,13 +36,25 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> NDArray[np.fl
     return column
 
 
-def coupling_strip(column: NDArray[np.float64]) -> NDArray[np.float64]:
+def coupling_strip(column: Array) -> Array:
     """Odd entries of K's first column, three times over, for products without index arithmetic."""
     return np.ascontiguousarray(np.tile(column[1::2], 3))
 
 
 @jit_sums
-def _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3):
+def _add_four(
+    target: Array,
+    strip: Array,
+    half: int,
+    p0: int,
+    p1: int,
+    p2: int,
+    p3: int,
+    z0: float,
+    z1: float,
+    z2: float,
+    z3: float,
+) -> None:
     a = strip[p0 : p0 + half]
     b = strip[p1 : p1 + half]
     c = strip[p2 : p2 + half]
@@ -52,7 +64,9 @@ def _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3):
 
 
 @jit
-def apply_stiffness(strip, own, members, size, values, halves, result):
+def apply_stiffness(
+    strip: Array, own: float, members: Array, size: int, values: Array, halves: Array, result: Array
+) -> None:
     """K times a field that vanishes off the members, at all nodes.
 
     Parameters
@@ -74,7 +88,7 @@ def apply_stiffness(strip, own, members, size, values, halves, result):
         # Sources of this parity act on targets of the other one.
         target = halves[1 - parity]
         held = 0
-        p0 = p1 = p2 = p3 = 0
+        p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
         for t in range(size):
             node = members[t]

@@ -1,0 +1,131 @@
+"""Equilibrium: closed forms, and the conditions of optimality checked with independent products."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.equilibrium.bound import smallest_window, window_mode
+from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
+from stiction.equilibrium.method import Equilibrium
+from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.stiffness import apply_stiffness, coupling_strip, stiffness_column
+
+
+def stiffness_times(problem, field):
+    """K d by the definition of K: the symbol (G*/2)|k|."""
+    symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
+    return np.fft.irfft(symbol * np.fft.rfft(field), problem.interface.nodes)
+
+
+def test_closed_form_of_the_stiffness(problem):
+    column = stiffness_column(256, 0.1, problem.effective_modulus)
+    unit = np.zeros(256)
+    unit[0] = 1.0
+    # Both have a few units of round-off in sums of 256 terms.
+    np.testing.assert_allclose(column, stiffness_times(problem, unit), atol=1e-14 * column[0])
+
+
+def test_sparse_product_with_the_stiffness(problem):
+    rng = np.random.default_rng(1)
+    members = rng.choice(256, 77, replace=False)
+    values = rng.standard_normal(77)
+    field = np.zeros(256)
+    field[members] = values
+    column = stiffness_column(256, 0.1, problem.effective_modulus)
+    result = np.empty(256)
+    apply_stiffness(
+        coupling_strip(column), column[0], members, 77, values, np.empty((2, 128)), result
+    )
+    np.testing.assert_allclose(result, stiffness_times(problem, field), atol=1e-13 * column[0])
+
+
+@pytest.mark.parametrize("groups", [[41], [1] * 41, [5, 17, 2, 17]])
+def test_growing_factor_is_the_cholesky_factor(groups):
+    column = stiffness_column(256, 0.1, 1e9)
+    nodes = np.random.default_rng(2).permutation(256)[: sum(groups)]
+    matrix = column[np.abs(nodes[:, None] - nodes)]
+    factor = np.empty(row_start(260))
+    members = np.empty(260, dtype=np.int64)
+    size = 0
+    for group in groups:
+        size = append(
+            factor, size, members, nodes[size:].copy(), group, column, np.full(256, column[0]), 0.0
+        )
+    reference = np.linalg.cholesky(matrix)
+    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(size)]
+    ours = np.array([np.pad(row, (0, size - row.size)) for row in rows])
+    np.testing.assert_allclose(ours, reference, atol=1e-12 * reference.max())
+    forward, solution = np.empty(size), np.empty(size)
+    substitute(factor, size, np.ones(size), forward)
+    back_substitute(factor, size, forward, solution)
+    # The condition number is below 100, so that 1e-12 is generous.
+    np.testing.assert_allclose(matrix @ solution, 1.0, atol=1e-12)
+
+
+def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
+    nodes = 256
+    rate = 12.0  # in units of (G*/2)(2 pi/L)
+    width = smallest_window(nodes, rate)
+    assert window_mode(nodes, width)[0] <= rate < window_mode(nodes, width - 1)[0]
+    column = stiffness_column(nodes, np.pi, 1.0)
+    factor = np.empty(row_start(nodes + 4))
+    members = np.empty(nodes + 4, dtype=np.int64)
+    size = append(
+        factor, 0, members, np.arange(nodes), nodes, column, np.full(nodes, column[0] - rate), 0.0
+    )
+    assert size == width - 1
+
+
+def test_uniform_strength_holds_until_every_node_is_at_it(problem):
+    onset = st.onset(problem, np.full(256, 0.9e6), method=Equilibrium(sensitivity=True))
+    assert onset.critical_load.item() == pytest.approx(0.9e6, rel=1e-14)
+    assert onset.slip_patches.item() == 0
+    assert onset.arrested_events.item() == 0
+    assert not onset.residual_reached.item()
+
+
+@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
+def test_conditions_of_optimality(problem, make_strength, ratio):
+    tau_p = make_strength(ratio).sample(problem.interface, samples=20, seed=3)
+    onset = st.onset(problem, tau_p, method=Equilibrium(sensitivity=True, slip=True))
+    rate = problem.friction.weakening_rate
+    for sample in range(20):
+        one = onset.isel(sample=sample)
+        load, slip, y = one.first_instability.item(), one.slip.values, one.sensitivity.values
+        balance = tau_p[sample] - load + stiffness_times(problem, slip) - rate * slip
+        assert slip.min() >= 0.0
+        assert y.min() >= 0.0
+        # 1e-11 of the strength: round-off of K d, K d being ten times the strength.
+        assert balance.min() > -1e-11 * load
+        assert np.abs(balance[slip > 0.0]).max() < 1e-11 * load
+        assert (stiffness_times(problem, y) - rate * y).max() < 1e-11 * rate * y.max()
+        assert y.sum() == pytest.approx(1.0, rel=1e-13)
+        assert y @ tau_p[sample] == pytest.approx(load, rel=1e-11)
+        assert one.certificate_gap.item() < 1e-9 * load
+
+
+def test_gradient_is_the_sensitivity(problem, make_strength):
+    tau_p = make_strength(0.25).sample(problem.interface, samples=3, seed=5)
+    method = Equilibrium(sensitivity=True)
+    rng = np.random.default_rng(0)
+    for profile in tau_p:
+        y = st.onset(problem, profile, method=method).sensitivity.values[0]
+        change = rng.standard_normal(256) * (y > 0.0)
+        step = 1.0  # Pa: small enough not to change which nodes slip, large against round-off
+        both = np.array([profile + step * change, profile - step * change])
+        plus, minus = st.onset(problem, both, method=method).first_instability.values
+        # The onset is piecewise linear in the strength: round-off 1e-10 Pa over a step of 1 Pa.
+        assert (plus - minus) / (2.0 * step) == pytest.approx(y @ change, abs=1e-6)
+
+
+def test_patches_on_the_circle():
+    slip = np.array([1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0])
+    assert count_patches(slip) == 2
+    assert count_patches(np.zeros(8)) == 0
+    assert count_patches(np.ones(8)) == 1
+    y = np.array([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0])
+    first, length, centre = main_patch(y)
+    assert (first, length) == (7, 3)
+    assert centre == pytest.approx(0.0)

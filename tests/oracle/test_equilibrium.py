@@ -1,0 +1,218 @@
+"""Equilibrium against other algorithms: HiGHS, path following, conjugate gradients, relaxation."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.linalg import circulant
+from scipy.optimize import linprog
+
+import stiction as st
+from stiction.equilibrium.advance import UNSTABLE, advance
+from stiction.equilibrium.events import equilibrium_events
+from stiction.equilibrium.follow import at_rest
+from stiction.equilibrium.large import LargeProgram
+from stiction.equilibrium.method import Equilibrium
+from stiction.equilibrium.path import equilibrium_path
+from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.solver import sample_of
+from stiction.equilibrium.spaces import make_room
+from stiction.equilibrium.stiffness import stiffness_column
+
+
+def by_linear_programme(problem, strength, rate=None):
+    """max tau_0: (K - W) d + s - tau_0 p >= 0, d >= 0, by the simplex method of HiGHS."""
+    n = problem.interface.nodes
+    if rate is None:
+        rate = problem.friction.weakening_rate
+    column = stiffness_column(n, problem.interface.length, problem.effective_modulus)
+    unit = float(np.max(rate))  # slip in units that make the matrix of order one
+    matrix = (circulant(column) - np.diag(np.broadcast_to(rate, n))) / unit
+    profile = np.broadcast_to(problem.load.profile, n)
+    excess = (strength - problem.load.initial_stress) / 1e6
+    # HiGHS keeps feasibility to 1e-7 at worst, 1e-10 on request; its vertex is exact.
+    result = linprog(
+        np.r_[np.zeros(n), -1.0],
+        A_ub=np.c_[-matrix, profile],
+        b_ub=excess,
+        bounds=[(0, None)] * n + [(None, None)],
+        method="highs-ds",
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    assert result.status == 0
+    return result.x[-1] * 1e6
+
+
+def by_relaxation(problem, strength, load, limit=200_000):
+    """Least equilibrium at a load: strictly local, monotone relaxation from zero slip."""
+    n = problem.interface.nodes
+    symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
+    rate = problem.friction.weakening_rate
+    floor = problem.friction.residual_strength
+    end = np.max((strength - floor) / rate)
+    slip = np.zeros(n)
+    for _ in range(limit):
+        stress = load - np.fft.irfft(symbol * np.fft.rfft(slip), n)
+        drive = stress - np.maximum(strength - rate * slip, floor)
+        new = np.maximum(slip, slip + drive / symbol[-1])
+        if np.max(new - slip) < 1e-19:
+            return new
+        slip = new
+        if slip.min() > end:
+            return None
+    raise AssertionError("relaxation did not come to rest")
+
+
+@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
+def test_linear_programme(problem, make_strength, ratio):
+    tau_p = make_strength(ratio).sample(problem.interface, samples=3, seed=7)
+    ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
+    theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+    np.testing.assert_allclose(ours, theirs, rtol=1e-11)
+
+
+def test_linear_programme_with_everything_varying(solid, make_strength):
+    x = np.arange(256) / 256
+    load = st.Load(
+        profile=1.0 + 0.3 * np.cos(2 * np.pi * x), initial_stress=1e5 * np.sin(4 * np.pi * x)
+    )
+    rate = 0.4e12 * (1.0 + 0.6 * np.sin(6 * np.pi * x))
+    for mode in ("II", "III"):
+        problem = st.Problem(
+            solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=rate), load, mode
+        )
+        tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
+        ours = st.onset(problem, tau_p, method=Equilibrium())
+        theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+        np.testing.assert_allclose(ours.critical_load, theirs, rtol=1e-11)
+        assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
+        # The mean stress differs from the load factor here.
+        mean = load.initial_stress.mean() + ours.critical_load * load.profile.mean()
+        np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
+
+
+def test_uniform_critical_slip(solid, make_strength):
+    friction = st.SlipWeakening(critical_slip=2e-6)
+    problem = st.Problem(solid, st.Interface(0.1, 256), friction)
+    tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
+    ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
+    theirs = [by_linear_programme(problem, profile, profile / 2e-6) for profile in tau_p]
+    np.testing.assert_allclose(ours, theirs, rtol=1e-11)
+
+
+def test_interface_shorter_than_a_critical_patch(solid, make_strength):
+    # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
+    interface = st.Interface(0.1, 128)
+    rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
+    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=rate))
+    tau_p = make_strength(2.0).sample(interface, samples=4, seed=10)
+    onset = st.onset(problem, tau_p, method=Equilibrium(slip=True))
+    theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+    np.testing.assert_allclose(onset.first_instability, theirs, rtol=1e-11)
+    assert np.all(onset.first_instability.values <= tau_p.mean(axis=1) * (1 + 1e-12))
+
+
+@pytest.mark.parametrize("ratio", [0.25, 1.0])
+def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
+    tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=11)
+    rows = problem.rows(tau_p)
+    setting = Setting(problem)
+    loads = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
+    for row in range(5):
+        sample = sample_of(rows, row)
+        state = at_rest(sample)
+        load, status = advance(
+            sample, setting.grid, state.load, np.inf, state.slip, state.stiff, state.direction,
+            5000, make_room(256),
+        )  # fmt: skip
+        assert status == UNSTABLE
+        assert load == pytest.approx(loads[row], rel=1e-11)
+
+
+@pytest.mark.parametrize("rough", [0.0, 0.4])
+def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, rough):
+    x = np.arange(2048) / 2048
+    rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
+    problem = st.Problem(solid, st.Interface(0.2, 2048), st.SlipWeakening(weakening_rate=rate))
+    setting = Setting(problem)
+    rows = problem.rows(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
+    for row in range(4):
+        sample = sample_of(rows, row)
+        dense = setting.programme(sample.excess, sample.rate)
+        bound = setting.bound(sample.excess, sample.rate)
+        large = LargeProgram(
+            sample.excess, sample.profile, sample.rate, setting.grid, bound.load, bound.multiplier
+        ).run()
+        assert large.load == pytest.approx(dense.load, rel=1e-11)
+        # At the optimum slip may be steep in the load; 1e-6 of d_c is far below any use of it.
+        np.testing.assert_allclose(large.slip, dense.slip, atol=1e-6 * sample.critical.max())
+        below = 0.995 * dense.load
+        dense = setting.programme(sample.excess, sample.rate, below)
+        large = LargeProgram(
+            sample.excess, sample.profile, sample.rate, setting.grid, bound.load,
+            bound.multiplier, below,
+        ).run()  # fmt: skip
+        np.testing.assert_allclose(large.slip, dense.slip, atol=1e-10 * sample.critical.max())
+
+
+@pytest.mark.parametrize("high", [1.66e6, 2.5e6, 4.0e6])
+@pytest.mark.parametrize("low", [0.1e6, 0.66e6])
+def test_events_against_relaxation(problem, low, high):
+    """Wide ranges of strength: nodes reach the floor, patches are arrested."""
+    strength = st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=low, high=high),
+        spectrum=st.PowerLawSpectrum(
+            correlation_length=0.5 * problem.nucleation_length, exponent=4.0, truncation=2.5
+        ),
+    )
+    tau_p = strength.sample(problem.interface, samples=2, seed=13)
+    onset = st.onset(problem, tau_p, method=Equilibrium())
+    for row, profile in enumerate(tau_p):
+        load = onset.critical_load.values[row]
+        loads = load * np.array([0.8, 0.95, 0.999])
+        path = equilibrium_path(problem, profile, loads)
+        for i in range(3):
+            slip = by_relaxation(problem, profile, loads[i])
+            assert slip is not None
+            # Relaxation stops at increments of 1e-19 m, up to 1e4 of them away from the limit.
+            np.testing.assert_allclose(path.slip.values[i], slip, atol=1e-14)
+        assert by_relaxation(problem, profile, 1.001 * load) is None
+
+
+def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
+    """Most samples slide at the first instability; the few that do not are not an artefact."""
+    problem = st.Problem(solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=0.5e12))
+    tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
+    onset = st.onset(problem, tau_p, method=Equilibrium())
+    arrested = np.flatnonzero(onset.arrested_events.values)
+    assert arrested.size > 0
+    for row in arrested[:2]:
+        first = onset.first_instability.values[row]
+        last = onset.critical_load.values[row]
+        assert last > first
+        beyond = first + 0.5 * min(last - first, 1e-3 * first)
+        assert by_relaxation(problem, tau_p[row], beyond) is not None
+    events = equilibrium_events(problem, tau_p)
+    assert events.sizes["event"] == onset.arrested_events.values.sum()
+    assert set(events["sample"].values) == set(arrested)
+    np.testing.assert_allclose(
+        events.stress.values[np.searchsorted(events["sample"], arrested)],
+        onset.first_instability.values[arrested],
+        rtol=1e-14,
+    )
+
+
+def test_residual_strength_only_shifts_the_stress(problem, make_strength):
+    """Only tau_p - tau_r and tau_0 - tau_r matter, floor and all."""
+    strength = make_strength(0.5).sample(problem.interface, samples=20, seed=15)
+    wide = 0.05e6 + 2.0 * (strength - 0.66e6)
+    shifted = dataclasses.replace(
+        problem, friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
+    )
+    one = st.onset(problem, wide, method=Equilibrium())
+    two = st.onset(shifted, wide + 0.3e6, method=Equilibrium())
+    assert one.arrested_events.values.sum() > 0
+    np.testing.assert_allclose(two.critical_load, one.critical_load + 0.3e6, rtol=1e-11)
+    np.testing.assert_array_equal(two.arrested_events, one.arrested_events)

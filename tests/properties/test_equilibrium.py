@@ -1,0 +1,148 @@
+"""Equilibrium: symmetries, bounds and monotonicity, for random profiles, rates and loads."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as hs
+
+import stiction as st
+from stiction.equilibrium.method import Equilibrium
+from stiction.equilibrium.path import equilibrium_path
+from stiction.equilibrium.setting import Setting
+
+NODES = 96
+SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
+METHOD = Equilibrium(sensitivity=True, slip=True)
+
+
+def profile(seed, roughness):
+    """Positive random profile around 1e6 Pa: modes falling like j^-roughness."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros(NODES // 2 + 1, dtype=complex)
+    j = np.arange(1, NODES // 2)
+    spectrum[1 : NODES // 2] = (rng.standard_normal((2, j.size)).T @ [1, 1j]) * j**-roughness
+    field = np.fft.irfft(spectrum, NODES)
+    return 1e6 * (1.0 + 0.4 * field / np.abs(field).max())
+
+
+def problem_of(length, wave, varying):
+    x = 2.0 * np.pi * np.arange(NODES) / NODES
+    rate = 0.5e12 * (1.0 + 0.5 * np.cos(2 * x)) if varying else 0.5e12
+    load = st.Load(profile=1.0 + wave * np.sin(x)) if wave else st.Load()
+    return st.Problem(
+        SOLID, st.Interface(length, NODES), st.SlipWeakening(weakening_rate=rate), load
+    )
+
+
+problems = hs.builds(
+    problem_of,
+    length=hs.floats(2e-3, 0.04),  # half a critical patch to twelve of them
+    wave=hs.sampled_from([0.0, 0.3]),
+    varying=hs.booleans(),
+)
+uniform_problems = hs.builds(
+    problem_of, length=hs.floats(2e-3, 0.04), wave=hs.just(0.0), varying=hs.just(False)
+)
+profiles = hs.builds(profile, hs.integers(0, 10**6), hs.floats(0.0, 2.0))
+
+
+def solve(problem, tau_p):
+    return st.onset(problem, tau_p, method=METHOD)
+
+
+@settings(max_examples=100, deadline=None)
+@given(problem=problems, tau_p=profiles)
+def test_gap_closes_and_bounds_hold(problem, tau_p):
+    onset = solve(problem, tau_p)
+    load, slip = onset.first_instability.item(), onset.slip.values[0]
+    assert onset.certificate_gap.item() < 1e-9 * load
+    assert slip.min() >= 0.0
+    y = onset.sensitivity.values[0]
+    mean = np.mean(problem.load.profile)
+    # What is mean stress must be the mean of the load: <p, y> = <p>, at no residual node.
+    if not np.any(slip >= tau_p / np.asarray(problem.friction.weakening_rate) * (1 - 1e-9)):
+        np.testing.assert_allclose(y @ np.broadcast_to(problem.load.profile, NODES), mean)
+    # A uniform field is a multiplier: the load factor is at most <s>/<p>.
+    assert onset.critical_load.item() * mean <= tau_p.mean() * (1.0 + 1e-12)
+    assert onset.critical_load.item() * mean >= load * (1.0 - 1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=uniform_problems, tau_p=profiles)
+def test_never_above_the_discrete_local_criterion(problem, tau_p):
+    bound = Setting(problem).bound(tau_p, np.full(NODES, 0.5e12))
+    onset = solve(problem, tau_p)
+    assert onset.first_instability.item() <= bound.load * (1.0 + 1e-13)
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=problems, tau_p=profiles, other=profiles, weight=hs.floats(0.05, 0.95))
+def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
+    # The strength is far above the residual one here: floors would make it neither.
+    high = 50e6
+    three = np.array([tau_p, other, weight * tau_p + (1.0 - weight) * other]) + high
+    first = solve(problem, three).first_instability.values - high * np.mean(problem.load.profile)
+    if not np.ptp(problem.load.profile):
+        # 1e-12 of 50 MPa is round-off.
+        assert first[2] >= weight * first[0] + (1.0 - weight) * first[1] - 5e-5
+    raised = np.array([tau_p, np.maximum(tau_p, other)]) + high
+    low, up = solve(problem, raised).first_instability.values
+    assert up >= low - 5e-5
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=uniform_problems, tau_p=profiles, shift=hs.integers(0, NODES - 1))
+def test_translation_and_reflection(problem, tau_p, shift):
+    several = np.array([tau_p, np.roll(tau_p, shift), tau_p[::-1]])
+    onset = solve(problem, several)
+    load = onset.critical_load.values
+    np.testing.assert_allclose(load, load[0], rtol=1e-11)
+    place = onset.critical_position.values
+    length = problem.interface.length
+    moved = (place[1] - place[0]) / problem.interface.spacing - shift
+    # The last digits of y move the centroid; two critical patches at once are ruled out by chance.
+    assert abs((moved + NODES / 2) % NODES - NODES / 2) < 1e-4
+    assert place.min() >= 0.0
+    assert place.max() < length
+
+
+@settings(max_examples=40, deadline=None)
+@given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
+def test_a_constant_shifts_the_load(problem, tau_p, constant):
+    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=constant)
+    shifted = st.Problem(SOLID, problem.interface, friction)
+    one, two = solve(problem, tau_p), solve(shifted, tau_p + constant)
+    np.testing.assert_allclose(two.critical_load, one.critical_load + constant, rtol=1e-10)
+    stressed = st.Problem(
+        SOLID, problem.interface, problem.friction, st.Load(initial_stress=-constant)
+    )
+    three = solve(stressed, tau_p)
+    np.testing.assert_allclose(three.critical_load, one.critical_load + constant, rtol=1e-10)
+    np.testing.assert_allclose(three.critical_stress, one.critical_stress, rtol=1e-10)
+
+
+@settings(max_examples=30, deadline=None)
+@given(problem=problems, tau_p=profiles)
+def test_slip_grows_with_the_load_and_strength_is_kept(problem, tau_p):
+    load = solve(problem, tau_p).critical_load.item()
+    loads = load * np.array([0.6, 0.8, 0.9, 0.97, 0.9999])
+    path = equilibrium_path(problem, tau_p, loads)
+    slip, stress = path.slip.values, path.stress.values
+    assert np.diff(slip, axis=0).min() >= -1e-15
+    strength = np.maximum(tau_p - np.asarray(problem.friction.weakening_rate) * slip, 0.0)
+    # Where it slips the stress is the strength, elsewhere below: to 1e-10 of it.
+    assert (stress - strength).max() < 1e-10 * load
+    assert np.abs(stress - strength)[slip > 0.0].max(initial=0.0) < 1e-10 * load
+
+
+def test_results_do_not_depend_on_the_batch():
+    rng = np.random.default_rng(4)
+    problem = problem_of(0.03, 0.0, False)
+    tau_p = np.array([profile(seed, 1.0) for seed in range(24)])
+    rates = 0.5e12 * np.where(np.arange(24) % 3 == 0, 1.0, rng.uniform(0.8, 1.2, 24))[:, None]
+    together = st.onset(problem, tau_p, method=METHOD, weakening_rate=rates)
+    for row in (0, 1, 5, 23):
+        alone = st.onset(problem, tau_p[row], method=METHOD, weakening_rate=rates[row : row + 1])
+        for name in together.data_vars:
+            np.testing.assert_array_equal(alone[name].values[0], together[name].values[row])

@@ -1,0 +1,71 @@
+"""Equilibrium: what a user can get wrong, and what he is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.equilibrium.events import equilibrium_events
+from stiction.equilibrium.method import Equilibrium
+from stiction.equilibrium.path import equilibrium_path
+
+
+def test_unstable_before_it_is_loaded(problem):
+    initial = np.zeros(256)
+    initial[77] = 0.95e6
+    with pytest.raises(st.InputError, match="sample 0, node 77"):
+        st.onset(problem, np.full(256, 0.9e6), method=Equilibrium(), initial_stress=initial)
+
+
+def test_weakening_rate_negative_somewhere(problem):
+    rate = np.full(256, 0.5e12)
+    rate[3] = -1.0
+    with pytest.raises(st.InputError, match="weakening_rate"):
+        st.onset(problem, np.full(256, 0.9e6), method=Equilibrium(), weakening_rate=rate)
+
+
+def test_load_profile_not_positive():
+    with pytest.raises(st.InputError, match="profile"):
+        st.Load(profile=np.linspace(-0.1, 1.0, 256))
+
+
+def test_unknown_option():
+    with pytest.raises(st.InputError, match="sensitivity"):
+        Equilibrium(sensitivities=True)
+
+
+@pytest.mark.parametrize(
+    ("loads", "message"),
+    [
+        ([2e5, 1e5], "entries 0 and 1"),
+        ([-1.0, 1e5], "negative"),
+        ([np.nan], "finite"),
+        ([], "one-dimensional"),
+        ("many", "array of numbers"),
+    ],
+)
+def test_loads_of_a_path(problem, loads, message):
+    with pytest.raises(st.InputError, match=message):
+        equilibrium_path(problem, np.full(256, 0.9e6), loads)
+
+
+def test_path_of_several_samples(problem):
+    with pytest.raises(st.InputError, match="one profile"):
+        equilibrium_path(problem, np.full((2, 256), 0.9e6), [1e5])
+
+
+def test_no_events(problem):
+    events = equilibrium_events(problem, np.full((2, 256), 0.9e6))
+    assert events.sizes["event"] == 0
+    assert events.position.attrs["units"] == "m"
+
+
+def test_variables_are_labelled(problem, make_strength):
+    method = Equilibrium(sensitivity=True, slip=True)
+    tau_p = make_strength(0.5).sample(problem.interface, samples=2, seed=1)
+    onset = st.onset(problem, tau_p, method=method)
+    assert set(onset.data_vars) == set(method.variables)
+    for name, variable in method.variables.items():
+        assert onset[name].attrs["units"] == variable.units
+        assert onset[name].dims == variable.dims
