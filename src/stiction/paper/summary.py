@@ -6,6 +6,7 @@ import platform
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ def assemble(
         headline=_tally(findings),
         points=_points(data, findings),
         exceptions=_exceptions(findings),
-        key_table=_key_table(data) if "monte_carlo" in data.studies else None,
+        key_table=_key_table(data),
         figures=figures,
         claims=_claims(findings),
         parameters=_parameters(data),
@@ -123,24 +124,44 @@ def _exceptions(findings: Judged) -> list[tuple[str, list[str]]]:
     return groups
 
 
-def _key_table(data: Data) -> Table:
+def _key_table(data: Data) -> Table | None:
+    by_method = [
+        (label, data[study])
+        for label, study in (
+            ("local criterion", "monte_carlo"),
+            ("exact equilibrium", "interaction"),
+        )
+        if study in data.studies
+    ]
     rows = []
-    for ratio in data.ratios:
-        stress = data.at(ratio)["critical_stress"].values
+    for ratio, (label, study) in product(data.ratios, by_method):
+        stress = study["critical_stress"].sel(correlation_ratio=ratio).values
         q = quantiles(stress, (0.05, 0.5, 0.95))
         rows.append(
             (
                 f"{ratio:g}",
+                label,
                 rounded(megapascal(mean(stress))),
                 rounded(kilopascal(standard_deviation(stress))),
                 *(f"{value * 1e-6:.4f}" for value in q.value),
                 f"{float(np.mean(stress)) / data.setting.mean:.4f}",
             )
         )
+    if not rows:
+        return None
     return Table.of(
         "critical-stress",
-        "Critical stress tau_cr by the local criterion",
-        ("xi_0/h_n", "mean (MPa)", "st. dev. (kPa)", "5 % (MPa)", "median", "95 %", "mean/<tau_p>"),
+        "Critical stress tau_cr",
+        (
+            "xi_0/h_n",
+            "by",
+            "mean (MPa)",
+            "st. dev. (kPa)",
+            "5 % (MPa)",
+            "median",
+            "95 %",
+            "mean/<tau_p>",
+        ),
         rows,
     )
 
@@ -167,6 +188,7 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
     solid, interface = problem.solid, problem.interface
     rate = float(np.max(problem.friction.weakening_rate))
     length = problem.nucleation_length
+    deviation = setting.field(data.ratios[0]).standard_deviation
     return [
         (
             "Solid",
@@ -189,7 +211,7 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
         (
             "Strength",
             f"{_marginal(setting.marginal)}; mean {setting.mean * 1e-6:.6g} MPa,"
-            f" standard deviation {setting.field(data.ratios[0]).standard_deviation * 1e-6:.4g} MPa",
+            f" standard deviation {deviation * 1e-6:.4g} MPa",
         ),
         (
             "Spectrum",
@@ -232,7 +254,7 @@ def _provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
         ("Studies", times or "none"),
         ("Results", "results.nc (one group a study), tables/*.csv, figures/*.png and *.pdf"),
         (
-            "Method",
+            "Local criterion",
             "local criterion of Uenishi and Rice (2003), exact eigenfunction, minimum"
             " between the nodes",
         ),

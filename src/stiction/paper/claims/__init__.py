@@ -8,10 +8,12 @@ its subject; to add a subject, write the module and import it here.
 from __future__ import annotations
 
 from stiction.paper.claims import (  # importing them registers their claims
+    interaction,
     nucleation,
     onset,
     parameters,
     rupture,
+    what_if,
 )
 from stiction.paper.claims.claim import CLAIMS, Claim, Finding, Quantity, Verdict, claim, judged
 
@@ -20,7 +22,9 @@ SUBJECTS = {
     "parameters": "Parameters and theory",
     "nucleation": "Nucleation stress",
     "onset": "Critical stress and position of onset",
+    "interaction": "Theory against exact equilibrium",
     "rupture": "Run-away propagation",
+    "what_if": "What if",
 }
 """Titles of the subjects, in the order in which they are shown."""
 
@@ -32,9 +36,11 @@ __all__ = [
     "Quantity",
     "Verdict",
     "claim",
+    "interaction",
     "judged",
     "nucleation",
     "onset",
     "parameters",
     "rupture",
+    "what_if",
 ]

@@ -12,6 +12,7 @@ from typing import Any
 
 from stiction.errors import InputError, unknown_name
 from stiction.paper.figures import (
+    interaction,
     mapping,
     monte_carlo,
     problem,
@@ -20,7 +21,8 @@ from stiction.paper.figures import (
 )
 
 FIGURES: dict[str, Any] = {
-    figure.name: figure for figure in (problem, mapping, monte_carlo, statistics, variance)
+    figure.name: figure
+    for figure in (problem, mapping, monte_carlo, statistics, variance, interaction)
 }
 
 

@@ -23,11 +23,13 @@ PROBABILITIES = (0.25, 0.5, 0.75)
 
 def caption(data: Data) -> str:
     """What is seen."""
+    exact = "interaction" in data.studies
     return (
         "Mean, median and quartiles of (a) the nucleation stress at a point and (b) the critical"
         " stress, against the correlation length. Filled symbols and lines: Monte Carlo study,"
         f" {data.samples:,} samples each. Thin lines in (b): side study over a wider range at fixed"
-        " interface length. Squares at the left edge: limit of vanishing correlation length."
+        f" interface length.{' Diamonds: means by exact equilibrium.' if exact else ''}"
+        " Squares at the left edge: limit of vanishing correlation length."
         " Bars at the right edge: quartiles and median in the limit of long correlation with the"
         " interface as many correlation lengths long as at the last point: in (a) those of the"
         " strength at a point, in (b) those of its minimum. (c) The same critical stress when the"
@@ -118,6 +120,19 @@ def draw(data: Data) -> Figure:
     weakest = data.relative(data["window"]["weakest_quantile_value"].values[1:4])
     _long_limit(critical, weakest, 2, r"$\min\tau_\mathrm{p}$")
     _short_side(critical, data)
+    if "interaction" in data.studies:
+        exact = data["interaction"]["critical_stress"].mean("sample").values
+        critical.plot(
+            data.ratios,
+            data.relative(exact),
+            "D",
+            color=INK,
+            markerfacecolor="white",
+            markersize=3.6,
+            label="exact mean",
+            zorder=6,
+        )
+        critical.legend(loc="upper right")
     for axes in (nucleation, critical):
         if np.isfinite(setting.bounds[0]):
             _bound(axes, setting.bounds[0] / setting.mean)

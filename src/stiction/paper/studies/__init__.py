@@ -15,6 +15,7 @@ import xarray as xr
 
 from stiction.paper.studies import (
     correction,
+    interaction,
     interface_length,
     monte_carlo,
     skewness,
@@ -30,6 +31,7 @@ STUDIES: dict[str, Any] = {
     for study in (
         theory,
         monte_carlo,
+        interaction,
         trend,
         window,
         correction,
