@@ -1,4 +1,4 @@
-"""What interaction does to the paper's Monte Carlo: bias of the local criterion, patches, arrest."""
+"""The paper's Monte Carlo with interaction: bias of the local criterion, patches, arrest."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 
-ZERO = np.int64(0)
-"""A zero that is not a literal: numba compiles a kernel again for each literal it is called with."""
+ZERO: Any = np.int64(0)
+"""A zero that is not a literal: numba compiles a kernel again for each literal it is given."""
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

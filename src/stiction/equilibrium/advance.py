@@ -90,9 +90,8 @@ def advance(
             count = build(sample, grid, slip, residual, strength, room)
             if count > MOST_MEMBERS:
                 return load, CROWDED
-            size = append(
-                room.factor, ZERO, room.members, room.order, count, grid.column, room.diagonal, PIVOT
-            )
+            members, order, diagonal = room.members, room.order, room.diagonal
+            size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
             if size < count:
                 # Stability was lost exactly as the floor was reached.
                 singular_direction(room, size, direction)

@@ -7,6 +7,7 @@ load from above: the criterion of Uenishi and Rice (2003) in the form that is st
 
 from __future__ import annotations
 
+import bisect
 import functools
 from typing import NamedTuple
 
@@ -17,9 +18,14 @@ from numpy.typing import NDArray
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium.stiffness import stiffness_column
+from stiction.problem import SMALLEST_EIGENVALUE
 
 GROWTH = 1.04
 """Ratio of successive widths tried where the weakening rate varies."""
+DENSE = 300
+"""Widest window whose eigenvector is found with a dense matrix."""
+WIDEST = 4096
+"""Widest window tried."""
 
 
 @functools.lru_cache(maxsize=512)
@@ -31,16 +37,44 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     nodes, width : int
         Nodes of the interface and of the window.
     """
-    block = scipy.linalg.toeplitz(stiffness_column(nodes, np.pi, 1.0)[:width])
-    values, vectors = scipy.linalg.eigh(block, subset_by_index=[0, 0])
-    mode = np.abs(vectors[:, 0])
-    mode /= mode.sum()
+    first = stiffness_column(nodes, np.pi, 1.0)[:width]
+    if width <= DENSE:
+        values, vectors = scipy.linalg.eigh(scipy.linalg.toeplitz(first), subset_by_index=[0, 0])
+        value, mode = float(values[0]), np.abs(vectors[:, 0])
+        mode /= mode.sum()
+    else:
+        # Inverse iteration; the next eigenvalue is more than twice as large.
+        mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
+        mode /= mode.sum()
+        for _ in range(60):
+            new = scipy.linalg.solve_toeplitz(first, mode)
+            value = 1.0 / float(new.sum())
+            new *= value
+            change = float(np.abs(new - mode).max())
+            mode = new
+            if change < 1e-14 * float(mode.max()):
+                break
     mode.flags.writeable = False
-    return float(values[0]), mode
+    return value, mode
+
+
+def estimated_width(nodes: int, rate: float) -> int:
+    """Width of an unstable window by h_n = 2 lambda_0 G*/W of the continuum.
+
+    Parameters
+    ----------
+    nodes : int
+    rate : float
+        W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
+    """
+    return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
 
 
 def smallest_window(nodes: int, rate: float) -> int | None:
     """Fewest nodes that are unstable by themselves at a weakening rate, or None.
+
+    None also if the window would be wider than `WIDEST`: the uniform field then starts the
+    programme, whose result is the same.
 
     Parameters
     ----------
@@ -48,28 +82,32 @@ def smallest_window(nodes: int, rate: float) -> int | None:
     rate : float
         W in units of (G*/2)(2 pi/L).
     """
-    # Continuum estimate: h_n/L = lambda_0 (2 G*/W)/L, here 1.158/(2 pi rate) of n nodes times 2.
-    guess = int(np.clip(0.3685 / rate * nodes, 1, nodes - 1))
-    low, high = 0, nodes  # width `low` is stable; `high` is unstable or the whole interface
-    step = 1
-    width = guess
+    widest = min(nodes - 1, WIDEST)
+    width = estimated_width(nodes, rate)
+    if width > 1.2 * widest:
+        return None
+    width = min(width, widest)
+    low, high = 0, widest + 1  # `low` is stable; `high` is unstable, or too wide
+    # The estimate is a node or so off, more where the window is a fair part of the circle.
+    for probe in (width - 3, width + 3):
+        if low < probe < high:
+            if window_mode(nodes, probe)[0] <= rate:
+                high = probe
+            else:
+                low = probe
     while high - low > 1:
-        if window_mode(nodes, width)[0] <= rate:
-            high = width
-            width = max(low + 1, width - step)
+        middle = (low + high) // 2
+        if window_mode(nodes, middle)[0] <= rate:
+            high = middle
         else:
-            low = width
-            width = min(high - 1, width + step)
-        if low > 0 and high < nodes:
-            width = (low + high) // 2
-        step *= 2
-    return high if high < nodes else None
+            low = middle
+    return high if high <= widest else None
 
 
 def ladder(nodes: int) -> list[int]:
     """Widths tried where the weakening rate varies: the same for all samples."""
     widths = [1]
-    while widths[-1] < nodes // 2:
+    while widths[-1] < min(nodes // 2, WIDEST):
         widths.append(max(widths[-1] + 1, int(widths[-1] * GROWTH)))
     return widths[:-1]
 
@@ -117,14 +155,14 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
     rungs = ladder(nodes)
 
     def rung(rate: float) -> int:
-        low, high = -1, len(rungs)
-        while high - low > 1:
-            middle = (low + high) // 2
-            if window_mode(nodes, rungs[middle])[0] * unit <= rate:
-                high = middle
-            else:
-                low = middle
-        return high
+        """The first rung that is unstable; the last one if none is."""
+        width = estimated_width(nodes, rate / unit)
+        i = min(bisect.bisect_left(rungs, width), len(rungs) - 1)
+        while i < len(rungs) - 1 and window_mode(nodes, rungs[i])[0] * unit > rate:
+            i += 1
+        while i > 0 and window_mode(nodes, rungs[i - 1])[0] * unit <= rate:
+            i -= 1
+        return i
 
     return _windows(nodes, tuple(rungs[rung(highest) : rung(lowest) + 1]), unit)
 

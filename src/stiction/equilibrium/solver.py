@@ -145,8 +145,8 @@ class Solver:
         solve_batch(
             np.ascontiguousarray(rows.strength - rows.initial_stress),
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-            setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column, setting.usual,
-            setting.windows(unusual), setting.block, setting.reach, setting.spacing,
+            setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column,
+            setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
             setting.modulus, table, slips, multipliers,
         )  # fmt: skip
 
