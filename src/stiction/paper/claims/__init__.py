@@ -15,18 +15,16 @@ from stiction.paper.claims import (  # importing them registers their claims
     rupture,
     what_if,
 )
-from stiction.paper.claims.claim import CLAIMS, Claim, Finding, Quantity, Verdict, claim, judged
-
-# Keyed by module; `judged` follows this order.
-SUBJECTS = {
-    "parameters": "Parameters and theory",
-    "nucleation": "Nucleation stress",
-    "onset": "Critical stress and position of onset",
-    "interaction": "Theory against exact equilibrium",
-    "rupture": "Run-away propagation",
-    "what_if": "What if",
-}
-"""Titles of the subjects, in the order in which they are shown."""
+from stiction.paper.claims.claim import (
+    CLAIMS,
+    SUBJECTS,
+    Claim,
+    Finding,
+    Quantity,
+    Verdict,
+    claim,
+    judged,
+)
 
 __all__ = [
     "SUBJECTS",

@@ -98,7 +98,17 @@ class Claim:
 
 
 CLAIMS: dict[str, Claim] = {}
-"""All claims by name, by subject and then in the order of their modules."""
+"""All claims by name."""
+
+SUBJECTS = {
+    "parameters": "Parameters and theory",
+    "nucleation": "Nucleation stress",
+    "onset": "Critical stress and position of onset",
+    "interaction": "Theory against exact equilibrium",
+    "rupture": "Run-away propagation",
+    "what_if": "What if",
+}
+"""Titles of the subjects, by module, in the order in which they are shown."""
 
 
 def claim(
@@ -117,10 +127,13 @@ def claim(
 
 
 def judged(data: Data, claims: Iterable[Claim] | None = None) -> list[tuple[Claim, Finding]]:
-    """Every claim whose studies there are, with its finding."""
-    chosen = CLAIMS.values() if claims is None else claims
+    """Every claim whose studies there are, with its finding, subject by subject."""
     there = set(data.studies)
-    return [(each, each.judge(data)) for each in chosen if there.issuperset(each.needs)]
+    chosen = CLAIMS.values() if claims is None else claims
+    possible = [each for each in chosen if there.issuperset(each.needs)]
+    order = {subject: place for place, subject in enumerate(SUBJECTS)}
+    possible.sort(key=lambda each: order.get(each.subject, len(order)))
+    return [(each, each.judge(data)) for each in possible]
 
 
 def rounded(estimate: Estimate) -> str:

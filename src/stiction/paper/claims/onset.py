@@ -199,8 +199,8 @@ def near_the_bound(data: Data) -> Finding:
             Quantity(f"xi_0/h_n = {ratios[-1]:g}", series[-1]),
         ),
         close,
-        "(tau_cr - bound)/<tau_p>; with L fixed the interface then holds too few correlation"
-        " lengths to meet the bound: it needs L >> xi_0 >> h_n"
+        "with L fixed the interface then holds too few correlation lengths to meet the bound: it"
+        " needs L >> xi_0 >> h_n (computed: (tau_cr - bound)/<tau_p>)"
         if turned
         else "(tau_cr - bound)/<tau_p>",
     )
@@ -242,7 +242,7 @@ def skewness_amplified(data: Data) -> Finding:
     else:
         verdict, comment = worst(verdicts), ""
     return Finding(
-        at_each(data, gaps), verdict, "; ".join(filter(None, ("difference of skewness", comment)))
+        at_each(data, gaps), verdict, f"{comment} (skewness of tau_cr less that of tau_n)".strip()
     )
 
 

@@ -31,8 +31,8 @@ def caption(data: Data) -> str:
         " equilibrium (lines) and by the local criterion (thin grey lines). (b) By how much the"
         " local criterion is too high: median, quartiles, and 5 and 95 % points; the diamond is the"
         f" mean. (c) Position of onset by both, {min(DRAWN, data.samples)} samples at the shortest"
-        " (filled) and the longest correlation length. (d) Share of samples that the local criterion puts more than"
-        " half a nucleation length off. (e) Number of patches that slip at onset, mean and 5 to"
+        " (filled) and the longest correlation length. (d) Share of samples that the local"
+        " criterion puts more than half a nucleation length off. (e) Number of patches that slip at onset, mean and 5 to"
         " 95 % range. (f) Length of the critical patch, the same, in nucleation lengths."
     )
 
@@ -118,7 +118,6 @@ def draw(data: Data) -> Figure:
         [exact["critical_patch_length"].sel(correlation_ratio=r).values / unit for r in ratios],
     )
     length.axhline(1.0, color=PALE, linewidth=0.8, zorder=0)
-    length.set_ylim(bottom=0)
     length.set_ylabel(r"critical patch$\,/h_\mathrm{n}$")
     for axes in (wrong, patches, length, bias):
         axes.set_xscale("log")
