@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from scipy.special import ndtri
 
 from stiction._model import describe
 from stiction.criterion.method import LocalCriterion
@@ -29,7 +28,7 @@ from stiction.reliability.result import say
 from stiction.reliability.sampled import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, bridge
-from stiction.reliability.uncertainty import generator
+from stiction.reliability.uncertainty import generator, log_width
 
 DEEPER = 0.3
 """Runs go on to this share of the probability, to know the lower end of the interval."""
@@ -104,7 +103,7 @@ def stress_interval(
     """Stresses whose estimated probabilities bracket the one asked for."""
     if not math.isfinite(cov):
         return lowest, tail.runs[0].extent[1]
-    width = float(ndtri(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cov * cov))
+    width = min(log_width(cov, confidence), 700.0)
     below = probability * math.exp(-width)
     seen = tail.probability(np.nextafter(min(run.extent[0] for run in tail.runs), math.inf))
     low = tail.quantile(below) if below >= seen else lowest

@@ -42,11 +42,12 @@ def rice_probability(
     for interfaces that lie below from the start. By the local criterion, whatever the method.
     """
     stress = np.asarray(stress, dtype=np.float64)
+    initial, factor = np.mean(problem.load.initial_stress), np.mean(problem.load.profile)
     below, crossings, nodes = np.zeros(stress.size), np.zeros(stress.size), 0
     for first in range(0, samples, BATCH):
         count = min(BATCH, samples - first)
         profiles = strength.sample(problem.interface, samples=count, seed=seed, first=first)
-        tau = nucleation_stress(problem, profiles)
+        tau = initial + factor * nucleation_stress(problem, profiles)
         following = np.roll(tau, -1, axis=1)
         ordered = np.sort(tau.ravel())
         below += np.searchsorted(ordered, stress, side="left")

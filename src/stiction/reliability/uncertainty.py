@@ -7,15 +7,26 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtri
+from scipy.special import betaincinv, stdtrit
 
 from stiction._typing import Array
 
 Integers = NDArray[np.int64]
 
 
+def log_width(cov: float, confidence: float) -> float:
+    """Half the width of the interval of the logarithm of an estimate."""
+    if cov == 0.0:
+        return 0.0
+    freedom = max(1.0, 1.0 / (cov * cov) - 1.0)
+    return float(stdtrit(freedom, 0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cov * cov))
+
+
 def lognormal_interval(probability: float, cov: float, confidence: float) -> tuple[float, float]:
     """Interval of an estimate whose logarithm is about normal, within [0, 1].
+
+    The coefficient of variation is itself estimated, from about 1/cov^2 independent families or
+    weights that matter, so Student's distribution takes the place of the normal one.
 
     Parameters
     ----------
@@ -28,8 +39,9 @@ def lognormal_interval(probability: float, cov: float, confidence: float) -> tup
     """
     if not math.isfinite(cov):
         return 0.0, 1.0
-    width = float(ndtri(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cov * cov))
-    return probability * math.exp(-width), min(1.0, probability * math.exp(width))
+    width = log_width(cov, confidence)
+    high = probability * math.exp(min(width, 700.0))
+    return probability * math.exp(-width), min(1.0, high)
 
 
 def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[float, float]:
@@ -46,7 +58,8 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
     Families that descend from different first samples evolve independently, so the spread of
     their shares among the failures measures the error of the whole estimate, with the
     correlation along chains, between chains of one ancestor and from level to level: the sum of
-    (share - 1/N)^2 over the N first samples.
+    (share - 1/N)^2 over the N first samples. With k families of equal size that is 1/k, where the
+    variance of a mean of k calls for 1/(k - 1): hence a last division by one minus the sum.
 
     Parameters
     ----------
@@ -64,7 +77,8 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
         return math.inf
     _, sizes = np.unique(ancestors, return_counts=True)
     shares = sizes / ancestors.size
-    return max(0.0, float(np.sum(shares * shares)) - 1.0 / samples)
+    found = max(0.0, float(np.sum(shares * shares)) - 1.0 / samples)
+    return found / (1.0 - found) if found < 1.0 else math.inf
 
 
 def chain_correlation(failed: NDArray[np.bool_]) -> float:

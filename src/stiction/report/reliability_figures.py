@@ -1,4 +1,4 @@
-"""Figures of failure probability: the curve over decades, weak interfaces, what the tail hangs on."""
+"""Figures of failure probability: the curve, weak interfaces, what the tail hangs on."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def curve_figure(curve: xr.Dataset) -> Figure:
     bounded = _has_bound(curve)
     with paper_style():
         figure = new_figure(PAGE if bounded else COLUMN * 1.2, 2.7)
-        axes = np.atleast_1d(figure.subplots(1, 2 if bounded else 1, sharey=True))
+        axes = figure.subplots(1, 2 if bounded else 1, sharey=True, squeeze=False)[0]
         _curve(axes[0], curve["stress"].values * 1e-6, curve)
         axes[0].set_xlabel(r"stress $s$ (MPa)")
         axes[0].set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")

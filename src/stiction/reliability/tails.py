@@ -1,0 +1,165 @@
+"""What the lower tail hangs on: correlation length, interface length, the least strengths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.stats
+import xarray as xr
+
+from stiction._typing import Array
+from stiction.errors import InputError
+from stiction.fields.marginals import Beta
+from stiction.fields.random_field import RandomField
+from stiction.fields.spectra import CustomSpectrum
+from stiction.interface import Interface
+from stiction.methods import Method
+from stiction.problem import Problem
+from stiction.reliability.curve import failure_curve
+
+CORRELATION_RATIOS = (0.25, 0.5, 1.0, 2.0)
+LONGER = 4
+"""Ratio of the two interface lengths that are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class TailStudy:
+    """Failure curves of one system with one thing changed at a time.
+
+    Attributes
+    ----------
+    correlation : dict of Dataset
+        By xi_0/h_n.
+    length : dict of Dataset
+        By the length over that of the system: 1 and 4.
+    lower_end : dict of Dataset
+        By name of the marginal; all have the same mean and standard deviation.
+    """
+
+    correlation: Mapping[float, xr.Dataset]
+    length: Mapping[int, xr.Dataset]
+    lower_end: Mapping[str, xr.Dataset]
+
+
+def weakest_link(probability: Array, ratio: float) -> Array:
+    """P of an interface `ratio` times longer, were it a chain of independent pieces.
+
+    The survival probability to the power of the length ratio (Weibull, 1939), without loss of
+    digits for small probabilities.
+
+    Parameters
+    ----------
+    probability : (k,) array
+    ratio : float
+    """
+    result: Array = -np.expm1(ratio * np.log1p(-np.asarray(probability, dtype=np.float64)))
+    return result
+
+
+def longer(problem: Problem, ratio: int) -> Problem:
+    """The same system with `ratio` times the length at the same spacing.
+
+    Raises
+    ------
+    InputError
+        If something varies along the interface: there is no one way to continue it.
+    """
+    load, friction = problem.load, problem.friction
+    parts = {
+        "load.profile": load.profile,
+        "load.initial_stress": load.initial_stress,
+        "load.normal_pressure": load.normal_pressure,
+        "friction.weakening_rate": friction.weakening_rate,
+        "friction.critical_slip": friction.critical_slip,
+        "friction.residual_strength": friction.residual_strength,
+    }
+    varying = [name for name, value in parts.items() if isinstance(value, np.ndarray)]
+    if varying:
+        raise InputError([f"{name}: is given node by node; give a number" for name in varying])
+    interface = Interface(ratio * problem.interface.length, ratio * problem.interface.nodes)
+    return Problem(problem.solid, interface, friction, load, problem.mode)
+
+
+def alike_marginals(strength: RandomField) -> dict[str, Any]:
+    """Marginals of the same mean and standard deviation that end differently below.
+
+    The field's own; a beta distribution of twice its shape parameters, which ends lower and more
+    gently (Beta(3, 6) where the own one is not beta); and a log-normal one, which ends at zero.
+    """
+    mean, deviation = strength.mean, strength.standard_deviation
+    own = strength.marginal
+    a, b = (2.0 * own.alpha, 2.0 * own.beta) if isinstance(own, Beta) else (3.0, 6.0)
+    spread = deviation * (a + b) * np.sqrt((a + b + 1.0) / (a * b))
+    low = mean - spread * a / (a + b)
+    shape = float(np.sqrt(np.log1p((deviation / mean) ** 2)))
+    scale = float(mean * np.exp(-0.5 * shape**2))
+    name = f"beta({own.alpha:g}, {own.beta:g})" if isinstance(own, Beta) else own.type
+    return {
+        name: own,
+        f"beta({a:g}, {b:g})": Beta(alpha=a, beta=b, low=low, high=low + spread),
+        "log-normal": scipy.stats.lognorm(shape, scale=scale),
+    }
+
+
+def tail_study(
+    problem: Problem,
+    strength: RandomField,
+    *,
+    method: Method,
+    smallest: float = 1e-9,
+    target_cov: float = 0.3,
+    plain_samples: int = 10_000,
+    seed: int = 0,
+    workers: int | None = None,
+) -> TailStudy:
+    """Failure curves for several correlation lengths, two lengths and three lower ends.
+
+    Parameters
+    ----------
+    problem : Problem
+        Uniform along the interface.
+    strength : RandomField
+        Its spectrum must have a correlation length.
+    method : LocalCriterion or Equilibrium
+    smallest, target_cov, plain_samples, seed, workers
+        As in `failure_curve`.
+
+    Returns
+    -------
+    TailStudy
+    """
+    if isinstance(strength.spectrum, CustomSpectrum):
+        raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
+    options: dict[str, Any] = {
+        "method": method,
+        "smallest": smallest,
+        "target_cov": target_cov,
+        "plain_samples": plain_samples,
+        "seed": seed,
+        "workers": workers,
+    }
+    long = longer(problem, LONGER)
+
+    own_spectrum = strength.spectrum
+
+    def field(ratio: float) -> RandomField:
+        spectrum = own_spectrum.with_correlation_length(ratio * problem.nucleation_length)
+        return RandomField(strength.marginal, spectrum, strength.mean_mode)
+
+    own = failure_curve(problem, strength, **options)
+    others = list(alike_marginals(strength).items())
+    ends = {others[0][0]: own}
+    for name, marginal in others[1:]:
+        ends[name] = failure_curve(
+            problem, RandomField(marginal, strength.spectrum, strength.mean_mode), **options
+        )
+    return TailStudy(
+        correlation={
+            ratio: failure_curve(problem, field(ratio), **options) for ratio in CORRELATION_RATIOS
+        },
+        length={1: own, LONGER: failure_curve(long, strength, **options)},
+        lower_end=ends,
+    )
