@@ -149,6 +149,10 @@ class Run:
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
+    def ended(self, state: State) -> bool:
+        """Whether the end time is reached, up to the rounding of a sum of many steps."""
+        return bool(self.control[track.END_TIME] - state.time <= 1e-6 * self.medium.step)
+
     def _to_explicit(self, state: State) -> None:
         pairs = self.medium.kernel.poles.size
         scale_memory(state.memory, self.medium.gain, pairs, divide=True)
@@ -184,7 +188,7 @@ class Run:
                 self._to_implicit(state)
             elif reason != track.DONE or taken >= count:
                 return taken, reason
-            elif state.time >= self.control[track.END_TIME]:
+            elif self.ended(state):
                 return taken, track.DONE
         return taken, track.DONE
 
@@ -192,7 +196,7 @@ class Run:
         medium = self.medium
         left = self.control[track.END_TIME] - state.time
         if left < count * medium.step:
-            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-9))))
+            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
         taken, reason = explicit_steps(
             count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,

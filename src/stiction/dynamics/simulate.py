@@ -260,7 +260,7 @@ def simulate_rupture(
             frames.add_steps(part[:taken])
             if code == track.NOT_FINITE:
                 check_finite(run, state, code)
-            ended = _reason(code, state, stop, end_time)
+            ended = _reason(code, run, state, stop)
             if ended or interval is None or state.time - last_frame >= interval:
                 frames.add(state)
                 last_frame = state.time
@@ -303,7 +303,7 @@ def _quietly(action: Callable[[], None]) -> None:
         return  # the first error is already on its way
 
 
-def _reason(code: int, state: State, stop: str, end_time: float | None) -> str | None:
+def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
     """Why the run ends here, or None."""
     if code == track.ALL_SLID:
         return "sliding"
@@ -311,7 +311,7 @@ def _reason(code: int, state: State, stop: str, end_time: float | None) -> str |
         return "onset"
     if stop == "arrest" and state.watch[track.ARRESTED] > 0.0:
         return "arrest"
-    if end_time is not None and state.time >= end_time * (1.0 - 1e-15):
+    if run.ended(state):
         return "time"
     return None
 

@@ -1,0 +1,79 @@
+"""Validation: energy balance of a rupture, and its convergence with the time step.
+
+Work of the load, less friction, less the static strain energy of the slip, is radiated: never
+negative, and steady once everything rests.
+Run: python examples/validation_energy.py [folder for the figure]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import stiction as st
+from stiction.report.style import PAGE, new_figure, panel, paper_style, series
+
+SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
+LOAD = 7.5e5
+
+
+def rupture(steps: int, barrier: float = 1e6, end: float = 40e-6):
+    """A weak spot under constant load; a high barrier arrests what it starts."""
+    interface = st.Interface(length=0.1, nodes=256)
+    friction = st.SlipWeakening(weakening_rate=2e11, residual_strength=2e5)
+    problem = st.Problem(SOLID, interface, friction)
+    strength = barrier - (barrier - 6.5e5) * np.exp(-(((interface.x - 0.05) / 0.012) ** 4))
+    return st.simulate_rupture(
+        problem,
+        strength,
+        method=st.Rupture(loading_rate=1.0, implicit=False, time_step=end / steps),
+        load=([0.0, 1.0], [LOAD, LOAD]),
+        variables=[],
+        every=max(1, steps // 250),
+        steps=False,
+        stop="time",
+        end_time=end,
+    )
+
+
+def compute() -> list[tuple[int, float]]:
+    """Relative error of the radiated energy for ever smaller steps."""
+    reference = float(rupture(8000)["radiated_energy"][-1])
+    return [
+        (steps, abs(float(rupture(steps)["radiated_energy"][-1]) / reference - 1.0))
+        for steps in (400, 800, 1600)
+    ]
+
+
+def draw(folder: Path) -> None:
+    """Shares of the work over time, of a rupture that runs and of one that is arrested."""
+    with paper_style():
+        figure = new_figure(PAGE, 2.6)
+        runs = (rupture(800), rupture(4000, barrier=4e6, end=200e-6))
+        names = ("work", "fracture_energy", "strain_energy", "radiated_energy")
+        for letter, axes, run in zip("ab", figure.subplots(1, 2), runs, strict=True):
+            for i, name in enumerate(names):
+                axes.plot(run["time"] * 1e6, run[name], label=name.replace("_", " "), **series(i))
+            axes.set_xlabel("$t$ (µs)")
+            axes.set_ylabel("energy (J/m)")
+            axes.legend(loc="upper left" if letter == "a" else (0.5, 0.5))
+            panel(axes, letter)
+        figure.savefig(folder / "validation_energy.png")
+
+
+def main() -> None:
+    """Print and draw."""
+    errors = compute()
+    for steps, error in errors:
+        print(f"{steps:5d} steps: radiated energy off by {error:.2e}")
+    print(f"order {np.log2(errors[0][1] / errors[1][1]):.2f}")
+    held = rupture(4000, barrier=4e6, end=200e-6)["radiated_energy"].values
+    print(f"arrested: radiated {held[-1]:.6f} J/m, smallest {held.min():.1e}, change over the last "
+          f"half {abs(held[-1] / held[held.size // 2] - 1.0):.1e}")  # fmt: skip
+    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+
+
+if __name__ == "__main__":
+    main()

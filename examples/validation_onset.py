@@ -1,0 +1,75 @@
+"""Validation: onset by slow rupture against exact equilibrium, two independent solvers.
+
+Random strength at xi_0/h_n = 0.25, 0.5 and 2: the difference is smooth in the loading rate and
+vanishes with it.
+Run: python examples/validation_onset.py [folder for the figure]
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import stiction as st
+from stiction.report.style import COLUMN, new_figure, paper_style, series
+
+RATES = (1e3, 1e4, 1e5, 1e6, 2e7, 1e8, 1e9)
+
+
+def compute(
+    nodes: int = 512, samples: int = 5, rates: tuple[float, ...] = RATES
+) -> dict[float, np.ndarray]:
+    """Relative difference of the first instability, (rates, samples), by correlation ratio."""
+    problem = st.paper.problem(nodes=nodes, plane="stress")
+    found = {}
+    for ratio in (0.25, 0.5, 2.0):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", st.AccuracyWarning)
+            field = st.paper.strength(problem, correlation_ratio=ratio)
+            tau_p = field.sample(problem.interface, samples=samples, seed=3)
+        exact = st.onset(problem, tau_p, method=st.Equilibrium())["first_instability"].values
+        found[ratio] = np.array(
+            [
+                st.onset(problem, tau_p, method=st.Rupture(loading_rate=rate))[
+                    "first_instability"
+                ].values
+                / exact
+                - 1.0
+                for rate in rates
+            ]
+        )
+    return found
+
+
+def draw(folder: Path, found: dict[float, np.ndarray]) -> None:
+    """Difference over loading rate."""
+    with paper_style():
+        figure = new_figure(COLUMN * 1.2, 2.8)
+        axes = figure.subplots()
+        for i, (ratio, difference) in enumerate(found.items()):
+            style = series(i, marker=True)
+            label = rf"$\xi_0/h_n = {ratio:g}$"
+            axes.loglog(RATES, np.abs(difference).mean(axis=1), label=label, **style)
+        axes.axhline(1e-3, color="0.6", linewidth=0.7)
+        axes.text(1.2e3, 1.2e-3, "0.1 %", va="bottom")
+        axes.set_xlabel("loading rate (Pa/s)")
+        axes.set_ylabel("mean |rupture/equilibrium - 1|")
+        axes.legend()
+        figure.savefig(folder / "validation_onset.png")
+
+
+def main() -> None:
+    """Print and draw."""
+    found = compute()
+    for ratio, difference in found.items():
+        for rate, values in zip(RATES, difference, strict=True):
+            print(f"xi_0/h_n = {ratio:4.2f}, {rate:7.0e} Pa/s: mean {values.mean():+.2e}, "
+                  f"largest {np.abs(values).max():.2e}")  # fmt: skip
+    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""Validation: rupture speed against driving, S = (tau_p - tau_0)/(tau_0 - tau_r).
+
+Uniform interface, a weak patch that breaks at once. For weak driving the speed tends to the
+Rayleigh speed from below; for strong driving the rupture becomes supershear (Burridge 1973,
+Andrews 1976: in an unbounded medium below S of about 1.77).
+Run: python examples/validation_rupture_speed.py [folder for the figure]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import stiction as st
+from stiction.dynamics.measures import rupture_speed
+from stiction.report.style import COLUMN, new_figure, paper_style, series
+
+SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
+RATE, STRENGTH = 1e12, 1e6
+
+
+def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+    """Distance from the patch's centre in h_n, and speed in c_R, up to 0.85 of the half period."""
+    modulus = SOLID.effective_modulus("II")
+    spacing = 1.158 * modulus / RATE / 20.0
+    problem = st.Problem(
+        SOLID, st.Interface(length=nodes * spacing, nodes=nodes), st.SlipWeakening(
+            weakening_rate=RATE
+        ),
+    )  # fmt: skip
+    load = STRENGTH / (1.0 + ratio)
+    # Griffith length of a crack with fracture energy tau_p^2/(2 W) under the drop tau_0.
+    griffith = 2.0 * modulus * STRENGTH**2 / (np.pi * RATE * load**2)
+    x = problem.interface.x - 0.5 * problem.interface.length
+    run = st.simulate_rupture(
+        problem,
+        np.where(np.abs(x) < 0.75 * griffith, 0.98 * load, STRENGTH),
+        method=st.Rupture(loading_rate=1.0, implicit=False),
+        load=([0.0, 1.0], [load, load]),
+        variables=[],
+        every=500,
+        steps=False,
+    )
+    found = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
+    right = slice(nodes // 2, nodes // 2 + int(0.425 * nodes))
+    return x[right] / problem.nucleation_length, found[right] / SOLID.rayleigh_wave_speed
+
+
+def compute(ratios: tuple[float, ...] = (0.5, 0.8, 1.2, 1.6, 2.0, 3.5)) -> dict[float, tuple]:
+    """Speed along the interface for each driving ratio."""
+    return {ratio: speed(ratio) for ratio in ratios}
+
+
+def draw(folder: Path, curves: dict[float, tuple]) -> None:
+    """Speed over distance."""
+    with paper_style():
+        figure = new_figure(COLUMN * 1.3, 3.0)
+        axes = figure.subplots()
+        for i, (ratio, (x, found)) in enumerate(curves.items()):
+            # Speeds beyond c_d belong to a daughter crack that is born ahead of the front.
+            shown = np.where(found > 2.0, np.nan, found)
+            axes.plot(x, shown, label=f"$S = {ratio:g}$", **series(i))
+        shear = SOLID.shear_wave_speed / SOLID.rayleigh_wave_speed
+        fast = SOLID.dilatational_wave_speed / SOLID.rayleigh_wave_speed
+        for value, name in ((1.0, "$c_R$"), (np.sqrt(2) * shear, r"$\sqrt{2} c_s$"),
+                            (fast, "$c_d$")):  # fmt: skip
+            axes.axhline(value, color="0.7", linewidth=0.6, zorder=0)
+            axes.text(1.01, value, name, transform=axes.get_yaxis_transform(), va="center")
+        axes.set_xlabel("distance ($h_n$)")
+        axes.set_ylabel("rupture speed ($c_R$)")
+        axes.set_ylim(0.0, 2.1)
+        axes.legend(ncols=2, loc="lower right")
+        figure.savefig(folder / "validation_rupture_speed.png")
+
+
+def main() -> None:
+    """Print and draw."""
+    curves = compute()
+    for ratio, (_, found) in curves.items():
+        last = found[np.isfinite(found)][-20:]
+        kind = "supershear" if last.mean() > 1.1 else "below c_R"
+        print(f"S = {ratio:3.1f}: final speed {last.mean():.4f} c_R, {kind}")
+    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), curves)
+
+
+if __name__ == "__main__":
+    main()
