@@ -11,6 +11,9 @@ MARGIN = 1.1
 """The variance known so far is itself an estimate; aim a little further."""
 
 
+AnyRun = TypeVar("AnyRun", bound="Run")
+
+
 class Run(Protocol):
     """What pooling needs to know of a run."""
 
@@ -25,6 +28,9 @@ class Run(Protocol):
     @property
     def complete(self) -> bool:
         """Whether it came to an estimate."""
+
+    def light(self: AnyRun) -> AnyRun:
+        """The same without what only the last run is asked for."""
 
 
 class TailRun(Run, Protocol):
@@ -41,7 +47,6 @@ class TailRun(Run, Protocol):
         """Squared coefficient of variation of it."""
 
 
-AnyRun = TypeVar("AnyRun", bound=Run)
 AnyTailRun = TypeVar("AnyTailRun", bound=TailRun)
 
 
@@ -85,7 +90,7 @@ def run_until_precise(
         spent += run.evaluations
         if not run.complete:
             return runs or [run]
-        runs.append(run)
+        runs = [*(earlier.light() for earlier in runs), run]
         cov = judge(runs)
         if cov <= target_cov:
             return runs

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,12 @@ class Descent:
     def extent(self) -> tuple[float, float]:
         """Lowest and highest value seen."""
         return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
+
+    def light(self) -> Descent:
+        """The same without draws, which take nearly all of the memory."""
+        none = np.empty((0, 0))
+        populations = tuple(replace(population, draws=none) for population in self.populations)
+        return replace(self, populations=populations)
 
     def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
         holder = self.populations[0]
@@ -235,14 +241,7 @@ def descend(
         populations.append(Population(ceiling, log_probability, values, ancestors, chains, draws))
         if len(populations) > KEEP:
             old = populations[-KEEP - 1]
-            populations[-KEEP - 1] = Population(
-                old.ceiling,
-                old.log_probability,
-                old.values,
-                old.ancestors,
-                old.chains,
-                np.empty((0, dimension)),
-            )
+            populations[-KEEP - 1] = replace(old, draws=np.empty((0, dimension)))
         order = np.argsort(values, kind="stable")
         lowest = float(values[order[count - 1]])
         final = lowest < threshold

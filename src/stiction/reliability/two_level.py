@@ -56,7 +56,7 @@ class Bridge:
     ceiling : float
         b, Pa.
     descent : Descent
-        Of the cheap limit state.
+        Of the cheap limit state, without draws.
     failing, failing_values : arrays
         Draws and exact stress of failing samples.
     acceptance : float
@@ -79,6 +79,10 @@ class Bridge:
     failing_values: Array
     acceptance: float
     complete: bool
+
+    def light(self) -> Bridge:
+        """The same; nothing in it is large."""
+        return self
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -197,7 +201,7 @@ def bridge(
             spent,
             first_stage,
             population.ceiling,
-            descent,
+            descent.light(),
             kept,
             kept_values,
             acceptance,
@@ -218,7 +222,7 @@ def bridge(
         spent,
         first_stage,
         -math.inf,
-        descent,
+        descent.light(),
         np.empty((0, dimension)),
         np.zeros(0),
         0.0,

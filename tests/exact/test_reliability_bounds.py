@@ -1,0 +1,107 @@
+"""Probabilities that are exactly zero or one, intervals, and the error estimates themselves."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import stiction as st
+from stiction.reliability.estimate import failure_probability
+from stiction.reliability.tails import weakest_link
+from stiction.reliability.uncertainty import (
+    ancestral_variance,
+    binomial_interval,
+    chain_correlation,
+    effective_size,
+    lognormal_interval,
+)
+
+
+@pytest.fixture(scope="module")
+def system():
+    problem = st.paper.problem(nodes=256)
+    return problem, st.paper.strength(problem)
+
+
+@pytest.mark.parametrize(("stress", "expected"), [(0.66e6, 0.0), (0.1e6, 0.0), (1.66e6, 1.0)])
+def test_beyond_the_bounds_nothing_is_sampled(system, stress, expected):
+    result = failure_probability(*system, stress, method=st.LocalCriterion())
+    assert result.probability == expected
+    assert result.interval == (expected, expected)
+    assert result.coefficient_of_variation == 0.0
+    assert result.evaluations == 0
+    assert result.algorithm == "exact"
+    assert result.stress_above_bound == stress - 0.66e6
+
+
+def test_bounds_follow_load_and_initial_stress():
+    """Nothing slips below min (tau_p - tau_i)/p; in mean stress that is <tau_i> + load <p>."""
+    nodes = 256
+    wave = np.cos(2.0 * np.pi * np.arange(nodes) / nodes)
+    base = st.paper.problem(nodes=nodes)
+    load = st.Load(profile=1.0 + 0.2 * wave, initial_stress=1e5 + 2e4 * wave)
+    problem = st.Problem(base.solid, base.interface, base.friction, load)
+    field = st.paper.strength(base)
+    # At x = 0: (0.66e6 - 0.12e6)/1.2 = 0.45e6, plus the mean initial stress 0.1e6.
+    below = failure_probability(problem, field, 0.5499e6, method=st.LocalCriterion())
+    assert below.lower_bound == pytest.approx(0.55e6, rel=1e-12)
+    assert below.probability == 0.0
+    onset = st.onset(problem, field.sample(base.interface, samples=500), method=st.LocalCriterion())
+    assert float(onset["critical_stress"].min()) > below.lower_bound
+
+
+def test_binomial_interval_has_its_coverage():
+    low, high = binomial_interval(7, 100, 0.95)
+    # By definition of Clopper and Pearson (1934).
+    assert binom.sf(6, 100, low) == pytest.approx(0.025, rel=1e-9)
+    assert binom.cdf(7, 100, high) == pytest.approx(0.025, rel=1e-9)
+    assert binomial_interval(0, 100, 0.95)[0] == 0.0
+    # The rule of three, two-sided: 1 - 0.025^(1/100).
+    assert binomial_interval(0, 100, 0.95)[1] == pytest.approx(1.0 - 0.025**0.01, rel=1e-9)
+    assert binomial_interval(100, 100, 0.95)[1] == 1.0
+
+
+def test_lognormal_interval():
+    low, high = lognormal_interval(1e-6, 0.01, 0.95)
+    # Ten thousand families: the normal quantile, 1.96.
+    assert math.log(high / low) == pytest.approx(2 * 1.96 * 0.01, rel=1e-3)
+    assert lognormal_interval(1e-6, math.inf, 0.95) == (0.0, 1.0)
+    assert lognormal_interval(0.9, 0.5, 0.95)[1] == 1.0
+    # Few families: Student's quantile with ten degrees of freedom, 2.228.
+    low, high = lognormal_interval(1e-6, 1.0 / math.sqrt(11.0), 0.95)
+    width = 2 * 2.228 * math.sqrt(math.log1p(1.0 / 11.0))
+    assert math.log(high / low) == pytest.approx(width, rel=1e-3)
+
+
+def test_ancestral_variance_of_independent_families_is_binomial():
+    # 100 failures among 10,000 independent samples: (1 - p)/(p N), up to the correction 1/(1-v).
+    plain = (1.0 - 0.01) / 100.0
+    found = ancestral_variance(np.arange(100), 10_000)
+    assert found == pytest.approx(plain / (1.0 - plain), rel=1e-12)
+    # Ten families of ten are worth ten.
+    assert ancestral_variance(np.repeat(np.arange(10), 10), 10**9) == pytest.approx(1.0 / 9.0)
+    assert ancestral_variance(np.zeros(0, dtype=np.int64), 100) == math.inf
+    assert ancestral_variance(np.zeros(9, dtype=np.int64), 10**20) == math.inf
+
+
+def test_chain_correlation_of_known_chains():
+    rng = np.random.default_rng(0)
+    free = rng.random((10, 4000)) < 0.1
+    # Nine lagged products of 4000 chains: noise of about 0.02 a lag.
+    assert chain_correlation(free) < 0.1
+    # Chains that never move: 1 + gamma = number of steps.
+    stuck = np.tile(free[:1], (10, 1))
+    assert chain_correlation(stuck) == pytest.approx(9.0)
+    assert chain_correlation(np.ones((10, 5), dtype=bool)) == 0.0
+
+
+def test_effective_size():
+    assert effective_size(np.array([2.0, 2.0, 0.0, 2.0])) == pytest.approx(3.0)
+    assert effective_size(np.zeros(4)) == 0.0
+
+
+def test_weakest_link():
+    # Two pieces: 1 - (1 - p)^2, kept for p far below round-off of 1 - p.
+    p = np.array([0.5, 1e-3, 1e-18])
+    np.testing.assert_allclose(weakest_link(p, 2.0), [0.75, 2e-3 - 1e-6, 2e-18], rtol=1e-12)

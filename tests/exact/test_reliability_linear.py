@@ -1,0 +1,141 @@
+"""Linear limit states in many dimensions, whose failure probability is known."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from stiction.reliability.pooled import Tail, run_until_precise
+from stiction.reliability.subset import descend
+from stiction.reliability.two_level import bridge
+from stiction.reliability.uncertainty import generator
+
+DIMENSION = 600
+REPEATS = 50
+
+
+def linear(draws):
+    """Standard normal in 600 dimensions, every draw with the same weight."""
+    return draws.sum(axis=1) / math.sqrt(DIMENSION)
+
+
+across = []
+"""Difference of two draws in the last level of each run, which failure does not depend on."""
+
+
+@lru_cache(maxsize=1)
+def descents():
+    """Fifty independent runs to beta = 5; shallower tails are read off their earlier levels."""
+    runs = []
+    for seed in range(REPEATS):
+        run = descend(linear, DIMENSION, rng=generator(seed, 0), samples=1000, threshold=-5.0)
+        across.append(run.populations[-1].draws[:, :2] @ (1.0, -1.0))
+        runs.append(run.light())
+    return runs
+
+
+@pytest.mark.parametrize("beta", [3.0, 4.0, 5.0])
+def test_subset_simulation_is_unbiased_and_knows_its_error(beta):
+    found = np.array([run.probability(-beta) for run in descents()]) / norm.cdf(-beta)
+    error = found.std(ddof=1) / math.sqrt(REPEATS)
+    # Three standard errors of the mean of fifty runs.
+    assert abs(found.mean() - 1.0) < 3.0 * error
+    observed = found.std(ddof=1) / found.mean()
+    reported = math.sqrt(np.mean([run.relative_variance(-beta) for run in descents()]))
+    # Fifty runs know their own spread to 10 to 15 %; 30 % is two to three standard errors.
+    assert reported == pytest.approx(observed, rel=0.3)
+
+
+def test_levels_are_tenths_and_chains_move():
+    for run in descents()[:5]:
+        assert all(level.probability == pytest.approx(0.1) for level in run.levels[:-1])
+        # The target is 0.37; the step adapts over nine steps a level.
+        assert all(0.2 < level.acceptance < 0.6 for level in run.levels[1:])
+        thresholds = [level.threshold for level in run.levels]
+        assert thresholds == sorted(thresholds, reverse=True)
+
+
+def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
+    last = [run.populations[-1] for run in descents()]
+    means = [population.values.mean() for population in last]
+    truth = [-norm.pdf(p.ceiling) / norm.cdf(p.ceiling) for p in last]
+    excess = np.array(means) - np.array(truth)
+    # Each run's mean scatters by a few hundredths; the average of fifty by their standard error.
+    assert abs(excess.mean()) < 3.0 * excess.std(ddof=1) / math.sqrt(REPEATS)
+    # Orthogonal directions remain standard normal: 50,000 values, heavily correlated along chains.
+    assert np.concatenate(across).var() == pytest.approx(2.0, abs=0.1)
+
+
+def test_quantiles_of_pooled_runs():
+    tail = Tail(descents())
+    for beta in (1.0, 3.0, 4.5):
+        chance = norm.cdf(-beta)
+        # dP/P = beta d(beta): the pooled c.o.v. is below 0.06, so the quantile is good to 0.02.
+        cov = tail.coefficient_of_variation(-beta)
+        assert cov < 0.07
+        assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cov / beta)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beta", [3.0, 4.0, 5.0])
+def test_runs_until_precise_are_unbiased(beta):
+    """Stopping when the estimate looks good must not favour estimates that look good."""
+
+    def one(seed):
+        def make(samples, number, left):
+            rng = generator(seed, 1, number)
+            return descend(linear, DIMENSION, rng=rng, samples=samples, threshold=-beta)
+
+        runs = run_until_precise(
+            make,
+            lambda runs: Tail(runs).coefficient_of_variation(-beta),
+            target_cov=0.2,
+            first=1000,
+            largest=5000,
+            max_evaluations=10**7,
+        )
+        return Tail(runs).probability(-beta), Tail(runs).coefficient_of_variation(-beta)
+
+    found, reported = np.array([one(seed) for seed in range(REPEATS)]).T
+    found /= norm.cdf(-beta)
+    assert np.all(reported <= 0.2)
+    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(REPEATS)
+    observed = found.std(ddof=1) / found.mean()
+    assert math.sqrt(np.mean(reported**2)) == pytest.approx(observed, rel=0.3)
+
+
+@pytest.mark.parametrize("likeness", [1.0, 0.98])
+def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
+    """The cheap limit state may fail where the exact one holds and the other way round."""
+    other = math.sqrt(1.0 - likeness**2)
+
+    def cheap(draws):
+        return likeness * draws[:, 0] + other * draws[:, 1]
+
+    def exact(draws):
+        return draws[:, 0]
+
+    runs = [
+        bridge(
+            cheap,
+            exact,
+            50,
+            samples=300,
+            rng=generator(seed, 2),
+            max_evaluations=10**6,
+            threshold=-4.0,
+        )
+        for seed in range(REPEATS)
+    ]
+    found = np.array([run.probability(-4.0) for run in runs]) / norm.cdf(-4.0)
+    # Three standard errors of fifty runs.
+    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(REPEATS)
+    reported = math.sqrt(np.mean([run.relative_variance(-4.0) for run in runs]))
+    # Counts the same noise of the middle factor twice at most, so it may be a little high.
+    assert reported == pytest.approx(found.std(ddof=1) / found.mean(), rel=0.35)
+    if likeness == 1.0:
+        assert all(run.last == 1.0 for run in runs)
+    else:
+        assert min(run.last for run in runs) < 1.0
