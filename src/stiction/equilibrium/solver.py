@@ -20,7 +20,7 @@ from stiction.equilibrium.follow import (
     follow,
     residual_nodes,
 )
-from stiction.equilibrium.jump import SLIDING, escape_run
+from stiction.equilibrium.jump import SLIDING, UNDECIDED, escape_run
 from stiction.equilibrium.large import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import runs_away
@@ -81,11 +81,14 @@ class Solver:
         table = np.empty((count, batch.COLUMNS))
         multipliers = np.empty((count, nodes))
         slips = np.empty((count if self.slip else 0, nodes))
+        known: dict[int, Solution] = {}
         if nodes < LARGE_GRID:
             self._batch(rows, table, slips, multipliers)
         else:
             for row in range(count):
-                self._one(rows, row, table, slips, multipliers)
+                solution = self._one(rows, row, table, slips, multipliers)
+                if solution is not None and table[row, batch.FATE] == UNDECIDED:
+                    known[row] = solution
         self._check(table)
         load = table[:, batch.LOAD].copy()
         first = load.copy()
@@ -95,7 +98,7 @@ class Solver:
         sliding_at = table[:, batch.POSITION].copy()
         for row in map(int, np.flatnonzero(fate != SLIDING)):
             sample = sample_of(rows, row)
-            state = self.follow_row(sample, bool(fate[row] == batch.FLOOR_REACHED))
+            state = self._follow(sample, fate[row] == batch.FLOOR_REACHED, known.get(row))
             load[row] = state.load
             if state.events:
                 events[row] = state.events
@@ -126,12 +129,11 @@ class Solver:
             values["sensitivity"] = multipliers * mean_profile
         return values, events
 
-    def follow_row(self, sample: Sample, from_rest: bool) -> State:
+    def _follow(self, sample: Sample, from_rest: bool, solution: Solution | None) -> State:
         """Follow one sample to global sliding, from rest or from its first instability."""
-        if from_rest:
-            return follow(self.setting, sample, at_rest(sample))
-        solution = self.setting.programme(sample.excess, sample.rate)
-        if solution is None:
+        if not from_rest and solution is None:
+            solution = self.setting.programme(sample.excess, sample.rate)
+        if from_rest or solution is None:
             return follow(self.setting, sample, at_rest(sample))
         state = State(solution.load, solution.slip, solution.stiff, solution.multiplier)
         fall(self.setting, sample, state)
@@ -150,7 +152,9 @@ class Solver:
             setting.modulus, table, slips, multipliers,
         )  # fmt: skip
 
-    def _one(self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array) -> None:
+    def _one(
+        self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array
+    ) -> Solution | None:
         """Solve the programme of one row on a large grid, and test quickly for arrest."""
         setting = self.setting
         sample = sample_of(rows, row)
@@ -158,8 +162,10 @@ class Solver:
         solution = setting.programme(sample.excess, sample.rate)
         if solution is None:  # followed event by event instead
             line[:] = 0.0
+            line[batch.GAP] = np.nan
+            multipliers[row] = 0.0
             line[batch.FATE] = batch.FLOOR_REACHED
-            return
+            return None
         multipliers[row] = solution.multiplier
         if self.slip:
             slips[row] = solution.slip
@@ -174,13 +180,14 @@ class Solver:
         line[batch.LENGTH] = length * setting.spacing
         if np.any(solution.slip > OVERSHOOT * sample.critical):
             line[batch.FATE] = batch.FLOOR_REACHED
-            return
+            return solution
         line[batch.FATE] = runs_away(
             sample, setting.wide_column, solution.load, solution.slip.copy(),
             solution.stiff.copy(), solution.multiplier, stiff_multiplier,
             escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
             setting.reach, np.empty((6, setting.nodes)),
         )  # fmt: skip
+        return solution
 
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""
