@@ -32,8 +32,9 @@ def caption(data: Data) -> str:
         " local criterion is too high: median, quartiles, and 5 and 95 % points; the diamond is the"
         f" mean. (c) Position of onset by both, {min(DRAWN, data.samples)} samples at the shortest"
         " (filled) and the longest correlation length. (d) Share of samples that the local"
-        " criterion puts more than half a nucleation length off. (e) Number of patches that slip at onset, mean and 5 to"
-        " 95 % range. (f) Length of the critical patch, the same, in nucleation lengths."
+        " criterion puts more than half a nucleation length off. (e) Number of patches that slip at"
+        " onset, mean and 5 to 95 % range. (f) Length of the critical patch, the same, in units of"
+        " the nucleation length."
     )
 
 

@@ -1,0 +1,63 @@
+"""The distribution of the critical stress from crossing rates, against Monte Carlo."""
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.statistics.rice import rice_distribution
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_lower_tail_agrees_with_monte_carlo(problem, make_strength, ratio):
+    strength = make_strength(ratio)
+    found = rice_distribution(problem, strength, profiles=8192, seed=1)
+    sampled = [
+        st.onset(
+            problem,
+            strength.sample(problem.interface, samples=4096, seed=2, first=4096 * part),
+            method=st.LocalCriterion(),
+        ).critical_stress.values
+        for part in range(4)
+    ]
+    stress = np.concatenate(sampled)
+    for probability, tolerance in ((0.03, 0.25), (0.1, 0.15)):
+        # Errors of both counts: at 0.03 some 250 crossings and 490 samples, 6 and 5 %, three
+        # times over, and 5 % of the approximation.
+        level = np.quantile(stress, probability)
+        assert found.failure_probability(level) == pytest.approx(probability, rel=tolerance)
+    # Beyond its range it is too low, by a few per cent at the median: crossings cluster.
+    median = found.failure_probability(np.median(stress))
+    assert 0.44 < median < 0.5
+
+
+def test_says_where_to_trust_it(problem, make_strength):
+    found = rice_distribution(problem, make_strength(0.5), profiles=256)
+    assert found.trusted.any()
+    assert found.probability[found.trusted].max() <= 0.1
+    # Ten crossings in 256 profiles: not much below 10/256, whatever the clustering.
+    assert found.probability[found.trusted].min() > 0.5 * 10 / 256
+    assert np.all(np.diff(found.probability) >= 0.0)
+    assert found.relative_error[found.trusted].max() <= 10**-0.5
+    level = found.quantile(0.05)
+    assert found.failure_probability(level) == pytest.approx(0.05, rel=1e-9)
+    assert found.failure_probability(0.5e6) == 0.0
+
+
+def test_crossings_are_those_of_the_profiles(problem, make_strength):
+    """Counted one by one at a few levels."""
+    strength = make_strength(1.0)
+    found = rice_distribution(problem, strength, profiles=32, seed=4)
+    tau_n = st.nucleation_stress(problem, strength.sample(problem.interface, samples=32, seed=4))
+    before = np.roll(tau_n, 1, axis=1)
+    for index in (100, 400, 800):
+        level = found.stress[index]
+        crossings = np.sum((before > level) & (tau_n <= level))
+        assert found.crossing_rate[index] * 32 * 0.1 == pytest.approx(crossings, abs=1e-6)
+        assert found.point_survival[index] == pytest.approx(np.mean(tau_n > level), abs=1e-12)
+
+
+def test_same_seed_same_numbers(problem, make_strength):
+    first, second = (rice_distribution(problem, make_strength(), profiles=64) for _ in range(2))
+    np.testing.assert_array_equal(first.probability, second.probability)
+    with pytest.raises(st.InputError, match="profiles"):
+        rice_distribution(problem, make_strength(), profiles=3)

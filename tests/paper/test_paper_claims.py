@@ -1,0 +1,123 @@
+"""Claims: rules judge numbers, and other parameters give other verdicts."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.paper.claims import CLAIMS, Finding, Verdict, judged
+from stiction.paper.claims.claim import SUBJECTS, rounded
+from stiction.paper.claims.rules import agrees, below, falling, rising, worst
+from stiction.paper.data import Data
+from stiction.paper.setting import Setting
+from stiction.paper.studies import STUDIES, compute
+from stiction.paper.studies.context import Context
+from stiction.statistics.estimates import Estimate
+
+FALLING = [Estimate(3.0, 0.1), Estimate(2.0, 0.1), Estimate(1.0, 0.1)]
+
+
+def test_rules():
+    assert agrees(Estimate(0.0346), 0.034, 0.001) is Verdict.CORRECTED
+    assert agrees(Estimate(0.0344), 0.034, 0.001) is Verdict.HOLDS
+    assert agrees(Estimate(0.0308), 0.034, 0.001) is Verdict.FAILS
+    assert agrees(Estimate(0.0308, 0.001), 0.034, 0.001) is Verdict.HOLDS
+    assert falling(FALLING) is Verdict.HOLDS
+    assert rising(FALLING) is Verdict.FAILS
+    assert falling([*FALLING, Estimate(1.1, 0.1)]) is Verdict.OPEN
+    assert falling([*FALLING, Estimate(2.1, 0.1)]) is Verdict.FAILS
+    assert below(Estimate(1.0, 0.1), 2.0) is Verdict.HOLDS
+    assert below(Estimate(1.0, 0.1), 1.1) is Verdict.OPEN
+    assert below(Estimate(1.0, 0.1), 0.5) is Verdict.FAILS
+    assert worst([Verdict.HOLDS, Verdict.OPEN, Verdict.CORRECTED]) is Verdict.OPEN
+
+
+def test_numbers_are_shown_to_the_digits_that_they_have():
+    assert rounded(Estimate(0.694512, 0.00021)) == "0.69451 ± 0.00021"
+    assert rounded(Estimate(0.694512, 0.0005)) == "0.6945 ± 0.0005"
+    assert rounded(Estimate(29.28, 0.07)) == "29.28 ± 0.07"
+    assert rounded(Estimate(5123.0, 250.0)) == "5123 ± 250"
+    assert rounded(Estimate(1.0003606)) == "1.00036"
+
+
+def _judge(name: str, setting: Setting) -> Finding:
+    return CLAIMS[name].judge(Data(setting, 0, 0, {}))
+
+
+def test_parameters_decide_the_printed_numbers():
+    paper, strain = Setting(), Setting(problem=st.paper.problem(plane="strain"))
+    assert _judge("nucleation-length", paper).verdict is Verdict.FAILS
+    assert _judge("nucleation-length", strain).verdict is Verdict.CORRECTED
+    assert _judge("effective-modulus", paper).verdict is Verdict.FAILS
+    solid = dataclasses.replace(paper.problem.solid, poisson_ratio=0.0)
+    incompressible = Setting(problem=dataclasses.replace(paper.problem, solid=solid))
+    assert _judge("effective-modulus", incompressible).verdict is Verdict.HOLDS
+    assert _judge("mean-strength", paper).verdict is Verdict.CORRECTED
+    exact = Setting(marginal=st.Beta(1.5, 3.0, 0.66e6, 1.68e6))
+    assert _judge("mean-strength", exact).verdict is Verdict.HOLDS
+    assert _judge("power-kept", paper).verdict is Verdict.HOLDS
+    assert _judge("power-kept", Setting(exponent=1.5)).verdict is not Verdict.HOLDS
+
+
+@pytest.fixture(scope="module")
+def findings() -> dict[str, dict[str, Finding]]:
+    """All claims at 256 nodes and few samples, for the paper's strength and for its mirror."""
+    result = {}
+    for name, marginal in (
+        ("paper", st.Beta(1.5, 3.0, 0.66e6, 1.66e6)),
+        ("mirror", st.Beta(3.0, 1.5, 0.66e6, 1.66e6)),
+    ):
+        setting = Setting(problem=st.paper.problem(nodes=256), marginal=marginal)
+        context = Context(setting, 300, 0)
+        studies = compute(STUDIES if name == "paper" else ["monte_carlo"], context)
+        data = Data(setting, 300, 0, studies)
+        result[name] = {claim.name: finding for claim, finding in judged(data)}
+    return result
+
+
+def test_every_claim_has_a_verdict(findings):
+    assert len(CLAIMS) >= 50
+    assert set(findings["paper"]) == set(CLAIMS)
+    for name, finding in findings["paper"].items():
+        assert isinstance(finding.verdict, Verdict), name
+        assert finding.computed, name
+        assert all(np.isfinite(each.estimate.value) for each in finding.computed), name
+    assert {claim.subject for claim in CLAIMS.values()} == set(SUBJECTS)
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [
+        ("nucleation-mean", Verdict.HOLDS),
+        ("nucleation-variance", Verdict.HOLDS),
+        ("linear-variance", Verdict.HOLDS),
+        ("lower-friction-always", Verdict.CORRECTED),
+        ("more-variable", Verdict.FAILS),
+        ("uniform-position", Verdict.HOLDS),
+        ("weakest-does-not-govern", Verdict.HOLDS),
+        ("runaway-length", Verdict.HOLDS),
+        ("printed-modulus", Verdict.FAILS),
+        ("interaction-explains", Verdict.CORRECTED),
+        ("residual-not-reached", Verdict.HOLDS),
+        ("precursors-unlikely", Verdict.HOLDS),
+        ("mirrored-variability", Verdict.HOLDS),
+        ("longer-interface", Verdict.HOLDS),
+    ],
+)
+def test_verdicts_that_few_samples_decide(findings, name, verdict):
+    """Those whose differences are many standard errors even with 300 samples.
+
+    'Undecided' is allowed where the rule compares small differences; the opposite verdict is not.
+    """
+    assert findings["paper"][name].verdict in (verdict, Verdict.OPEN)
+
+
+def test_mirrored_strength_changes_verdicts(findings):
+    """A mostly strong interface is not close to its lower bound, and is skewed the other way."""
+    paper, mirror = findings["paper"], findings["mirror"]
+    assert paper["close-to-bound"].verdict is Verdict.HOLDS
+    assert mirror["close-to-bound"].verdict is Verdict.FAILS
+    assert mirror["runaway-length"].verdict is Verdict.FAILS  # a larger stress drop
+    skewness = mirror["nucleation-skewness"].computed[0].estimate
+    assert skewness.value < 0.0

@@ -1,0 +1,124 @@
+"""The whole paper in its shortest form: every file there, nothing blank, mistakes refused."""
+
+import csv
+import re
+import shutil
+
+import matplotlib.image
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+from stiction.paper.claims import CLAIMS
+from stiction.paper.figures import FIGURES
+from stiction.paper.setting import Setting
+from stiction.paper.studies import STUDIES
+
+
+def _options() -> dict:
+    return {"samples": 64, "setting": Setting(problem=st.paper.problem(nodes=256))}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("paper") / "new" / "folder"
+    steps = []
+    report = st.paper.run(
+        out, progress=lambda done, total: steps.append((done, total)), **_options()
+    )
+    assert report == out / "report.html"
+    assert steps[-1][0] == steps[-1][1]
+    assert steps == sorted(steps)
+    return out
+
+
+def test_every_figure_is_there_and_not_blank(folder):
+    for figure in FIGURES.values():
+        path = folder / "figures" / f"figure-{figure.number}-{figure.name}.png"
+        pixels = matplotlib.image.imread(path)[..., :3]
+        assert pixels.shape[1] > 1000
+        # Ink on at least 1 % of the area, and not on all of it.
+        assert 0.01 < np.mean(pixels.min(axis=2) < 0.6) < 0.7
+        assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_figures_are_legible_in_grey(folder):
+    """No series may be so light that grey print loses it."""
+    from matplotlib.colors import to_rgb
+
+    from stiction.report.style import color, series
+
+    styles = [series(i, marker=True) for i in range(4)]
+    assert len({str(style["linestyle"]) for style in styles}) == 4
+    assert len({style["marker"] for style in styles}) == 4
+    light = [float(np.dot(to_rgb(color(i)), (0.299, 0.587, 0.114))) for i in range(4)]
+    assert light == sorted(light)
+    assert max(light) < 0.72
+
+
+def test_report_holds_all_it_shows(folder):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    assert html.count("data:image/png;base64,") == len(FIGURES)
+    # Nothing is fetched from elsewhere.
+    assert not re.search(r"""(src|href)=["'](https?:|//|file:)""", html)
+    assert "<link" not in html
+    assert html.count('class="verdict"') == len(CLAIMS)
+    for text in ("Provenance", "numpy", "seed 0", "Time taken", "Does not hold"[5:]):
+        assert text in html
+    # No symbol is left as it is written in the sources.
+    body = re.sub(
+        r"base64,[^\"]*|<code>.*?</code>|<style>.*?</style>|<script>.*?</script>",
+        "",
+        html,
+        flags=re.S,
+    )
+    assert not re.search(r"\b(tau|xi|h)_[a-z0-9]+\b", body)
+
+
+def test_tables_and_results_are_whole(folder):
+    with (folder / "tables" / "claims.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["claim"] for row in rows} == set(CLAIMS)
+    assert all(row["verdict"] and row["computed"] for row in rows)
+    assert len(list((folder / "tables").glob("figure-*.csv"))) >= len(FIGURES)
+    root = xr.open_dataset(folder / "results.nc")
+    assert root.attrs["samples"] == 64
+    assert root.attrs["stiction_version"] == st.__version__
+    root.close()
+    for name in STUDIES:
+        with xr.open_dataset(folder / "results.nc", group=name) as study:
+            assert study.attrs["title"]
+    assert not list(folder.rglob("*.part"))
+
+
+def test_same_numbers_whatever_the_workers(folder, tmp_path):
+    st.paper.run(tmp_path, workers=1, only=["mc"], **_options())
+    with (
+        xr.open_dataset(folder / "results.nc", group="monte_carlo") as one,
+        xr.open_dataset(tmp_path / "results.nc", group="monte_carlo") as other,
+    ):
+        for name in ("critical_stress", "critical_position", "nucleation_counts"):
+            np.testing.assert_array_equal(one[name].values, other[name].values)
+
+
+def test_only_some_figures(tmp_path):
+    report = st.paper.run(tmp_path, only="mapping", **_options())
+    assert [path.name for path in (tmp_path / "figures").glob("*.png")] == ["figure-2-mapping.png"]
+    assert "Figure 5" not in report.read_text(encoding="utf-8")
+    # A second run replaces the first.
+    st.paper.run(tmp_path, only=["problem", "variance"], **_options())
+    assert "Figure 7" in report.read_text(encoding="utf-8")
+    shutil.rmtree(tmp_path)
+
+
+def test_all_mistakes_at_once(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(st.InputError) as caught:
+        st.paper.run(file, samples=3, seed=-1, workers=0, only=["mcc", "variance"])
+    text = str(caught.value)
+    assert "did you mean 'mc'" in text
+    for key in ("samples", "seed", "workers", "out"):
+        assert f"{key}:" in text
+    assert len(caught.value.problems) == 5
