@@ -37,6 +37,7 @@ from stiction.errors import InputError
 from stiction.study import Study
 
 FAILED = "failed_samples"
+OVERHEAD = 2**16
 
 
 @dataclass(frozen=True)
@@ -193,17 +194,17 @@ def folder_beside(file: Path) -> Path:
 def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as one NetCDF file, whole or not at all."""
     aside = path.with_name(path.name + ".part")
+    # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
+    if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
+        raise cannot_write(path, OSError(errno.ENOSPC, ""))
     try:
         result.to_netcdf(aside)
         with open(aside, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(aside, path)
     except (OSError, RuntimeError) as error:  # the NetCDF library raises either
-        # The NetCDF library does not say that the disk is full.
-        full = _free_bytes(path.parent) < 2**20
         aside.unlink(missing_ok=True)
-        reason = OSError(errno.ENOSPC, "") if full else error
-        raise cannot_write(path, reason) from error
+        raise cannot_write(path, error) from error
     sync_folder(path.parent)
 
 
