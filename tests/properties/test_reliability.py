@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
+from stiction.equilibrium.method import Equilibrium
 from stiction.reliability.curve import failure_curve
 from stiction.reliability.design import design_stress
 from stiction.reliability.estimate import failure_probability
@@ -51,7 +52,7 @@ def test_two_levels_are_reproducible(system):
         failure_probability(
             *system,
             0.665e6,
-            method=st.Equilibrium(),
+            method=Equilibrium(),
             algorithm="two_level",
             target_cov=0.5,
             seed=2,

@@ -138,10 +138,15 @@ def failure_curve(
     tail = subset_tail(
         state, float(smallest), int(seed), target_cov, budget_of(state, max_evaluations)
     )
+    deepest = float(smallest)
     if not tail.runs[0].complete:
-        say([f"the evaluations allowed do not reach P = {smallest:g}: raise max_evaluations"])
-    # As deep as the samples go, whatever was asked for.
-    deepest = max(smallest, tail.probability(np.nextafter(tail.runs[0].extent[0], np.inf)))
+        deepest = tail.probability(float(np.nextafter(tail.runs[0].levels[-1].threshold, np.inf)))
+        say(
+            [
+                f"the evaluations allowed do not reach P = {smallest:g}: the curve ends at"
+                f" {deepest:.2g}; raise max_evaluations"
+            ]
+        )
     decades = max(np.log10(COMMONEST / deepest), 0.0)
     count = int(np.ceil(decades * points_per_decade)) + 1
     chances = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)

@@ -141,4 +141,4 @@ class Tail(Generic[AnyTailRun]):
                 low = middle
             else:
                 high = middle
-        return 0.5 * (low + high)
+        return high

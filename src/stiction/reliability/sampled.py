@@ -258,7 +258,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
     largest = max(runs, key=lambda run: run.samples)
     diagnostics = {
         "runs": len(runs),
-        "middle_factor": float(np.mean(largest.values < stress)),
+        "middle_factor": float(np.mean(largest.values < stress)) if largest.complete else 0.0,
         "last_factor": last,
         "ceiling": largest.ceiling,
         "walk_acceptance": min(run.acceptance for run in runs),

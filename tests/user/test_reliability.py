@@ -1,0 +1,229 @@
+"""Mistakes, budgets that do not suffice, odd cases, and the command line of failure probability."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import typer
+import xarray as xr
+from typer.testing import CliRunner
+
+import stiction as st
+from stiction.cli.reliability import reliability
+from stiction.equilibrium.method import Equilibrium
+from stiction.reliability.curve import failure_curve
+from stiction.reliability.design import design_stress
+from stiction.reliability.estimate import failure_probability
+from stiction.reliability.limit_state import LimitState
+
+LOCAL = st.LocalCriterion()
+
+
+@pytest.fixture(scope="module")
+def system():
+    problem = st.paper.problem(nodes=256)
+    return problem, st.paper.strength(problem, 0.5)
+
+
+@dataclass(frozen=True)
+class FakeRupture:
+    """Stands for a method whose samples take a second each."""
+
+    type: str = "rupture"
+
+    @property
+    def variables(self):
+        return LOCAL.variables
+
+    def prepare(self, problem):
+        return LOCAL.prepare(problem)
+
+
+def test_everything_wrong_is_named_at_once(system):
+    with pytest.raises(st.InputError) as caught:
+        failure_probability(
+            *system,
+            "low",
+            method=st.LocalCriterion,
+            target_cov=0.0,
+            confidence=1.0,
+            max_evaluations=3,
+        )
+    text = str(caught.value)
+    for word in ("target_cov", "confidence", "max_evaluations", "stress", "method"):
+        assert word in text
+    with pytest.raises(st.InputError, match="seed"):
+        failure_probability(*system, 0.67e6, method=LOCAL, seed=-1)
+    with pytest.raises(st.InputError, match="event"):
+        failure_probability(*system, 0.67e6, method=LOCAL, event="collapse")
+    with pytest.raises(st.InputError, match="workers"):
+        failure_probability(*system, 0.67e6, method=LOCAL, workers=0)
+
+
+def test_unknown_algorithm_offers_the_nearest(system):
+    with pytest.raises(st.InputError, match="did you mean 'subset'"):
+        failure_probability(*system, 0.67e6, method=LOCAL, algorithm="subsets")
+
+
+@pytest.mark.parametrize("stress", [np.nan, np.inf, True, None, [0.67e6]])
+def test_stress_must_be_a_number(system, stress):
+    with pytest.raises(st.InputError, match="stress"):
+        failure_probability(*system, stress, method=LOCAL)
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, -0.1, 2.0, np.nan, "1e-6", 1e-40])
+def test_probability_must_lie_between_zero_and_one(system, probability):
+    with pytest.raises(st.InputError, match="probability"):
+        design_stress(*system, probability=probability, method=LOCAL)
+    with pytest.raises(st.InputError, match="smallest"):
+        failure_curve(*system, smallest=probability, method=LOCAL)
+
+
+def test_rupture_goes_with_plain_sampling_only(system):
+    rupture = FakeRupture()
+    for algorithm in ("subset", "importance", "two_level"):
+        with pytest.raises(st.InputError, match="plain"):
+            failure_probability(*system, 0.69e6, method=rupture, algorithm=algorithm)
+    with pytest.raises(st.InputError, match="monte_carlo"):
+        design_stress(*system, probability=1e-3, method=rupture)
+    result = failure_probability(*system, 0.72e6, method=rupture, target_cov=0.2)
+    assert result.algorithm == "plain"
+    assert "rupture" in result.reason
+    # A hundred samples first, not a thousand.
+    assert result.evaluations <= 200
+
+
+def test_two_levels_need_a_uniform_weakening_rate(system):
+    problem, field = system
+    wave = 1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(256) / 256)
+    varying = st.Problem(
+        problem.solid, problem.interface, st.SlipWeakening(weakening_rate=0.5e12 * wave)
+    )
+    with pytest.raises(st.InputError, match="weakening rate varies"):
+        failure_probability(varying, field, 0.67e6, method=Equilibrium(), algorithm="two_level")
+    with pytest.raises(st.InputError, match="weakening rate varies"):
+        failure_probability(varying, field, 0.67e6, method=Equilibrium(), algorithm="importance")
+    with pytest.raises(st.InputError, match="not to 'local_criterion'"):
+        failure_probability(problem, field, 0.67e6, method=LOCAL, algorithm="two_level")
+    result = failure_probability(varying, field, 0.675e6, method=Equilibrium(), target_cov=0.4)
+    assert result.algorithm == "subset"
+    assert 0.0 < result.probability < 0.01
+
+
+def test_auto_says_why(system):
+    often = failure_probability(*system, 0.7e6, method=LOCAL)
+    assert (often.algorithm, often.evaluations >= 1000) == ("plain", True)
+    assert "frequent" in often.reason
+    rare = failure_probability(*system, 0.665e6, method=LOCAL, target_cov=0.3)
+    assert rare.algorithm == "subset"
+    assert "rare" in rare.reason
+    both = failure_probability(*system, 0.665e6, method=Equilibrium(), target_cov=0.4)
+    assert both.algorithm == "two_level"
+    assert both.first_stage_evaluations > both.evaluations
+    assert "c.o.v." in str(both)
+
+
+@pytest.mark.parametrize("algorithm", ["plain", "subset", "importance"])
+def test_too_few_evaluations_return_what_there_is(system, algorithm):
+    with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
+        result = failure_probability(
+            *system,
+            0.665e6,
+            method=LOCAL,
+            algorithm=algorithm,
+            target_cov=0.01,
+            max_evaluations=2000,
+        )
+    assert result.evaluations <= 2000
+    assert result.warnings
+    low, high = result.interval
+    # P is about 8e-5; all intervals must hold it, however wide they are.
+    assert low < 8e-5 < high < 0.1
+
+
+def test_budget_too_small_for_any_failure(system):
+    with pytest.warns(st.AccuracyWarning, match="come down to"):
+        result = failure_probability(
+            *system, 0.6605e6, method=LOCAL, algorithm="subset", max_evaluations=3000
+        )
+    assert result.interval[0] == 0.0
+    assert 1e-9 < result.interval[1] < 0.1
+    with pytest.warns(st.AccuracyWarning, match="do not reach"):
+        answer = design_stress(*system, probability=1e-9, method=LOCAL, max_evaluations=3000)
+    assert answer.interval[0] == 0.66e6
+    with pytest.warns(st.AccuracyWarning, match="do not reach"):
+        curve = failure_curve(
+            *system, method=LOCAL, smallest=1e-9, max_evaluations=3000, plain_samples=0
+        )
+    assert 1e-5 < float(curve["probability"].min()) < 1e-2
+    with pytest.warns(st.AccuracyWarning):
+        nothing = failure_probability(
+            *system, 0.6605e6, method=Equilibrium(), algorithm="two_level", max_evaluations=100
+        )
+    assert nothing.probability == 0.0
+    assert nothing.interval[1] < 1e-6
+
+
+def test_a_median_interface_that_fails_at_once(system):
+    """At the origin of the draws the strength is its median, 0.97 MPa, everywhere."""
+    result = failure_probability(*system, 0.99e6, method=LOCAL, algorithm="subset")
+    assert result.probability == 1.0
+    assert len(result.levels) == 1
+    with pytest.warns(st.AccuracyWarning, match="median interface"):
+        shifted = failure_probability(*system, 0.99e6, method=LOCAL, algorithm="importance")
+    assert shifted.probability == pytest.approx(1.0)
+    chosen = failure_probability(*system, 0.99e6, method=LOCAL)
+    assert (chosen.algorithm, chosen.probability, chosen.warnings) == ("plain", 1.0, ())
+
+
+def test_first_instability_is_never_later_than_letting_go(system):
+    state = LimitState(system[0], (("strength", system[1]),), Equilibrium())
+    draws = state.draws(0, 0, 300)
+    first = LimitState(system[0], (("strength", system[1]),), Equilibrium(), "first_instability")
+    assert np.all(first(draws) <= state(draws))
+
+
+@pytest.fixture(scope="module")
+def app():
+    command = typer.Typer()
+    command.command()(reliability)
+    return command
+
+
+def test_command_writes_table_data_and_figures(app, system, tmp_path):
+    study = st.Study(
+        problem=system[0],
+        strength=system[1],
+        method=LOCAL,
+        ensemble=st.Ensemble(samples=10, seed=3),
+    )
+    study.to_toml(tmp_path / "study.toml")
+    out = tmp_path / "out"
+    arguments = [str(tmp_path / "study.toml"), "--out", str(out), "--smallest", "1e-4"]
+    arguments += ["--plain-samples", "1000", "--stress", "0.68e6", "--probability", "1e-3"]
+    done = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    assert done.exit_code == 0
+    names = {path.name for path in out.iterdir()}
+    for stem in ("failure_curve", "weak_spots"):
+        assert {f"{stem}.png", f"{stem}.pdf"} <= names
+    table = (out / "failure_curve.csv").read_text().splitlines()
+    assert table[0].startswith("stress (Pa),above the bound (Pa),P,")
+    with xr.open_dataset(out / "failure_curve.nc") as curve:
+        assert curve.sizes["point"] == len(table) - 1
+        assert curve["stress"].attrs["units"] == "Pa"
+        assert curve.attrs["lower_bound"] == 0.66e6
+        again = failure_curve(*system, method=LOCAL, smallest=1e-4, plain_samples=1000, seed=3)
+        np.testing.assert_array_equal(curve["probability"], again["probability"])
+    assert "0.68 MPa" in done.output
+    assert "at P = 0.001" in done.output
+
+
+def test_command_names_mistakes(app, tmp_path):
+    with pytest.raises(st.InputError, match="cannot be read"):
+        CliRunner().invoke(app, [str(tmp_path / "none.toml")], catch_exceptions=False)
+    (tmp_path / "file").write_text("")
+    example = "examples/reliability.toml"
+    with pytest.raises(st.InputError, match="--out"):
+        CliRunner().invoke(
+            app, [example, "--out", str(tmp_path / "file" / "x")], catch_exceptions=False
+        )
