@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,10 +43,10 @@ type = "power_law"
 [method]
 type = "local_criterion"
 [ensemble]
-samples = 40_000
+samples = 120_000
 seed = 11
 keep = ["strength"]
-keep_samples = [0, 12345, 39999]
+keep_samples = [0, 12345, 119999]
 [[sweep]]
 "strength.spectrum.correlation_length" = [2e-3, 3e-3, 4e-3, 6e-3]
 """
@@ -92,6 +93,13 @@ def finish(process: subprocess.Popen[bytes]) -> None:
         raise RuntimeError(f"exit code {process.returncode}: {errors}")
 
 
+def wait_for(process: subprocess.Popen[bytes], event: Callable[[], bool], seconds: float) -> None:
+    """Until an event, the end of the process, or so many seconds."""
+    end = time.perf_counter() + seconds
+    while process.poll() is None and time.perf_counter() < end and not event():
+        time.sleep(0.001)
+
+
 def chunks_in(out: Path) -> int:
     """Chunks listed so far."""
     folder = out.with_name(out.name + ".run") if out.suffix == ".nc" else out
@@ -113,9 +121,7 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
     chance, counts = random.Random(seed), Counts()
     study = folder / "study.toml"
     study.write_text(STUDY)
-    begin = time.perf_counter()
     finish(start(study, folder / "reference"))
-    whole = time.perf_counter() - begin
     begin = time.perf_counter()
     finish(start(study, folder / "reference"))  # nothing to do: the time to start
     idle = time.perf_counter() - begin
@@ -126,18 +132,19 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
         while True:
             before = chunks_in(out)
             process = start(study, out)
-            try:
-                # Most kills while it computes, some while it starts, reads or has finished.
-                process.wait(chance.uniform(0.5 * idle, idle + 0.35 * max(whole - idle, 0.5)))
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-                process.stderr.close()
-                counts.kills += 1
-                counts.in_the_middle += chunks_in(out) > before
-            else:
+            if chance.random() < 0.25:  # while it starts, reads what is there, or computes
+                wait_for(process, lambda: False, chance.uniform(0.3 * idle, 1.5 * idle))
+            else:  # while it computes, or when it has just finished
+                wait_for(process, lambda now=before, out=out: chunks_in(out) > now, 60.0)
+                wait_for(process, lambda: False, chance.uniform(0.0, 0.4))
+            if process.poll() is not None:
                 finish(process)
                 break
+            process.kill()
+            process.wait()
+            process.stderr.close()
+            counts.kills += 1
+            counts.in_the_middle += chunks_in(out) > before
         counts.studies += 1
         counts.different += not result_of(out).identical(reference)
         if say:

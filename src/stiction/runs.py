@@ -155,7 +155,8 @@ class StoredRun:
             Names of the variables to read; all if left out.
         """
         if self._store is None:
-            return self._result if only is None else self._result[list(only)]
+            names = [name for name in only or () if name in self._result]
+            return self._result if only is None else self._result[names]
         study = self.study
         gathered = Gathered(study.plans, study.ensemble.samples, study.ensemble.first, only)
         for outcome in self._store.outcomes():
@@ -188,7 +189,7 @@ def _is_active(folder: Path) -> bool:
 
 def folder_beside(file: Path) -> Path:
     """Where the chunks of ``result.nc`` are until it is complete."""
-    return file.with_name(file.name + ".run")
+    return file.parent / f"{file.name}.run"
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:

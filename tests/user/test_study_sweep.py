@@ -1,0 +1,260 @@
+"""Sweeps: lists and ranges over any key, crossed or zipped, the same in Python and TOML."""
+
+import copy
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import scipy.stats
+
+import stiction as st
+
+STUDY = {
+    "problem": {
+        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
+        "interface": {"length": 0.1, "nodes": 128},
+        "friction": {"weakening_rate": 0.25e12},
+    },
+    "strength": {
+        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
+        "spectrum": {"type": "power_law", "correlation_length": 4e-3},
+    },
+    "method": {"type": "local_criterion"},
+    "ensemble": {"samples": 30, "seed": 3},
+}
+KEEPING = {"samples": 30, "seed": 3, "keep": ["strength"], "keep_samples": 2}
+LENGTH = "strength.spectrum.correlation_length"
+
+
+def swept(*axes, **changes):
+    return st.Study.from_dict(copy.deepcopy(STUDY) | {"sweep": list(axes)} | changes)
+
+
+def test_every_point_is_the_study_with_its_values():
+    study = swept({LENGTH: [4e-3, 6e-3, 8e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]})
+    result = study.run()
+    assert result["critical_stress"].dims == ("correlation_length", "poisson_ratio", "sample")
+    assert result["critical_stress"].shape == (3, 2, 30)
+    assert result["correlation_length"].attrs == {"units": "m", "long_name": LENGTH}
+    for point in study.points:
+        one = copy.deepcopy(STUDY)
+        one["strength"]["spectrum"]["correlation_length"] = point.values[LENGTH]
+        one["problem"]["solid"]["poisson_ratio"] = point.values["problem.solid.poisson_ratio"]
+        alone = st.Study.from_dict(one).run()
+        part = result.isel(
+            correlation_length=point.number // 2, poisson_ratio=point.number % 2
+        )
+        for name in alone.data_vars:
+            np.testing.assert_array_equal(part[name], alone[name])
+
+
+def test_keys_of_one_table_vary_together():
+    study = swept(
+        {"problem.interface.length": [0.1, 0.2], "problem.interface.nodes": [128, 256]},
+        {"ensemble.seed": [3, 4, 5]},
+    )
+    assert [tuple(point.values.values()) for point in study.points] == [
+        (0.1, 128, 3), (0.1, 128, 4), (0.1, 128, 5), (0.2, 256, 3), (0.2, 256, 4), (0.2, 256, 5)
+    ]  # fmt: skip
+    result = study.run()
+    assert result["critical_stress"].dims == ("length", "seed", "sample")
+    assert result["nodes"].dims == ("length",)
+    spacings = [plan.problem.interface.spacing for plan in study.plans]
+    assert spacings == [0.1 / 128] * 6
+
+
+def test_ranges():
+    study = swept({LENGTH: {"start": 2e-3, "stop": 8e-3, "count": 3, "spacing": "log"}})
+    # Geometric and arithmetic means of the ends, up to round-off.
+    assert study.points[1].values[LENGTH] == pytest.approx(4e-3, rel=1e-14)
+    study = swept({LENGTH: {"start": 2e-3, "stop": 8e-3, "count": 4}})
+    assert [p.values[LENGTH] for p in study.points] == pytest.approx([2e-3, 4e-3, 6e-3, 8e-3])
+    study = swept({"problem.interface.nodes": {"start": 128, "stop": 256, "count": 3}})
+    assert [p.values["problem.interface.nodes"] for p in study.points] == [128, 192, 256]
+
+
+def test_toml_python_and_result_agree(tmp_path):
+    text = """
+    [[sweep]]
+    "strength.spectrum.correlation_length" = { start = 4e-3, stop = 8e-3, count = 3 }
+    [[sweep]]
+    problem.solid.density = [1000.0, 2000.0]
+    problem.solid.poisson_ratio = [0.2, 0.3]
+    """
+    base = st.Study.from_dict(STUDY)
+    base.to_toml(tmp_path / "study.toml")
+    written = (tmp_path / "study.toml").read_text()
+    (tmp_path / "study.toml").write_text(written + text)
+    study = st.Study.from_toml(tmp_path / "study.toml")
+    python = st.Study(
+        problem=base.problem,
+        strength=base.strength,
+        method=base.method,
+        ensemble=base.ensemble,
+        sweep=[
+            {LENGTH: np.linspace(4e-3, 8e-3, 3)},
+            {"problem.solid.density": [1000.0, 2000.0], "problem.solid.poisson_ratio": [0.2, 0.3]},
+        ],
+    )
+    assert python == study
+    result = study.run()
+    assert st.Study.from_result(result) == study
+    study.to_toml(tmp_path / "again.toml")
+    assert st.Study.from_toml(tmp_path / "again.toml") == study
+
+
+def test_whole_tables_are_values_too():
+    other = {"type": "lognorm", "s": 0.2, "scale": 1e6}
+    study = swept({"strength.marginal": [STUDY["strength"]["marginal"], other]})
+    result = study.run()
+    np.testing.assert_array_equal(result["marginal"], ["beta", "lognorm"])
+    assert study.plans[1].strength.mean == pytest.approx(scipy.stats.lognorm(0.2, scale=1e6).mean())
+    scales = swept({"strength.marginal.scale": [1e6, 2e6]}, strength={
+        "marginal": other, "spectrum": STUDY["strength"]["spectrum"]
+    })  # fmt: skip
+    stress = scales.run()["critical_stress"].values
+    # The onset is linear in the strength: twice the scale, twice the stress, to round-off.
+    np.testing.assert_allclose(stress[1], 2.0 * stress[0], rtol=1e-12)
+
+
+def test_objects_and_functions_in_python():
+    base = st.Study.from_dict(STUDY)
+    study = st.Study(
+        problem=base.problem,
+        strength=base.strength,
+        method=base.method,
+        ensemble=base.ensemble,
+        sweep=[{"strength.spectrum": [base.strength.spectrum, lambda k: np.exp(-((k * 2e-3) ** 2))]}],
+    )
+    assert study.run()["critical_stress"].shape == (2, 30)
+    with pytest.raises(st.InputError):
+        study.to_dict()
+
+
+def test_a_swept_key_needs_no_value_of_its_own():
+    bare = copy.deepcopy(STUDY)
+    del bare["strength"]["spectrum"]["correlation_length"]
+    study = st.Study.from_dict(bare | {"sweep": [{LENGTH: [4e-3, 6e-3]}]})
+    assert study.strength.spectrum.correlation_length == 4e-3
+
+
+def test_profiles_in_files_can_be_swept(tmp_path):
+    for name, scale in (("a", 0.0), ("b", 0.1)):
+        np.save(tmp_path / f"{name}.npy", 1.0 + scale * np.sin(np.arange(128) * 2 * np.pi / 128))
+    study = st.Study.from_dict(
+        STUDY | {"sweep": [{"problem.load.profile": ["a.npy", "b.npy"]}]}, folder=tmp_path
+    )
+    assert study.plans[1].problem.load.profile.max() == pytest.approx(1.1)
+    assert study.run()["critical_stress"].shape == (2, 30)
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ([{"strength.spectrum.corelation_length": [1e-3]}], ["did you mean 'correlation_length'"]),
+        ([{"problm.solid.density": [1.0]}], ["did you mean 'problem'"]),
+        ([{LENGTH: [4e-3, -1.0]}], ["correlation_length", "greater than 0", "point 1"]),
+        ([{LENGTH: 4e-3}], [LENGTH, "list of values or a range"]),
+        ([{LENGTH: []}], [LENGTH, "list"]),
+        ([{LENGTH: {"start": 1e-3, "stop": 2e-3}}], ["count: missing"]),
+        ([{LENGTH: {"start": 1e-3, "stop": 2e-3, "num": 3}}], ["'num'", "count: missing"]),
+        ([{LENGTH: {"start": 0.0, "stop": 2e-3, "count": 3, "spacing": "log"}}], ["positive"]),
+        ([{LENGTH: {"start": 1e-3, "stop": 2e-3, "count": 1}}], ["count", ">= 2"]),
+        (
+            [{LENGTH: [1e-3, 2e-3], "ensemble.seed": [1, 2, 3]}],
+            ["as many values each", "has 2", "has 3", "[[sweep]]"],
+        ),
+        ([{LENGTH: [1e-3]}, {LENGTH: [2e-3]}], ["swept twice"]),
+        ([{"strength.spectrum": []}, {LENGTH: [2e-3]}], ["strength.spectrum"]),
+        ([{"ensemble.samples": [10, 20]}], ["ensemble.samples: cannot be swept"]),
+        ([{"problem.solid.density": [1.0, "heavy"]}], ["problem.solid.density", "'heavy'"]),
+        ([{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}], ["1000000 points"]),
+        ("everything", ["list of tables"]),
+    ],
+)
+def test_mistakes_are_named(axes, words):
+    with pytest.raises(st.InputError) as caught:
+        st.Study.from_dict(STUDY | {"sweep": axes})
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_mistakes_of_sweep_and_study_come_at_once():
+    study = copy.deepcopy(STUDY) | {"sweep": [{"method.wieghts": ["exact"]}]}
+    study["ensemble"]["samples"] = 0
+    with pytest.raises(st.InputError) as caught:
+        st.Study.from_dict(study)
+    assert "ensemble.samples" in str(caught.value)
+    assert "did you mean 'weights'" in str(caught.value)
+
+
+def test_one_table_of_several_keys_asks_what_is_meant():
+    with pytest.raises(st.InputError, match="crosses them"):
+        st.Study.from_dict(STUDY | {"sweep": {LENGTH: [1e-3], "ensemble.seed": [1]}})
+    study = st.Study.from_dict(STUDY | {"sweep": {LENGTH: [4e-3, 6e-3]}})
+    assert len(study.points) == 2
+
+
+def test_methods_side_by_side():
+    methods = [{"type": "local_criterion"}, {"type": "local_criterion", "weights": "rounded"}]
+    result = swept({"method": methods}).run()
+    exact, rounded = result["critical_stress"].values
+    # The printed, rounded weights have an integral of 1.00036 and another shape by 1e-3.
+    np.testing.assert_allclose(rounded, exact, rtol=2e-3)
+    assert not np.any(rounded == exact)
+    assert list(result["method"].values)[0] != list(result["method"].values)[1]
+
+
+def test_kept_profiles():
+    study = swept(
+        {LENGTH: [4e-3, 6e-3]}, ensemble=KEEPING
+    )
+    result = study.run()
+    assert result["strength"].dims == ("correlation_length", "kept_sample", "x")
+    np.testing.assert_array_equal(result["kept_sample"], [0, 1])
+    direct = study.plans[1].strength.sample(study.problem.interface, samples=2, seed=3)
+    np.testing.assert_array_equal(result["strength"].values[1], direct)
+    longer = swept(
+        {"problem.interface.length": [0.1, 0.2]}, ensemble={"samples": 3, "keep": ["strength"]}
+    ).run()
+    np.testing.assert_allclose(longer["position"][1], 0.2 / 128 * np.arange(128), rtol=1e-15)
+
+
+def test_what_may_be_kept_is_limited():
+    with pytest.raises(st.InputError, match=r"ensemble\.keep.*10 MiB.*keep_limit = 1 MiB"):
+        st.Study.from_dict(
+            STUDY | {"ensemble": {"samples": 10240, "keep": ["strength"], "keep_limit": 2.0**20}}
+        )
+    with pytest.raises(st.InputError, match="number of nodes is swept"):
+        swept({"problem.interface.nodes": [128, 256]}, ensemble={"samples": 3, "keep": ["strength"]})
+    with pytest.raises(st.InputError, match="did you mean 'strength'"):
+        st.Study.from_dict(STUDY | {"ensemble": {"samples": 3, "keep": ["strenght"]}})
+
+
+@pytest.mark.slow
+def test_slip_and_sensitivity_on_request():
+    """What the method can add is switched on by asking for it."""
+    study = st.Study.from_dict(
+        STUDY
+        | {
+            "method": {"type": "equilibrium"},
+            "ensemble": {"samples": 6, "keep": ["slip", "sensitivity"], "keep_samples": [1, 4]},
+        }
+    )
+    result = study.run()
+    direct = st.onset(
+        study.problem,
+        study.strength.sample(study.problem.interface, samples=6, seed=0),
+        method=st.Equilibrium(slip=True, sensitivity=True),
+    )
+    np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
+    for name in ("slip", "sensitivity"):
+        assert result[name].dims == ("kept_sample", "x")
+        np.testing.assert_array_equal(result[name], direct[name][[1, 4]])
+
+
+def test_executors_do_not_change_a_bit():
+    study = swept({LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]})
+    alone = study.run(workers=1)
+    with ThreadPoolExecutor(3) as executor:
+        assert study.run(executor=executor).identical(alone)
