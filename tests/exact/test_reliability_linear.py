@@ -106,7 +106,7 @@ def test_runs_until_precise_are_unbiased(beta):
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(observed, rel=0.3)
 
 
-@pytest.mark.parametrize("likeness", [1.0, 0.98])
+@pytest.mark.parametrize("likeness", [1.0, 0.9])
 def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
     """The cheap limit state may fail where the exact one holds and the other way round."""
     other = math.sqrt(1.0 - likeness**2)
@@ -127,15 +127,19 @@ def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
             max_evaluations=10**6,
             threshold=-4.0,
         )
-        for seed in range(REPEATS)
+        for seed in range(4 * REPEATS)
     ]
     found = np.array([run.probability(-4.0) for run in runs]) / norm.cdf(-4.0)
-    # Three standard errors of fifty runs.
-    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(REPEATS)
-    reported = math.sqrt(np.mean([run.relative_variance(-4.0) for run in runs]))
-    # Counts the same noise of the middle factor twice at most, so it may be a little high.
+    # Three standard errors of two hundred runs, some 0.06 and 0.14. Walks that start from what the
+    # cheap limit state sees, and forget too little of it, are 0.25 low at a likeness of 0.9.
+    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(4 * REPEATS)
+    # The median: a few runs with two or three failures report an error of several hundred per cent.
+    reported = math.sqrt(np.median([run.relative_variance(-4.0) for run in runs]))
     assert reported == pytest.approx(found.std(ddof=1) / found.mean(), rel=0.35)
     if likeness == 1.0:
         assert all(run.last == 1.0 for run in runs)
-    else:
-        assert min(run.last for run in runs) < 1.0
+        return
+    run = next(run for run in runs if run.last < 1.0)
+    seen = math.exp(run.log_probability) * np.mean(run.values < -4.0)
+    assert run.probability(-4.0) == pytest.approx(seen / run.last, rel=1e-12)
+    assert run.wobble > 0.0

@@ -250,10 +250,10 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
             " rarer than the last level by the local criterion; raise max_evaluations"
         ]
     last = min(run.last for run in runs)
-    if last < 0.5 and probability > 0.0:
+    if last < 0.8 and probability > 0.0:
         doubts.append(
-            f"the local criterion misses {1.0 - last:.0%} of the failures: the correction for them"
-            " is large; compare with algorithm='subset'"
+            f"the local criterion misses {1.0 - last:.0%} of the failures: the estimate may be low;"
+            " compare with algorithm='subset'"
         )
     largest = max(runs, key=lambda run: run.samples)
     diagnostics = {

@@ -24,7 +24,7 @@ ACCEPTANCE = 0.37
 """Share of steps to accept; from 0.25 to 0.44 the efficiency is the same within a tenth."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
-KEEP = 2
+KEEP = 3
 """How many of the last populations keep their draws."""
 
 

@@ -28,10 +28,10 @@ from stiction.reliability.uncertainty import ancestral_variance
 
 CHEAP = 5
 """Cheap samples a level for each exact one of the middle factor."""
-COVERED = 0.8
+COVERED = 0.95
 """Smallest last factor: below it the walk must first find what the cheap stress does not see."""
-STEPS = 6
-FORGOTTEN = 2
+STEPS = 10
+FORGOTTEN = 5
 """Exact steps of each walk in the failure set, and how many of them are forgotten."""
 ROOM = 2.5
 """The cheap level should be this many times likelier than the probability asked for, or more."""
@@ -172,7 +172,7 @@ def bridge(
         kept, kept_values = draws[failed], values[failed]
         if math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
-            walkers = min(kept_values.size, max(8, samples // STEPS), room)
+            walkers = min(kept_values.size, max(16, samples // STEPS), room)
             if walkers < 2:
                 break
             states, found, acceptance, _ = conditional_chains(
