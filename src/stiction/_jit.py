@@ -20,7 +20,10 @@ class _FirstCompilation(event.Listener):
         self.said = False
 
     def on_start(self, event: event.Event) -> None:
-        if not self.said:
+        dispatcher = (event.data or {}).get("dispatcher")
+        function = getattr(dispatcher, "py_func", None)
+        ours = getattr(function, "__module__", "").startswith("stiction.")
+        if ours and not self.said:
             self.said = True
             logger.warning("compiling kernels on first use (up to 20 s, then cached)")
 

@@ -15,6 +15,7 @@ import pydantic_core
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
+from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 
 T = TypeVar("T")
@@ -26,7 +27,10 @@ def _number(value: Any) -> Any:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise ValueError("must be a number")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("must be finite") from None
 
 
 def _count(value: Any) -> Any:
@@ -35,12 +39,29 @@ def _count(value: Any) -> Any:
     return int(value)
 
 
+def real_array(value: Any) -> Array:
+    """`value` as a float64 array, or a TypeError that says what it is instead."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise TypeError("got a masked array")
+    try:
+        given = np.asarray(value)
+    except ValueError:
+        raise TypeError("got rows of unequal length") from None
+    if given.dtype.kind not in "fiu":
+        kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
+        raise TypeError(f"got {kind}")
+    return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+
+
 def _read_profile(path: Path) -> Any:
-    if path.suffix == ".npy":
-        return np.load(path, allow_pickle=False)
-    if path.suffix == ".csv":
+    if path.suffix not in (".npy", ".csv"):
+        raise ValueError("a profile file must end in .npy or .csv")
+    try:
+        if path.suffix == ".npy":
+            return np.load(path, allow_pickle=False)
         return np.loadtxt(path, delimiter=",", ndmin=1)
-    raise ValueError("a profile file must end in .npy or .csv")
+    except (OSError, EOFError, ValueError) as error:
+        raise ValueError(f"cannot read the file: {error}") from None
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
@@ -49,22 +70,16 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         folder = (info.context or {}).get("folder")
         if folder is None:
             raise ValueError("must be a number or an array (file names belong in a study file)")
-        try:
-            value = _read_profile(Path(folder) / value)
-        except OSError as error:
-            raise ValueError(f"cannot read the file: {error}") from None
+        value = _read_profile(Path(folder) / value)
     if isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
         number = _number(value)
         if not np.isfinite(number):
             raise ValueError("must be finite")
         return number
     try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiu":
-            raise TypeError
-        array = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("must be a number or an array of numbers, one for each node") from None
+        array = np.array(real_array(value))
+    except TypeError as error:
+        raise ValueError(f"must be a number or an array of numbers, {error}") from None
     if array.ndim != 1 or array.size == 0:
         raise ValueError(f"must have shape (nodes,), got shape {array.shape}")
     if not np.all(np.isfinite(array)):
@@ -80,21 +95,40 @@ def _plain(value: Any) -> Any:
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
 Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
+_PROFILE_SCHEMA = [
+    {"type": "number"},
+    {"type": "array", "items": {"type": "number"}},
+    {"type": "string", "description": "path to a .npy or .csv file"},
+]
 Profile: TypeAlias = Annotated[
     Any,
     BeforeValidator(_profile),
     PlainSerializer(_plain),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number"},
-                {"type": "array", "items": {"type": "number"}},
-                {"type": "string", "description": "path to a .npy or .csv file"},
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": _PROFILE_SCHEMA}),
 ]
 """A number, or a read-only array of shape (nodes,)."""
+
+
+def _optional_profile(value: Any, info: pydantic.ValidationInfo) -> Any:
+    return None if value is None else _profile(value, info)
+
+
+OptionalProfile: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_optional_profile),
+    PlainSerializer(_plain),
+    WithJsonSchema({"anyOf": [*_PROFILE_SCHEMA, {"type": "null"}]}),
+]
+"""The same, or None for 'not given'."""
+
+
+def _truth(value: Any) -> Any:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be True or False")
+    return bool(value)
+
+
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_truth)]
 
 
 def describe(value: Any) -> str:
@@ -140,14 +174,18 @@ def _walk(cls: type, location: tuple[int | str, ...]) -> tuple[list[str], list[s
 def explain(error: pydantic.ValidationError, cls: type, root: str = "") -> list[str]:
     """The mistakes that pydantic found in a `cls`, one text each, with the path to the key."""
     texts = []
-    for item in error.errors():
+    items = error.errors()
+    if any(item["type"] == "unexpected_positional_argument" for item in items):
+        names = [field.name for field in dataclasses.fields(cls) if field.init]
+        return [f"{cls.__name__}: give its arguments by name (valid: {', '.join(names)})"]
+    for item in items:
         steps, valid = _walk(cls, item["loc"])
         path = ".".join([root, *steps] if root else steps)
         kind, message, given = item["type"], item["msg"], item.get("input")
         message = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
         if kind in ("missing", "missing_argument"):
             texts.append(f"{path}: missing")
-        elif kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_argument"):
+        elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
             owner, _, key = path.rpartition(".")
             texts.append(unknown_name(owner or cls.__name__, key, valid))
         elif kind == "union_tag_invalid":
@@ -182,7 +220,8 @@ def _equal(self: Any, other: Any) -> bool:
 
 def _hash(self: Any) -> int:
     values = (getattr(self, field.name) for field in dataclasses.fields(self))
-    return hash(tuple(v.tobytes() if isinstance(v, np.ndarray) else v for v in values))
+    # Zeros of both signs are equal, so they must hash alike.
+    return hash(tuple((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values))
 
 
 @overload
@@ -232,6 +271,8 @@ def to_plain(value: Any) -> Any:
     except pydantic_core.PydanticSerializationError as error:
         reason = str(error).removeprefix("Error calling function ").split(": ", 1)[-1]
         raise InputError(f"{type(value).__name__}: cannot be written down: {reason}") from None
+    except pydantic.errors.PydanticSchemaGenerationError:
+        raise InputError(f"{type(value).__name__}: exists in Python only") from None
 
 
 Mode: TypeAlias = Literal["II", "III"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -38,3 +40,12 @@ def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
     near = get_close_matches(given, names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"{what}: unknown {given!r}{hint} (valid: {', '.join(names)})"
+
+
+def warn_accuracy(message: str) -> None:
+    """Issue an `AccuracyWarning` that points at the caller's own line, outside this package."""
+    level = 1
+    frame = sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] == "stiction":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, AccuracyWarning, stacklevel=level + 1)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydantic import model_validator
 
-from stiction._model import Profile, model
+from stiction._model import OptionalProfile, Profile, model
 from stiction.errors import InputError
 
 
@@ -35,20 +33,9 @@ class SlipWeakening:
     Gamma = (tau_p - tau_r)^2/(2 W).
     """
 
-    weakening_rate: Profile = None
-    critical_slip: Profile = None
+    weakening_rate: OptionalProfile = None
+    critical_slip: OptionalProfile = None
     residual_strength: Profile = 0.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _given_explicitly_as_none(cls, values: Any) -> Any:
-        # None means 'not given'; the field's validator would call it a wrong type.
-        keywords = getattr(values, "kwargs", None)
-        if keywords:
-            for name in ("weakening_rate", "critical_slip"):
-                if name in keywords and keywords[name] is None:
-                    del keywords[name]
-        return values
 
     @model_validator(mode="after")
     def _consistent(self) -> SlipWeakening:

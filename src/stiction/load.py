@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydantic import model_validator
 
-from stiction._model import Profile, model
+from stiction._model import OptionalProfile, Profile, model
 from stiction.errors import InputError
 
 
@@ -32,15 +30,7 @@ class Load:
 
     profile: Profile = 1.0
     initial_stress: Profile = 0.0
-    normal_pressure: Profile = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _given_explicitly_as_none(cls, values: Any) -> Any:
-        keywords = getattr(values, "kwargs", None)
-        if keywords and keywords.get("normal_pressure", 0.0) is None:
-            del keywords["normal_pressure"]
-        return values
+    normal_pressure: OptionalProfile = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:

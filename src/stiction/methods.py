@@ -40,6 +40,20 @@ def check_method(method: Any) -> None:
         )
 
 
+def check_problem(problem: Any) -> None:
+    """Refuse what is not a `Problem`, such as arguments that changed places."""
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: must be a Problem, got {describe(problem)}")
+
+
+def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
+    """The problem and the method in plain form, or why they have none."""
+    try:
+        return {"study": {"problem": to_plain(problem), "method": to_plain(method)}}
+    except InputError as error:
+        return {"study_incomplete": str(error)}
+
+
 def solve(
     problem: Problem, method: Method, solver: Callable[[Rows], Mapping[str, Any]], rows: Rows
 ) -> Values:
@@ -110,6 +124,8 @@ def onset(
         Naming all that does not fit.
     """
     check_method(method)
+    check_problem(problem)
+    attributes = study_attributes(problem, method)
     rows = problem.rows(
         tau_p,
         residual_strength=residual_strength,
@@ -117,5 +133,4 @@ def onset(
         weakening_rate=weakening_rate,
     )
     values = solve(problem, method, method.prepare(problem), rows)
-    attributes = {"study": {"problem": to_plain(problem), "method": to_plain(method)}}
     return label(problem, method, values, np.arange(rows.count), attributes)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 from pydantic import model_validator
 
 from stiction._model import Mode, describe, model
-from stiction.errors import AccuracyWarning, InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.friction import SlipWeakening
 from stiction.interface import Interface
 from stiction.load import Load
 from stiction.rows import Rows, as_rows
 from stiction.solid import Solid
 
-# Half the smallest eigenvalue-to-length factor: h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
+# lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
 SMALLEST_EIGENVALUE = 0.5788869418506
 FEWEST_NODES = 4
 
@@ -102,10 +101,10 @@ class Problem:
         resolution = length / self.interface.spacing
         if resolution >= FEWEST_NODES:
             return []
-        enough = int(np.ceil(FEWEST_NODES * self.interface.length / length / 2.0)) * 2
+        enough = 2.0 * np.ceil(0.5 * FEWEST_NODES * self.interface.length / max(length, 1e-300))
         return [
             f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
-            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough},"
+            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough:.10g},"
             f" got {self.interface.nodes}"
         ]
 
@@ -113,11 +112,9 @@ class Problem:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
         resolution = self.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
         if resolution < enough:
-            warnings.warn(
+            warn_accuracy(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
-                f" {cost}",
-                AccuracyWarning,
-                stacklevel=3,
+                f" {cost}"
             )
 
     def rows(
@@ -142,49 +139,47 @@ class Problem:
         ------
         InputError
             Naming all that is wrong: shapes, values that are not finite, strength not above the
-            residual strength, a weakening rate that is not positive.
+            residual strength and the initial stress, a weakening rate that is not positive.
         """
         nodes = self.interface.nodes
-        strength = as_rows("tau_p", tau_p, nodes)
-        count = strength.shape[0]
         problems: list[str] = []
-        defaults = {
-            "residual_strength": (residual_strength, self.friction.residual_strength),
-            "initial_stress": (initial_stress, self.load.initial_stress),
-        }
-        varying = {}
-        for name, (given, own) in defaults.items():
+
+        def checked(name: str, given: Any, own: Any, count: int | None) -> Any:
             try:
-                varying[name] = as_rows(name, own if given is None else given, nodes, count)
+                return as_rows(name, own if given is None else given, nodes, count)
             except InputError as error:
-                problems += error.problems
-        rate = self.friction.weakening_rate if weakening_rate is None else weakening_rate
+                problems.extend(error.problems)
+                return None
+
+        strength = checked("tau_p", tau_p, None, None)
+        count = 1 if strength is None else strength.shape[0]
+        residual = checked(
+            "residual_strength", residual_strength, self.friction.residual_strength, count
+        )
+        initial = checked("initial_stress", initial_stress, self.load.initial_stress, count)
+        own_rate = self.friction.weakening_rate
         rates = None
-        if rate is not None:
-            try:
-                rates = as_rows("weakening_rate", rate, nodes, count)
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError(problems)
-        residual, initial = varying["residual_strength"], varying["initial_stress"]
-        if residual.min() < 0.0:
+        if weakening_rate is not None or own_rate is not None:
+            rates = checked("weakening_rate", weakening_rate, own_rate, count)
+            if rates is not None and rates.min() <= 0.0:
+                problems.append(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
+        if residual is not None and residual.min() < 0.0:
             problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        excess = strength - residual
-        if excess.min() <= 0.0:
-            sample, node = np.unravel_index(int(np.argmin(excess)), excess.shape)
+        for name, other in (("residual_strength", residual), ("initial_stress", initial)):
+            if strength is None or other is None or np.all(strength > other):
+                continue
+            sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
             problems.append(
-                f"tau_p: must be above residual_strength everywhere; sample {sample}, node {node}:"
-                f" {strength[sample, node]:g} against {residual[sample, node]:g} Pa"
+                f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
+                f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
             )
+        if problems:
+            raise InputError(problems)
         if rates is None:
-            rates = excess / np.asarray(self.friction.critical_slip)
-        if problems:
-            raise InputError(problems)
-        if rates.min() <= 0.0:
-            raise InputError(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
-        problems += self._too_few_nodes(float(rates.max()))
-        if problems:
-            raise InputError(problems)
+            with np.errstate(over="ignore"):  # too short a critical slip is refused just below
+                rates = (strength - residual) / np.asarray(self.friction.critical_slip)
+        too_few = self._too_few_nodes(float(rates.max()))
+        if too_few:
+            raise InputError(too_few)
         profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)
         return Rows(strength, residual, rates, initial, profile, self.interface.spacing)

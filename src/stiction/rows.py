@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stiction._model import real_array
 from stiction._typing import Array
 from stiction.errors import InputError
 
@@ -18,7 +19,7 @@ class Rows:
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
-        tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa). Read-only; constant ones are broadcast views.
+        tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa); views of what was given, not to be written to.
     load_profile : (nodes,) array
         p, dimensionless, positive.
     spacing : float
@@ -59,24 +60,18 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
     A single profile (nodes,) is one sample; where `count` is given, a scalar, a (nodes,) profile
     or a (count, 1) column is broadcast to it.
     """
+    samples = "samples" if count is None else str(count)
+    valid = f"({samples}, {nodes}) or ({nodes},)"
+    if count is not None:
+        valid += f", ({samples}, 1) or a number"
     try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiu":
-            raise TypeError
-        array = np.ascontiguousarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"{name}: must be an array of numbers of shape (samples, {nodes}) or ({nodes},),"
-            f" got {type(value).__name__}"
-        ) from None
-    if given.ndim == 0:
-        array = array.reshape(())
-    samples = 1 if count is None else count
+        array = real_array(value)
+    except TypeError as error:
+        raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
     shapes: set[tuple[int, ...]] = {(nodes,)}
     if count is not None:
         shapes |= {(), (count, nodes), (count, 1)}
     if array.shape not in shapes and not (count is None and array.shape[1:] == (nodes,)):
-        valid = f"({samples if count else 'samples'}, {nodes}) or ({nodes},)"
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
@@ -85,5 +80,5 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
         where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
         raise InputError(f"{name}: must be finite; entry {where} is not")
     if array.ndim < 2 or array.shape[1] != nodes:
-        array = np.broadcast_to(array, (samples, nodes))
+        array = np.broadcast_to(array, (count or 1, nodes))
     return array

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field
-from scipy.optimize import brentq
 
 from stiction._model import Mode, Positive, _number, model
+from stiction.errors import InputError
 
 
 @model
@@ -59,16 +60,15 @@ class Solid:
 
     @property
     def rayleigh_wave_speed(self) -> float:
-        """c_R, m/s: the root of (2-q^2)^2 = 4 sqrt(1-q^2) sqrt(1-q^2/eta^2), q = c_R/c_s."""
-        eta = self.wave_speed_ratio
+        """c_R, m/s, from Rayleigh's cubic in q = (c_R/c_s)^2.
 
-        # q = 0 is a trivial double root; dividing it out leaves one simple root below 1.
-        def rayleigh(q: float) -> float:
-            product = 4.0 * math.sqrt(1.0 - q * q) * math.sqrt(1.0 - (q / eta) ** 2)
-            return ((2.0 - q * q) ** 2 - product) / (q * q)
-
-        root: float = brentq(rayleigh, 1e-3, 1.0, xtol=1e-15, rtol=1e-15)
-        return root * self.shear_wave_speed
+        q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2) = 0 with eta = c_d/c_s: the equation
+        (2-q)^2 = 4 sqrt(1-q) sqrt(1-q/eta^2), squared and divided by q (Rayleigh, 1885).
+        """
+        slowness = self.wave_speed_ratio**-2
+        roots = np.roots([1.0, -8.0, 24.0 - 16.0 * slowness, -16.0 * (1.0 - slowness)])
+        real = roots.real[np.abs(roots.imag) < 1e-9]
+        return math.sqrt(float(real.min())) * self.shear_wave_speed
 
     def effective_modulus(self, mode: Mode = "II") -> float:
         """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
@@ -76,6 +76,8 @@ class Solid:
         Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress; mode III: G. In every case
         it is 2 G (1 - c_s^2/c_d^2) for mode II (Geubelle and Rice, 1995, static limit).
         """
+        if mode not in ("II", "III"):
+            raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")
         if mode == "III":
             return self.shear_modulus
         return 2.0 * self.shear_modulus * (1.0 - self.wave_speed_ratio**-2)

@@ -26,6 +26,7 @@ def test_smallest_eigenvalue_and_its_vector():
 def test_integrals_of_the_weight():
     s = np.cos(np.linspace(np.pi, 0.0, 100_001))
     g = exact_weight().at(s)
+    # The trapezoidal sum on this grid is good to 1e-9; the figures have the digits printed.
     assert np.trapezoid(g, s) == pytest.approx(1.0, abs=1e-9)
     assert np.trapezoid(s * s * g, s) == pytest.approx(0.22813196, abs=1e-8)
     assert exact_weight().second_moment == pytest.approx(0.22813196, abs=1e-8)
@@ -51,6 +52,7 @@ def test_eigenfunction_solves_the_integral_equation():
 def test_multiplier_is_the_fourier_transform_of_the_weight(z):
     s = np.cos(np.linspace(np.pi, 0.0, 200_001))
     expected = np.trapezoid(exact_weight().at(s) * np.cos(z * s), s)
+    # The trapezoidal sum is good to (z dt)^2/12 of its value: 5e-9 at the largest z.
     assert exact_weight().multiplier(np.array([z]))[0] == pytest.approx(expected, abs=1e-8)
 
 
@@ -112,8 +114,127 @@ def test_moduli_and_speeds():
         assert solid.effective_modulus("II") == pytest.approx(factor * 1e9, rel=1e-14)
         assert solid.effective_modulus("III") == 1e9
     assert solid.shear_wave_speed == pytest.approx(924.5, abs=0.05)
-    incompressible_limit = st.Solid(shear_modulus=1.0, poisson_ratio=0.25, density=1.0)
+    quarter = st.Solid(shear_modulus=1.0, poisson_ratio=0.25, density=1.0)
     # nu = 1/4 in plane strain: c_R/c_s = sqrt(2 - 2/sqrt(3)), a classical closed form.
-    assert incompressible_limit.rayleigh_wave_speed == pytest.approx(
+    assert quarter.rayleigh_wave_speed == pytest.approx(
         np.sqrt(2.0 - 2.0 / np.sqrt(3.0)), rel=1e-13
     )
+
+
+@pytest.mark.parametrize(
+    ("plane", "nu"), [("stress", 0.33), ("strain", 0.33), ("strain", 0.0), ("stress", -0.5)]
+)
+def test_wave_speeds_of_both_plane_states(plane, nu):
+    """c_d from Lame's constants in plane strain, from E/(1-nu^2) in plane stress."""
+    solid = st.Solid(shear_modulus=3.0, poisson_ratio=nu, density=2.0, plane=plane)
+    young = 2.0 * 3.0 * (1.0 + nu)
+    lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    stiffness = lame + 6.0 if plane == "strain" else young / (1.0 - nu**2)
+    assert solid.dilatational_wave_speed == pytest.approx(np.sqrt(stiffness / 2.0), rel=1e-14)
+    # The Rayleigh function before squaring.
+    q = (solid.rayleigh_wave_speed / solid.shear_wave_speed) ** 2
+    eta = solid.dilatational_wave_speed / solid.shear_wave_speed
+    function = (2.0 - q) ** 2 - 4.0 * np.sqrt(1.0 - q) * np.sqrt(1.0 - q / eta**2)
+    assert 0.0 < q < 1.0
+    assert function == pytest.approx(0.0, abs=1e-13)
+
+
+@pytest.mark.parametrize("nodes", [128, 1024])
+def test_load_that_varies_along_the_interface(solid, nodes):
+    """Strength and load are single cosines, so both averages are known in closed form."""
+    interface = st.Interface(length=0.1, nodes=nodes)
+    x, k = interface.x, 2.0 * np.pi / 0.1
+    load = st.Load(profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=x + 1.0)
+    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12), load)
+    tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
+    half = problem.nucleation_length / 2.0
+    one, two = exact_weight().multiplier(np.array([3.0 * k * half, 2.0 * k * half]))
+
+    def tau_n(at):
+        strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))
+        return strength / (1.0 + 0.6 * two * np.cos(2.0 * k * (at - 0.013)))
+
+    found = st.nucleation_stress(problem, tau_p)
+    np.testing.assert_allclose(found, tau_n(x), rtol=1e-12)
+    result = st.onset(problem, tau_p, method=st.LocalCriterion())
+    fine = np.linspace(0.0, 0.1, 2_000_001)
+    # A minimum misses by at most half the fine spacing: relative 1e-12 of the curvature.
+    assert float(result.critical_load[0]) == pytest.approx(tau_n(fine).min(), rel=1e-10)
+    place = fine[tau_n(fine).argmin()]
+    assert float(result.critical_position[0]) == pytest.approx(place, abs=1e-7)
+    mean_load = float(result.critical_load[0]) * np.mean(load.profile)
+    assert float(result.critical_stress[0]) == pytest.approx(mean_load, rel=1e-13)
+    coefficient = mean_load / np.mean(x + 1.0)
+    assert float(result.friction_coefficient[0]) == pytest.approx(coefficient, rel=1e-13)
+
+
+def test_a_load_too_sharp_for_the_grid_is_refused(solid):
+    interface = st.Interface(length=0.1, nodes=128)
+    profile = np.where(np.arange(128) < 20, 1.0, 1e-3)
+    problem = st.Problem(
+        solid, interface, st.SlipWeakening(weakening_rate=0.5e12), st.Load(profile=profile)
+    )
+    with pytest.raises(st.InputError, match=r"load\.profile: varies too sharply"):
+        st.onset(problem, np.full(128, 1e6), method=st.LocalCriterion())
+
+
+def test_weakening_rate_of_each_sample(problem, make_strength):
+    """Samples of different W in one call are the same as one by one; columns are broadcast."""
+    tau_p = make_strength(0.5).sample(problem.interface, samples=5, seed=1)
+    rates = np.array([[0.5], [0.4], [0.5], [0.3], [0.45]]) * 1e12
+    together = st.onset(problem, tau_p, method=st.LocalCriterion(), weakening_rate=rates)
+    for i in range(5):
+        friction = st.SlipWeakening(weakening_rate=float(rates[i, 0]))
+        alone = st.onset(
+            st.Problem(problem.solid, problem.interface, friction),
+            tau_p[i],
+            method=st.LocalCriterion(),
+        )
+        assert float(together.critical_load[i]) == float(alone.critical_load[0])
+        assert float(together.critical_position[i]) == float(alone.critical_position[0])
+    assert len(np.unique(together.critical_load)) == 5
+
+
+def test_critical_slip_is_a_weakening_rate(solid):
+    """W = (tau_p - tau_r)/d_c, so a uniform strength has a uniform W."""
+    interface = st.Interface(length=0.1, nodes=256)
+    friction = st.SlipWeakening(critical_slip=2e-6, residual_strength=2e5)
+    rows = st.Problem(solid, interface, friction).rows(np.full((2, 256), 1e6))
+    np.testing.assert_allclose(rows.weakening_rate, 8e5 / 2e-6, rtol=1e-15)
+    tau_p = 1e6 - 1e5 * np.cos(2.0 * np.pi * interface.x / 0.1)
+    rows = st.Problem(solid, interface, friction).rows(tau_p)
+    np.testing.assert_allclose(rows.weakening_rate[0], (tau_p - 2e5) / 2e-6, rtol=1e-15)
+
+
+def test_position_lies_on_the_interface(problem):
+    """A minimum a hair left of node 0 is at 0, not at L."""
+    x = problem.interface.x
+    for mode in (1, 3, 5):
+        tau_p = 1e6 - 2e5 * np.cos(2.0 * np.pi * mode * x / 0.1)
+        for signed in (tau_p, tau_p[::-1].copy(), np.roll(tau_p, 1)):
+            result = st.onset(problem, signed, method=st.LocalCriterion())
+            assert 0.0 <= float(result.critical_position[0]) < 0.1
+
+
+def test_units_and_names(problem):
+    result = st.onset(problem, np.full(256, 1e6), method=st.LocalCriterion())
+    units = {name: variable.attrs["units"] for name, variable in result.variables.items()}
+    assert units == {
+        "critical_load": "Pa",
+        "critical_stress": "Pa",
+        "first_instability": "Pa",
+        "critical_position": "m",
+        "sample": "1",
+    }
+    assert all(variable.attrs["long_name"] for variable in result.variables.values())
+
+
+def test_odd_bessel_functions_by_recurrence():
+    from scipy.special import jv
+
+    from stiction.criterion.eigenproblem import odd_bessel
+
+    z = np.concatenate([np.geomspace(1e-9, 2e3, 2000), [1.0, 79.9999, 80.0]])
+    # Absolute, as the sum over orders needs it.
+    expected = jv(np.arange(1, 80, 2)[:, None], z)
+    np.testing.assert_allclose(odd_bessel(z, 40), expected, atol=2e-13)

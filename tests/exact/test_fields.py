@@ -183,3 +183,101 @@ def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
     # Round-off of one transform.
     np.testing.assert_allclose(profiles, profiles[:, :1] * np.ones(64), rtol=1e-13)
     assert np.ptp(profiles[:, 0]) > 0.5e6
+
+
+def test_draws_are_defined_by_seed_stream_block_and_mode():
+    """The promise of reproducibility, spelled out with numpy alone."""
+    field = st.RandomField(
+        marginal=scipy.stats.norm(), spectrum=st.PowerLawSpectrum(correlation_length=0.05)
+    )
+    interface = st.Interface(length=0.1, nodes=64)
+    found = field.draws(interface, 1, seed=7, first=300, stream=2)[0]
+    key = np.random.SeedSequence(entropy=7, spawn_key=(2, 1))  # sample 300 lies in block 1
+    block = np.random.Generator(np.random.PCG64DXSM(key)).standard_normal((12, 256))
+    np.testing.assert_array_equal(found, block[2:, 300 - 256])
+
+
+def test_custom_spectrum_agrees_with_the_named_one():
+    named = st.SquaredExponentialSpectrum(correlation_length=0.02)
+    custom = st.CustomSpectrum(
+        function=lambda k: 7.0 * np.exp(-((0.01 * k) ** 2)), max_wavenumber=named.cutoff * 3.0
+    )
+    lags = np.linspace(0.0, 0.06, 30)
+    # Both leave out next to nothing: at three times the cutoff less than 1e-20 of the power.
+    np.testing.assert_allclose(custom.correlation(lags), named.correlation(lags), atol=1e-9)
+    assert custom.efolding_length == pytest.approx(0.02, rel=1e-9)
+    interface = st.Interface(length=1.0, nodes=256)
+    fields = [st.RandomField(marginal=scipy.stats.norm(), spectrum=s) for s in (named, custom)]
+    sigma = [f.modes(interface).sigma for f in fields]
+    np.testing.assert_allclose(sigma[1][: sigma[0].size], sigma[0], atol=2e-4)
+
+
+def test_efolding_length_is_the_first_crossing():
+    """A narrow band: the correlation oscillates as cos(k_0 x) under a slow envelope."""
+    spectrum = st.CustomSpectrum(function=lambda k: np.exp(-(((k - 3e3) / 30.0) ** 2)))
+    # cos(k_0 x) = 1/e; the envelope exp(-(30 x)^2/4) takes off 4e-5.
+    assert spectrum.efolding_length == pytest.approx(np.arccos(np.exp(-1.0)) / 3e3, rel=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_efolding_length_scales_with_the_unit_of_length(scale):
+    one = st.PowerLawSpectrum(correlation_length=1.0).efolding_length
+    other = st.PowerLawSpectrum(correlation_length=scale).efolding_length
+    assert other == pytest.approx(one * scale, rel=1e-12)
+
+
+def test_distributions_that_scipy_has_no_name_for():
+    counts = np.histogram(np.random.default_rng(0).normal(5.0, 1.0, 1000), 20)
+    distribution = scipy.stats.rv_histogram(counts)()
+    field = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=0.01)
+    )
+    interface = st.Interface(length=0.1, nodes=64)
+    z = np.array([[-1.0, 0.3]])
+    values = from_normal(field.marginal, z)
+    np.testing.assert_allclose(values, quantile_of_normal(distribution, z), rtol=1e-9)
+    assert field.mean == pytest.approx(distribution.mean())
+    assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)
+
+    class Narrow(scipy.stats.rv_continuous):
+        def _pdf(self, x):
+            return 1.0 + 0.0 * x
+
+    # Named like scipy's normal distribution, but not it.
+    named = Narrow(name="norm", a=0.0, b=1.0)()
+    assert st.RandomField(marginal=named, spectrum=field.spectrum).mean == pytest.approx(0.5)
+
+
+def test_a_function_that_returns_its_own_array_keeps_it():
+    table = {}
+
+    def density(k):
+        return table.setdefault(np.shape(k), np.ones(np.shape(k)))
+
+    spectrum = st.CustomSpectrum(function=density, max_wavenumber=500.0)
+    field = st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum)
+    field.modes(st.Interface(length=0.1, nodes=64))
+    assert all(np.all(values == 1.0) for values in table.values())
+
+
+@pytest.mark.parametrize("name", ["rice", "moyal", "genlogistic", "invgauss"])
+def test_correlation_of_families_whose_tails_scipy_inverts_poorly(name):
+    shapes = {"rice": (5.0,), "moyal": (), "genlogistic": (1.0,), "invgauss": (0.145,)}
+    field = st.RandomField(
+        marginal=getattr(scipy.stats, name)(*shapes[name]),
+        spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
+    )
+    interface = st.Interface(length=0.1, nodes=256)
+    strength, z = field.correlation(interface), field.correlation(interface, of="z")
+    assert strength[0] == pytest.approx(1.0, rel=1e-12)
+    # These maps are mildly nonlinear: the correlations stay close.
+    np.testing.assert_allclose(strength, z, atol=0.03)
+
+
+def test_a_marginal_that_the_forty_terms_cannot_follow_has_correlation_one_at_zero_lag():
+    field = st.RandomField(
+        marginal=st.Beta(alpha=0.05, beta=0.05, low=0.0, high=1.0),
+        spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
+    )
+    interface = st.Interface(length=0.1, nodes=256)
+    assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)

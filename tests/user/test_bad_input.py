@@ -169,6 +169,64 @@ CASES = {
         ),
         ["initial_stress", "(2, 256)", "(3, 256)"],
     ),
+    "strength below initial stress": (
+        lambda: st.onset(
+            make_problem(), np.full(256, 1e6), method=st.LocalCriterion(), initial_stress=2e6
+        ),
+        ["tau_p", "initial_stress", "node 0", "2e+06"],
+    ),
+    "all rows at once": (
+        lambda: st.onset(
+            make_problem(),
+            np.full(256, np.nan),
+            method=st.LocalCriterion(),
+            residual_strength=-1.0,
+            initial_stress="x",
+            weakening_rate=-1.0,
+        ),
+        ["tau_p", "residual_strength", "initial_stress", "weakening_rate"],
+    ),
+    "complex profile": (
+        lambda: st.onset(make_problem(), np.ones(256) * 1j, method=st.LocalCriterion()),
+        ["tau_p", "complex128"],
+    ),
+    "masked profile": (
+        lambda: st.onset(
+            make_problem(), np.ma.masked_less(np.arange(256.0), 3), method=st.LocalCriterion()
+        ),
+        ["tau_p", "masked"],
+    ),
+    "swapped": (
+        lambda: st.onset(np.ones(256), make_problem(), method=st.LocalCriterion()),
+        ["problem", "must be a Problem"],
+    ),
+    "sample on a problem": (
+        lambda: make_strength().sample(make_problem()),
+        ["interface", "must be an Interface"],
+    ),
+    "by position": (lambda: st.Beta(1.5, 3.0, 1.0, 2.0), ["by name", "alpha, beta, low, high"]),
+    "flag": (lambda: make_strength(mean_mode="no"), ["mean_mode", "True or False"]),
+    "class of a spectrum": (
+        lambda: make_strength(spectrum=st.PowerLawSpectrum),
+        ["st.PowerLawSpectrum(...)", "class"],
+    ),
+    "too many modes": (
+        lambda: make_strength(spectrum=st.PowerLawSpectrum(correlation_length=1e-8)).sample(
+            st.Interface(length=0.1, nodes=64)
+        ),
+        ["25000000 modes", "units"],
+    ),
+    "huge": (lambda: st.Interface(length=10**400, nodes=64), ["length", "finite"]),
+    "mode of the modulus": (
+        lambda: st.Solid(**GOOD_SOLID).effective_modulus("iii"),
+        ["'II' or 'III'", "'iii'"],
+    ),
+    "draws not finite": (
+        lambda: make_strength().profiles(
+            st.Interface(length=0.1, nodes=256), np.full((1, 250), np.nan)
+        ),
+        ["draws", "finite"],
+    ),
     "rate that varies": (
         lambda: st.onset(
             make_problem(friction=st.SlipWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)),
@@ -238,6 +296,16 @@ def test_short_interface_warns_and_the_mean_mode_silences_it(recwarn):
     recwarn.clear()
     make_strength(spectrum=spectrum, mean_mode=True).sample(interface)
     assert not recwarn.list
+
+
+@pytest.mark.parametrize(("lost", "warns"), [(0.05, True), (5e-5, False)])
+def test_coarse_grid_warns_from_a_ten_thousandth_of_the_variance(lost, warns, recwarn):
+    spectrum = st.SquaredExponentialSpectrum(correlation_length=2e-3, power_kept=0.999999)
+    interface = st.Interface(length=0.1, nodes=2 * round(spectrum._power_quantile(1 - lost) / 62.8))
+    make_strength(spectrum=spectrum).sample(interface)
+    assert bool(recwarn.list) == warns
+    if warns:
+        assert recwarn.list[0].filename == __file__  # it points at the caller
 
 
 def test_few_nodes_in_the_nucleation_length_warn():

@@ -14,9 +14,39 @@ from stiction._typing import Array
 TERMS = 40
 
 
+def odd_bessel(z: Array, count: int) -> Array:
+    """J_1, J_3, ..., J_(2 count - 1) at positive z, shape (count, z.size).
+
+    By recurrence, since one transform of every order is far dearer than all together: upwards
+    where z is above the highest order, downwards from order 120 elsewhere (Miller, 1952), and
+    order by order for the few z below 1, where the downward recurrence would overflow.
+    """
+    orders = 2 * count
+    result = np.empty((count, z.size))
+    small, large = z < 1.0, z >= orders
+    result[:, small] = jv(np.arange(1, orders, 2)[:, None], z[small])
+    x = z[large]
+    before, here = jv(0, x), jv(1, x)
+    for m in range(1, orders):
+        if m % 2:
+            result[m // 2, large] = here
+        before, here = here, 2.0 * m / x * here - before
+    middle = ~small & ~large
+    x = z[middle]
+    after, here, norm = np.zeros_like(x), np.full_like(x, 1e-290), np.zeros_like(x)
+    for m in range(120 + 2 * max(0, orders - 80), 0, -1):
+        if m % 2 and m < orders:
+            result[m // 2, middle] = here
+        elif m % 2 == 0:
+            norm += 2.0 * here
+        after, here = here, 2.0 * m / x * here - after
+    result[:, middle] /= norm + here  # J_0 + 2 J_2 + 2 J_4 + ... = 1
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Weight:
-    """An even weight g on [-1, 1] with unit integral, g(cos t) = sum over odd m of b_m sin(m t).
+    """An even weight g on [-1, 1]: g(cos t) = sum over odd m of b_m sin(m t).
 
     Attributes
     ----------
@@ -41,11 +71,11 @@ class Weight:
         pi m (-1)^((m-1)/2) J_m(z)/z for odd m.
         """
         z = np.asarray(z, dtype=np.float64)
-        safe = np.where(z == 0.0, 1.0, z)
         m = np.arange(1, self.sine.size + 1, 2)
         factor = np.pi * self.sine[m - 1] * m * (-1.0) ** ((m - 1) // 2)
-        value: Array = np.tensordot(factor, jv(m[:, None], safe.ravel()), axes=1)
-        return np.where(z == 0.0, 1.0, value.reshape(z.shape) / safe)
+        safe = np.where(z == 0.0, 1.0, z).ravel()
+        value = (factor @ odd_bessel(safe, m.size)).reshape(z.shape) / safe.reshape(z.shape)
+        return np.where(z == 0.0, 0.5 * np.pi * self.sine[0], value)
 
     @property
     def second_moment(self) -> float:
@@ -79,12 +109,20 @@ def eigenvalues_and_vector(terms: int = TERMS) -> tuple[float, Array]:
     return float(1.0 / inverse[-1]), vector
 
 
+def _frozen(sine: Array) -> Weight:
+    sine.flags.writeable = False
+    return Weight(sine)
+
+
 @lru_cache(maxsize=1)
 def exact_weight() -> Weight:
-    """g_0 = v_0 / integral of v_0, from the exact eigenfunction (Uenishi and Rice, 2003)."""
+    """g_0 = v_0 / integral of v_0, from the exact eigenfunction (Uenishi and Rice, 2003).
+
+    With 40 terms its multiplier is within 2e-7 of the limit of many terms.
+    """
     _, vector = eigenvalues_and_vector()
     # The integral of sin(k t) sin t over [0, pi] is pi/2 for k = 1, else 0.
-    return Weight(vector * (2.0 / np.pi))
+    return _frozen(vector * (2.0 / np.pi))
 
 
 @lru_cache(maxsize=1)
@@ -96,4 +134,4 @@ def rounded_weight() -> Weight:
     sine = np.zeros(3)
     sine[0] = 0.751 * (0.925 - 0.308 / 4.0)
     sine[2] = -0.751 * 0.308 / 4.0
-    return Weight(sine)
+    return _frozen(sine)

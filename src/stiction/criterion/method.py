@@ -16,6 +16,7 @@ from stiction.criterion.nucleation import (
     averaged_load,
     multiplier_of,
     uniform_rates,
+    warn_if_coarse,
 )
 from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
@@ -39,7 +40,9 @@ class LocalCriterion:
 
     Notes
     -----
-    The minimum is taken between the nodes, on the trigonometric interpolant.
+    The minimum is taken between the nodes, on the trigonometric interpolant of the profile. A
+    measured profile that jumps from node to node rings there, and the minimum may fall somewhat
+    below its lowest value; a grid that resolves the jumps cures it.
     """
 
     weights: Weights = "exact"
@@ -67,28 +70,28 @@ class LocalCriterion:
         multipliers: dict[float, tuple[Array, int]] = {}
 
         def multiplier(rate: float) -> tuple[Array, int]:
-            if rate not in multipliers:
-                if len(multipliers) > 64:  # random rates: every sample has its own
-                    multipliers.clear()
+            found = multipliers.get(rate)
+            if found is None:
                 length = problem.nucleation_length_of(rate)
                 # Enough points in h_n for a parabola to find every minimum between them.
                 factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / length)
-                multipliers[rate] = multiplier_of(problem, length, self.weights), factor
-            return multipliers[rate]
+                found = multiplier_of(problem, length, self.weights), factor
+                if len(multipliers) < 64:  # random rates: every sample has its own
+                    multipliers[rate] = found
+            return found
 
         def solve(rows: Rows) -> dict[str, Array]:
-            problem.warn_if_coarse(
-                rows, 8.0, "the moving average is a coarse sum, about 1 % off at 4 nodes"
-            )
+            warn_if_coarse(problem, rows)
             rates = uniform_rates(rows)
             excess = np.ascontiguousarray(rows.strength - rows.initial_stress)
             load, place = np.empty(rows.count), np.empty(rows.count)
             for rate in np.unique(rates):
-                same = slice(None) if np.ptp(rates) == 0.0 else rates == rate
+                same = rates == rate
                 table, factor = multiplier(float(rate))
-                lowest, where = np.empty(rows.count)[same], np.empty(rows.count)[same]
-                scale = averaged_load(rows, table, factor)
-                minimum_rows(excess[same], table, scale, lowest, where)
+                averaged_load(rows, table)  # refuses a load that is too sharp for the grid
+                lowest, where = np.empty(np.sum(same)), np.empty(np.sum(same))
+                some = excess if same.all() else excess[same]
+                minimum_rows(some, rows.load_profile, table, factor, lowest, where)
                 load[same], place[same] = lowest, where
             stress = rows.mean_stress(load)
             return {

@@ -34,17 +34,38 @@ def _interpolant(spectrum: Array, nodes: int, theta: float) -> tuple[float, floa
 
 
 @jit
-def _newton(spectrum: Array, nodes: int, node: int, start: float) -> tuple[float, float]:
-    """The interpolant's minimum within one spacing of `node`: its value and place, in nodes.
+def _quotient(
+    spectrum: Array, scale: Array, nodes: int, theta: float
+) -> tuple[float, float, float]:
+    """Value and two derivatives of the interpolant of `spectrum` over that of `scale`.
+
+    A uniform scale comes as a spectrum of its mean alone, and costs nothing.
+    """
+    value, slope, curvature = _interpolant(spectrum, nodes, theta)
+    if scale.size == 1:
+        factor = nodes / scale[0].real
+        return value * factor, slope * factor, curvature * factor
+    below, slope_below, curvature_below = _interpolant(scale, nodes, theta)
+    value /= below
+    slope = (slope - value * slope_below) / below
+    curvature = (curvature - 2.0 * slope * slope_below - value * curvature_below) / below
+    return value, slope, curvature
+
+
+@jit
+def _newton(
+    spectrum: Array, scale: Array, nodes: int, node: int, start: float
+) -> tuple[float, float]:
+    """The quotient's minimum within one spacing of `node`: its value and place, in nodes.
 
     Newton's method on the slope, from `start`, kept between the points where the slope is known
-    to change sign; it bisects where the interpolant is not convex.
+    to change sign; it bisects where the function is not convex.
     """
     angle = 2.0 * np.pi / nodes
     low, high = node - 1.0, node + 1.0
     place = start
     for _ in range(50):
-        value, slope, curvature = _interpolant(spectrum, nodes, place * angle)
+        value, slope, curvature = _quotient(spectrum, scale, nodes, place * angle)
         if slope > 0.0:
             high = place
         else:
@@ -57,11 +78,11 @@ def _newton(spectrum: Array, nodes: int, node: int, start: float) -> tuple[float
 
 
 @jit
-def refine_minimum(values: Array, spectrum: Array) -> tuple[float, float]:
-    """Minimum of the trigonometric interpolant of `values`, and its place in units of nodes.
+def refine_minimum(values: Array, spectrum: Array, scale: Array) -> tuple[float, float]:
+    """Minimum of the interpolant of `spectrum` over that of `scale`, and its place in nodes.
 
-    A parabola through each local minimum of the nodes estimates how low the interpolant falls
-    there; Newton's method takes the lowest to round-off, and any other that might be lower.
+    A parabola through each local minimum of the nodes' `values` estimates how low the function
+    falls there; Newton's method takes the lowest to round-off, and any other that might be lower.
     """
     nodes = values.size
     lows, starts = np.empty(nodes // 2 + 1), np.empty(nodes // 2 + 1)
@@ -82,7 +103,7 @@ def refine_minimum(values: Array, spectrum: Array) -> tuple[float, float]:
         left, middle = middle, right
     if count == 0:  # constant
         return values[0], 0.0
-    value, place = _newton(spectrum, nodes, lowest[best], starts[best])
+    value, place = _newton(spectrum, scale, nodes, lowest[best], starts[best])
     for i in range(count):
         if i == best:
             continue
@@ -92,42 +113,37 @@ def refine_minimum(values: Array, spectrum: Array) -> tuple[float, float]:
         before = abs(right - 3.0 * middle + 3.0 * left - values[node - 2])
         after = abs(values[(node + 2) % nodes] - 3.0 * right + 3.0 * middle - left)
         if lows[i] - 0.065 * max(before, after) < value:
-            other, elsewhere = _newton(spectrum, nodes, node, starts[i])
+            other, elsewhere = _newton(spectrum, scale, nodes, node, starts[i])
             if other < value:
                 value, place = other, elsewhere
-    return value, place % nodes
+    place %= nodes
+    return value, place if place < nodes else 0.0  # a tiny negative place rounds to `nodes`
 
 
 @jit
 def minimum_rows(
-    excess: Array, multiplier: Array, scale: Array, minimum: Array, place: Array
+    excess: Array, load: Array, multiplier: Array, factor: int, minimum: Array, place: Array
 ) -> None:
-    """Minimum over x of <g, excess>/scale for every row, and where, in units of nodes.
+    """Minimum over x of <g, excess>/<g, load> for every row, and where, in units of nodes.
 
-    `scale` is the averaged load profile on a grid that may be a whole number of times finer than
-    that of `excess`; the minimum is sought on that grid and then between its nodes. Where the
-    load is uniform, it is that of the interpolant of the average, else that of the interpolant of
-    the quotient.
+    Both averages are trigonometric interpolants; the weight of the load has unit integral. The
+    minimum is sought on a grid `factor` times finer and then between its nodes.
     """
     rows, nodes = excess.shape
-    fine = scale.size
-    factor = fine // nodes
-    uniform = True
-    for i in range(fine):
-        if abs(scale[i] - scale[0]) > 1e-14 * scale[0]:
-            uniform = False
+    fine = factor * nodes
+    half = nodes // 2
+    below = np.zeros(fine // 2 + 1, dtype=np.complex128)
+    below[: half + 1] = np.fft.rfft(load) * (multiplier * (factor / multiplier[0]))
+    if factor > 1:  # the highest mode of the coarse grid stands for both of its signs
+        below[half] *= 0.5
+    scale = np.fft.irfft(below, fine)
+    if np.ptp(load) <= 1e-14 * load[0]:
+        below = below[:1].copy()
     spectrum = np.zeros(fine // 2 + 1, dtype=np.complex128)
     for row in range(rows):
-        coarse = np.fft.rfft(excess[row])
-        for m in range(nodes // 2 + 1):
-            spectrum[m] = coarse[m] * (multiplier[m] * factor / scale[0])
-        if factor > 1:  # the highest mode of the coarse grid stands for both of its signs
-            spectrum[nodes // 2] *= 0.5
-        average = np.fft.irfft(spectrum, fine)
-        if uniform:
-            minimum[row], where = refine_minimum(average, spectrum)
-        else:
-            for i in range(fine):
-                average[i] *= scale[0] / scale[i]
-            minimum[row], where = refine_minimum(average, np.fft.rfft(average))
+        spectrum[: half + 1] = np.fft.rfft(excess[row]) * (multiplier * factor)
+        if factor > 1:
+            spectrum[half] *= 0.5
+        quotient = np.fft.irfft(spectrum, fine) / scale
+        minimum[row], where = refine_minimum(quotient, spectrum, below)
         place[row] = where / factor

@@ -25,21 +25,24 @@ def weight_of(weights: Weights) -> Weight:
 
 def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights = "exact") -> Array:
     """What the moving average over h_n does to each wavenumber, shape (nodes//2 + 1,)."""
-    return _multiplier(problem, nucleation_length, weights)
-
-
-def _multiplier(problem: Problem, length: float, weights: Weights) -> Array:
-    if length > problem.interface.length:
+    if nucleation_length > problem.interface.length:
         raise InputError(
-            f"interface.length: the nucleation length {length:.4g} m is longer than the interface"
-            f" ({problem.interface.length:.4g} m); the local criterion does not hold there, use"
-            " st.Equilibrium() or st.Rupture()"
+            f"interface.length: the nucleation length {nucleation_length:.4g} m is longer than the"
+            f" interface ({problem.interface.length:.4g} m); the local criterion does not hold"
+            " there, use st.Equilibrium() or st.Rupture()"
         )
-    weight = weight_of(weights)
-    multiplier = weight.multiplier(problem.interface.wavenumbers * length / 2.0)
-    if weights == "rounded":  # its integral is not 1
-        multiplier[0] = np.pi / 2.0 * weight.sine[0]
-    return np.ascontiguousarray(multiplier)
+    z = problem.interface.wavenumbers * nucleation_length / 2.0
+    return np.ascontiguousarray(weight_of(weights).multiplier(z))
+
+
+def warn_if_coarse(problem: Problem, rows: Rows) -> None:
+    """Warn where the moving average is a coarse sum."""
+    problem.warn_if_coarse(
+        rows,
+        12.0,
+        "where the strength varies within a quarter of it, the local criterion is off by about"
+        " 0.6 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less",
+    )
 
 
 def uniform_rates(rows: Rows) -> Array:
@@ -88,7 +91,8 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
     else:
         uniform_rates(rows)
         rate = float(rows.weakening_rate[0, 0])
-    multiplier = _multiplier(problem, problem.nucleation_length_of(rate), weights)
+    warn_if_coarse(problem, rows)
+    multiplier = multiplier_of(problem, problem.nucleation_length_of(rate), weights)
     excess = np.ascontiguousarray(rows.strength - rows.initial_stress)
     result = np.empty_like(excess)
     average_rows(excess, multiplier, result)
@@ -96,9 +100,13 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
     return result[0] if np.ndim(tau_p) == 1 else result
 
 
-def averaged_load(rows: Rows, multiplier: Array, factor: int = 1) -> Array:
-    """<g, p> with a weight of unit integral, on a grid `factor` times finer, (factor nodes,)."""
+def averaged_load(rows: Rows, multiplier: Array) -> Array:
+    """<g, p> at the nodes, with a weight of unit integral, shape (nodes,)."""
     spectrum = np.fft.rfft(rows.load_profile) * (multiplier / multiplier[0])
-    if factor > 1:
-        spectrum[-1] *= 0.5
-    return np.fft.irfft(spectrum, factor * rows.nodes) * factor
+    average: Array = np.fft.irfft(spectrum, rows.nodes)
+    if not average.min() > 0.0:
+        raise InputError(
+            "load.profile: varies too sharply for this grid: its average over the nucleation"
+            f" length is {average.min():.3g} at one node; take more nodes or a smoother profile"
+        )
+    return average

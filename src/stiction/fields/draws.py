@@ -31,6 +31,7 @@ def standard_normal(
     (samples, dimension) array
         A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
     """
+    samples, first = int(samples), int(first)  # small numpy integers would overflow
     start = 0 if mean_mode else 1
     kept = [0] * mean_mode + list(range(2, 2 * (modes + 1)))
     draws = np.empty((samples, 2 * modes + 1 - start))

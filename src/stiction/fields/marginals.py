@@ -11,12 +11,12 @@ import scipy.stats
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 from scipy.special import ndtr
 
-from stiction._model import Positive, Real, model
+from stiction._model import Positive, Real, _number, model
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 
 
-@model
+@model(kw_only=True)
 class Beta:
     """Beta distribution on [low, high].
 
@@ -72,6 +72,19 @@ class ScipyMarginal:
         return getattr(scipy.stats, self.type)(**dict(self.parameters))
 
 
+@dataclass(frozen=True)
+class PythonMarginal:
+    """A distribution that scipy does not know by name: for Python only, equal to itself only.
+
+    Attributes
+    ----------
+    distribution
+        The frozen distribution.
+    """
+
+    distribution: Any
+
+
 def _continuous_names() -> list[str]:
     return [
         name
@@ -97,23 +110,30 @@ def _scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
         f"{name}.{key}: missing" for key in known[:-2] if key not in parameters and not problems
     ]
     for key, value in parameters.items():
-        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not number or not np.isfinite(value):
+        try:
+            finite = bool(np.isfinite(_number(value)))
+        except ValueError:
+            finite = False
+        if not finite:
             problems.append(f"{name}.{key}: must be a finite number, got {value!r}")
     if problems:
         raise InputError(problems)
     result = ScipyMarginal(name, tuple((k, float(v)) for k, v in parameters.items()))
-    mean, deviation = result.distribution.mean(), result.distribution.std()
+    _check_moments(name, result.distribution, parameters)
+    return result
+
+
+def _check_moments(name: str, distribution: Any, parameters: Any) -> None:
+    mean, deviation = distribution.mean(), distribution.std()
     if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
         raise InputError(
             f"{name}: must have a finite mean and a positive, finite standard deviation,"
             f" got {mean:g} and {deviation:g} from {parameters}"
         )
-    return result
 
 
 def _marginal(value: Any) -> Any:
-    if isinstance(value, Beta | ScipyMarginal):
+    if isinstance(value, Beta | ScipyMarginal | PythonMarginal):
         return value
     if isinstance(value, dict):
         given = dict(value)
@@ -129,11 +149,17 @@ def _marginal(value: Any) -> Any:
             "must be st.Beta(...) or a frozen continuous scipy.stats distribution such as"
             f" scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
+    if type(family) is not type(getattr(scipy.stats, family.name or "", None)):
+        _check_moments(type(family).__name__, value, value.args)
+        return PythonMarginal(value)
     parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
     return _scipy_marginal(family.name, parameters)
 
 
 def _serialise(value: Any) -> Any:
+    if isinstance(value, PythonMarginal):
+        name = type(value.distribution.dist).__name__
+        raise ValueError(f"marginal is the Python distribution {name!r}; use one that scipy names")
     if isinstance(value, Beta):
         keys = ("alpha", "beta", "low", "high", "type")
         return {key: getattr(value, key) for key in keys}
@@ -172,7 +198,8 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
     Notes
     -----
     Grigoriu (1995): translation process. Phi(z) rounds to 1 long before z = 8; the upper tail
-    keeps its digits only through 1 - Phi(z) = Phi(-z).
+    keeps its digits only through 1 - Phi(z) = Phi(-z), and only where scipy computes the inverse
+    survival function of the family directly.
     """
     z = np.asarray(z, dtype=np.float64)
     tail = ndtr(-np.abs(z))

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import pydantic
 from pydantic import model_validator
 
-from stiction._model import model
+from stiction._model import Flag, Positive, describe, model, real_array
 from stiction._typing import Array
-from stiction.errors import AccuracyWarning, InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.fields.draws import standard_normal
 from stiction.fields.hermite import correlation_of_mapped, hermite_coefficients
 from stiction.fields.marginals import Marginal
 from stiction.fields.quantile_table import from_normal
-from stiction.fields.spectra import CustomSpectrum, Spectrum
+from stiction.fields.spectra import CustomSpectrum, Spectrum, lag_of_correlation
 from stiction.fields.synthesis import gaussian_rows
 from stiction.interface import Interface
 
@@ -73,7 +73,7 @@ class RandomField:
 
     marginal: Marginal
     spectrum: Spectrum
-    mean_mode: bool = False
+    mean_mode: Flag = False
 
     @model_validator(mode="after")
     def _tabulated_marginal(self) -> RandomField:
@@ -100,6 +100,8 @@ class RandomField:
         InputError
             If truncation leaves no mode: the correlation length is too long for the interface.
         """
+        if not isinstance(interface, Interface):
+            raise InputError(f"interface: must be an Interface, got {describe(interface)}")
         return _modes(self, interface)
 
     def draws(
@@ -130,11 +132,16 @@ class RandomField:
     def gaussian(self, interface: Interface, draws: Array) -> Array:
         """The underlying Gaussian field z of given draws, shape (samples, nodes), unit variance."""
         modes = self.modes(interface)
-        draws = np.ascontiguousarray(draws, dtype=np.float64)
+        try:
+            draws = real_array(draws)
+        except TypeError as error:
+            raise InputError(f"draws: must be numbers; {error}") from None
         if draws.ndim != 2 or draws.shape[1] != modes.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {modes.dimension}), got shape {draws.shape}"
             )
+        if not np.isfinite(draws).all():
+            raise InputError("draws: must be finite")
         z = np.empty((draws.shape[0], interface.nodes))
         gaussian_rows(draws, modes.sigma, self.mean_mode, interface.nodes, z)
         return z
@@ -231,7 +238,7 @@ class RandomField:
                 low = rho
             else:
                 high = rho
-        return _lag_of_correlation(self.spectrum, high)
+        return lag_of_correlation(self.spectrum, high)
 
     def with_efolding_length(self, length: float, *, of: str = "strength") -> RandomField:
         """The same field with a correlation that falls to 1/e at `length` (m).
@@ -245,8 +252,10 @@ class RandomField:
         """
         if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")
-        if not length > 0.0:
-            raise InputError(f"length: must be positive, got {length!r}")
+        try:
+            length = pydantic.TypeAdapter(Positive).validate_python(length)
+        except pydantic.ValidationError:
+            raise InputError(f"length: must be a positive number, got {length!r}") from None
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = self.spectrum.with_correlation_length(xi)
         return RandomField(self.marginal, spectrum, self.mean_mode)
@@ -268,18 +277,7 @@ def _check_counts(**counts: Any) -> None:
         raise InputError(problems)
 
 
-def _lag_of_correlation(spectrum: Any, target: float) -> float:
-    from scipy.optimize import brentq
-
-    reach = spectrum.efolding_length
-    while float(spectrum.correlation(np.array([reach]))[0]) > target:
-        reach *= 2.0
-
-    def excess(lag: float) -> float:
-        return float(spectrum.correlation(np.array([lag]))[0]) - target
-
-    root: float = brentq(excess, 0.0, reach, rtol=1e-13)
-    return root
+MOST_MODES = 1 << 22
 
 
 @lru_cache(maxsize=256)
@@ -294,12 +292,22 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
             f" {field.spectrum.cutoff:.3g} rad/m; shorten the correlation length, lengthen the"
             " interface or raise the truncation"
         )
-    power = field.spectrum.density(spacing * np.arange(count + 1))
-    # A mode j >= 1 stands for the wavenumbers k and -k, the mean mode for one of them only.
-    power[0] *= 0.5 if field.mean_mode else 0.0
+    if count > MOST_MODES:
+        raise InputError(
+            f"spectrum: has {count} modes on an interface of {interface.length:g} m, at most"
+            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
+        )
+    power = np.zeros(count + 1)
+    power[1:] = field.spectrum.density(spacing * np.arange(1, count + 1))
+    if field.mean_mode:
+        # A mode j >= 1 stands for the wavenumbers k and -k, the mean mode for one of them only.
+        power[0] = 0.5 * float(field.spectrum.density(np.zeros(1))[0])
     total = power.sum()
-    if not total > 0.0:
-        raise InputError("spectrum: has no power in the modes of this interface")
+    if not 0.0 < total < np.inf:
+        raise InputError(
+            "spectrum: its power in the modes of this interface must be positive and finite,"
+            f" got {total:g}"
+        )
     sigma = np.sqrt(power / total)
     sigma.flags.writeable = False
     return Modes(sigma, count, 2 * count + int(field.mean_mode))
@@ -310,21 +318,19 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
     modes = field.modes(interface)
     lost = float(np.sum(modes.sigma[interface.nodes // 2 + 1 :] ** 2))
     if lost > 1e-4:
-        warnings.warn(
+        warn_accuracy(
             f"the grid of {interface.nodes} nodes is coarser than the spectrum: values at the nodes"
             f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
-            f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)",
-            AccuracyWarning,
-            stacklevel=3,
+            f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
         )
+    if field.mean_mode:
+        return
     ratio = interface.length / field.spectrum.efolding_length
-    if not field.mean_mode and ratio < 2.0 * math.pi * FEWEST_LENGTHS:
+    if ratio < 2.0 * math.pi * FEWEST_LENGTHS:
         gap = -float(field.correlation(interface, of="z").min())
         if gap > 0.02:
-            warnings.warn(
+            warn_accuracy(
                 f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
                 f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
-                " RandomField(mean_mode=True) restores the mean's variability",
-                AccuracyWarning,
-                stacklevel=3,
+                " RandomField(mean_mode=True) restores the mean's variability"
             )

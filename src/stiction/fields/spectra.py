@@ -10,14 +10,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.special import betainc, betaincinv, erf, erfinv, gamma, kv
+from scipy.special import betainc, betaincinv, erf, erfinv, gammaln, kve
 
 from stiction._model import Positive, _number, model
 from stiction._typing import Array
@@ -43,7 +44,7 @@ class _Spectrum:
         raise NotImplementedError
 
     def correlation(self, lag: Array) -> Array:
-        """Correlation of z at `lag` (m), on an infinite line and without truncation."""
+        """Correlation of z at `lag` (m), on an infinite line."""
         raise NotImplementedError
 
     @property
@@ -58,23 +59,43 @@ class _Spectrum:
 
     @property
     def efolding_length(self) -> float:
-        """Distance at which the correlation of z has fallen to 1/e, m, on an infinite line."""
-        reach = 2.0 * math.pi / self._power_quantile(0.5)
-
-        def excess(lag: float) -> float:
-            return float(self.correlation(np.array([lag]))[0]) - math.exp(-1.0)
-
-        while excess(reach) > 0.0:
-            reach *= 2.0
-        root: float = brentq(excess, 0.0, reach, rtol=1e-14)
-        return root
+        """Distance at which the correlation of z first falls to 1/e, m, on an infinite line."""
+        return lag_of_correlation(self, math.exp(-1.0))
 
     def _power_quantile(self, share: float) -> float:
         upper = 1.0
         while self.power_within(upper) < share:
             upper *= 2.0
-        root: float = brentq(lambda k: self.power_within(k) - share, 0.0, upper, rtol=1e-12)
+            if upper > 1e15:
+                raise InputError("spectrum: its power is not finite; give a truncation")
+        root: float = brentq(lambda k: self.power_within(k) - share, 0.0, upper, xtol=1e-300)
         return root
+
+
+@lru_cache(maxsize=256)
+def lag_of_correlation(spectrum: _Spectrum, target: float) -> float:
+    """First lag at which the correlation of z on an infinite line falls to `target`, m."""
+    # The correlation cannot change faster than its highest wavenumber allows; wide steps after
+    # that, for spectra whose power sits far below their truncation.
+    step = 0.25 * math.pi / spectrum.cutoff
+    low = high = 0.0
+    while True:
+        lags = high + step * np.arange(1, 65)
+        below = np.nonzero(spectrum.correlation(lags) <= target)[0]
+        if below.size:
+            high = float(lags[below[0]])
+            low = high - step
+            break
+        high = float(lags[-1])
+        step *= 1.25
+        if not math.isfinite(high):
+            raise InputError("spectrum: its correlation does not fall to 1/e at any distance")
+
+    def excess(ratio: float) -> float:
+        return float(spectrum.correlation(np.array([ratio * high]))[0]) - target
+
+    root: float = brentq(excess, low / high, 1.0, xtol=1e-15, rtol=1e-14)
+    return root * high
 
 
 class _ScaledSpectrum(_Spectrum):
@@ -83,13 +104,14 @@ class _ScaledSpectrum(_Spectrum):
     correlation_length: float
     truncation: float | None
     power_kept: float | None
+    _default_power: ClassVar[float] = 0.9997
 
     @property
     def cutoff(self) -> float:
         """Wavenumber above which the spectrum is truncated, rad/m."""
         if self.truncation is not None:
             return self.truncation * 2.0 * math.pi / self.correlation_length
-        return self._power_quantile(0.9997 if self.power_kept is None else self.power_kept)
+        return self._power_quantile(self.power_kept or self._default_power)
 
     def with_correlation_length(self, correlation_length: float) -> Any:
         """The same spectrum with another `correlation_length` (m)."""
@@ -109,7 +131,7 @@ class PowerLawSpectrum(_ScaledSpectrum):
     correlation_length : float
         xi_0 = 2 pi/lambda, m.
     exponent : float
-        Above 1/2; 4 in Albertini et al. (2020, Eq. 4).
+        In [0.6, 64]; 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
         Truncation in multiples of lambda; 2.5 if neither this nor `power_kept` is given.
     power_kept : float, optional
@@ -129,9 +151,14 @@ class PowerLawSpectrum(_ScaledSpectrum):
     @model_validator(mode="after")
     def _truncated_once(self) -> PowerLawSpectrum:
         _one_truncation(self.truncation, self.power_kept)
-        if self.truncation is None and self.power_kept is None:
-            object.__setattr__(self, "truncation", 2.5)
         return self
+
+    @property
+    def cutoff(self) -> float:
+        """Wavenumber above which the spectrum is truncated, rad/m."""
+        if self.power_kept is not None:
+            return self._power_quantile(self.power_kept)
+        return (2.5 if self.truncation is None else self.truncation) * self.cutoff_wavenumber
 
     @property
     def cutoff_wavenumber(self) -> float:
@@ -150,15 +177,24 @@ class PowerLawSpectrum(_ScaledSpectrum):
         return float(betainc(0.5, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def _power_quantile(self, share: float) -> float:
-        t = float(betaincinv(0.5, self.exponent - 0.5, share))
-        return self.cutoff_wavenumber * math.sqrt(t / (1.0 - t))
+        # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
+        rest = float(betaincinv(self.exponent - 0.5, 0.5, 1.0 - share))
+        return self.cutoff_wavenumber * math.sqrt((1.0 - rest) / rest)
 
     def correlation(self, lag: Array) -> Array:
         """Matern correlation at `lag` (m), on an infinite line."""
         smoothness = self.exponent - 0.5
-        a = np.maximum(np.abs(np.asarray(lag)) * self.cutoff_wavenumber, 1e-12)
-        value = 2.0 ** (1.0 - smoothness) / gamma(smoothness) * a**smoothness * kv(smoothness, a)
-        return np.where(a <= 1e-12, 1.0, value)
+        a = np.abs(np.asarray(lag, dtype=np.float64)) * self.cutoff_wavenumber
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log_value = (
+                (1.0 - smoothness) * math.log(2.0)
+                - gammaln(smoothness)
+                + smoothness * np.log(a)
+                + np.log(kve(smoothness, a))
+                - a
+            )
+        # Where the Bessel function overflows, a is so small that the correlation is 1.
+        return np.where(np.isfinite(log_value) & (a > 0.0), np.exp(log_value), 1.0)
 
 
 @model
@@ -223,11 +259,11 @@ class ExponentialSpectrum(_ScaledSpectrum):
     power_kept: Share | None = None
     type: Literal["exponential"] = "exponential"
 
+    _default_power: ClassVar[float] = 0.99
+
     @model_validator(mode="after")
     def _truncated_once(self) -> ExponentialSpectrum:
         _one_truncation(self.truncation, self.power_kept)
-        if self.truncation is None and self.power_kept is None:
-            object.__setattr__(self, "power_kept", 0.99)
         return self
 
     def density(self, wavenumber: Array) -> Array:
@@ -308,7 +344,7 @@ class CustomSpectrum(_Spectrum):
 
     def density(self, wavenumber: Array) -> Array:
         """g(k) at k in rad/m, up to a factor."""
-        return np.asarray(self.function(np.asarray(wavenumber)), dtype=np.float64)
+        return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
 
     def power_within(self, wavenumber: float) -> float:
         """Share of the power below `wavenumber`, by quadrature."""
@@ -323,15 +359,17 @@ class CustomSpectrum(_Spectrum):
 
     def correlation(self, lag: Array) -> Array:
         """Correlation of z at `lag` (m): the cosine transform of g up to the cutoff."""
-        k = np.linspace(0.0, self.cutoff, 20001)
+        # Midpoints: g may be infinite at k = 0.
+        k = (np.arange(20_000) + 0.5) * (self.cutoff / 20_000)
         weight = self.density(k)
-        weight[[0, -1]] *= 0.5
         lags = np.atleast_1d(np.asarray(lag, dtype=np.float64))
         value = np.array([np.sum(weight * np.cos(k * x)) for x in lags]) / weight.sum()
         return value.reshape(np.shape(lag))
 
 
 def _as_spectrum(value: Any) -> Any:
+    if isinstance(value, type):
+        raise InputError(f"must be a spectrum such as st.{value.__name__}(...), got the class")
     if callable(value) and not isinstance(value, _Spectrum):
         return CustomSpectrum(function=value)
     return value
