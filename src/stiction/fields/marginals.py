@@ -149,11 +149,12 @@ def _marginal(value: Any) -> Any:
             "must be st.Beta(...) or a frozen continuous scipy.stats distribution such as"
             f" scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
-    if type(family) is not type(getattr(scipy.stats, family.name or "", None)):
+    name = str(getattr(family, "name", ""))
+    if type(family) is not type(getattr(scipy.stats, name, None)):
         _check_moments(type(family).__name__, value, value.args)
         return PythonMarginal(value)
     parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return _scipy_marginal(family.name, parameters)
+    return _scipy_marginal(name, parameters)
 
 
 def _serialise(value: Any) -> Any:
