@@ -65,7 +65,9 @@ def test_short_correlation_is_linear(problem):
     """A Gaussian marginal keeps exp(-x/xi), whose integral is 2 xi: the slope is in closed form."""
     marginal = scipy.stats.norm(loc=1e6, scale=1e5)
     xi = 0.01 * problem.nucleation_length
-    strength = st.RandomField(marginal, st.ExponentialSpectrum(xi))
+    strength = st.RandomField(
+        marginal=marginal, spectrum=st.ExponentialSpectrum(correlation_length=xi)
+    )
     square = quad(lambda s: float(exact_weight().at(np.array([s]))[0]) ** 2, -1.0, 1.0)[0]
     slope = nucleation_limits(problem, strength).short_slope
     assert slope == pytest.approx(4.0 * square, rel=1e-4)  # Simpson's rule across the kink
@@ -77,13 +79,19 @@ def test_short_correlation_is_linear(problem):
 def test_long_correlation_at_fixed_length(problem):
     """One mode left: the closed limit is what the general formula gives."""
     xi = 2.4 * problem.interface.length
-    marginal = st.Beta(1.5, 3.0, 0.66e6, 1.66e6)
-    strength = st.RandomField(marginal, st.PowerLawSpectrum(xi))
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    strength = st.RandomField(
+        marginal=marginal, spectrum=st.PowerLawSpectrum(correlation_length=xi)
+    )
     assert strength.modes(problem.interface).count == 1
     limit = nucleation_limits(problem, strength).long_ratio_fixed_length
     found = nucleation_statistics(problem, strength).variance_ratio
     assert found == pytest.approx(limit, rel=1e-10)
-    uniform = st.RandomField(marginal, st.PowerLawSpectrum(1e3 * xi, truncation=1e4), True)
+    uniform = st.RandomField(
+        marginal=marginal,
+        spectrum=st.PowerLawSpectrum(correlation_length=1e3 * xi, truncation=1e4),
+        mean_mode=True,
+    )
     assert nucleation_limits(problem, uniform).long_ratio_fixed_length == 1.0
     assert nucleation_statistics(problem, uniform).variance_ratio == pytest.approx(1.0, abs=1e-6)
 

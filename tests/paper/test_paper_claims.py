@@ -4,12 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import stiction as st
 from stiction.paper.claims import CLAIMS, Finding, Verdict, judged
 from stiction.paper.claims.claim import SUBJECTS, rounded
 from stiction.paper.claims.rules import agrees, below, falling, rising, worst
 from stiction.paper.data import Data
+from stiction.paper.derived import misplaced
 from stiction.paper.setting import Setting
 from stiction.paper.studies import STUDIES, compute
 from stiction.paper.studies.context import Context
@@ -54,7 +56,7 @@ def test_parameters_decide_the_printed_numbers():
     incompressible = Setting(problem=dataclasses.replace(paper.problem, solid=solid))
     assert _judge("effective-modulus", incompressible).verdict is Verdict.HOLDS
     assert _judge("mean-strength", paper).verdict is Verdict.CORRECTED
-    exact = Setting(marginal=st.Beta(1.5, 3.0, 0.66e6, 1.68e6))
+    exact = Setting(marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.68e6))
     assert _judge("mean-strength", exact).verdict is Verdict.HOLDS
     assert _judge("power-kept", paper).verdict is Verdict.HOLDS
     assert _judge("power-kept", Setting(exponent=1.5)).verdict is not Verdict.HOLDS
@@ -65,8 +67,8 @@ def findings() -> dict[str, dict[str, Finding]]:
     """All claims at 256 nodes and few samples, for the paper's strength and for its mirror."""
     result = {}
     for name, marginal in (
-        ("paper", st.Beta(1.5, 3.0, 0.66e6, 1.66e6)),
-        ("mirror", st.Beta(3.0, 1.5, 0.66e6, 1.66e6)),
+        ("paper", st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)),
+        ("mirror", st.Beta(alpha=3.0, beta=1.5, low=0.66e6, high=1.66e6)),
     ):
         setting = Setting(problem=st.paper.problem(nodes=256), marginal=marginal)
         context = Context(setting, 300, 0)
@@ -121,3 +123,19 @@ def test_mirrored_strength_changes_verdicts(findings):
     assert mirror["runaway-length"].verdict is Verdict.FAILS  # a larger stress drop
     skewness = mirror["nucleation-skewness"].computed[0].estimate
     assert skewness.value < 0.0
+
+
+def test_misplaced_counts_the_shorter_way_round():
+    """Onsets on either side of x = 0 are neighbours."""
+    setting = Setting(correlation_ratios=(0.5, 1.0))
+    length, h = 0.1, setting.problem.nucleation_length
+    exact = np.array([0.0, 0.0, 0.05, 0.05])
+    local = np.array([length - 0.4 * h, 0.6 * h, 0.05 + 0.4 * h, 0.05 - 0.6 * h])
+    coordinates = {"correlation_ratio": [0.5]}
+    dims = ("correlation_ratio", "sample")
+    studies = {
+        "monte_carlo": xr.Dataset({"critical_position": (dims, local[None])}, coordinates),
+        "interaction": xr.Dataset({"critical_position": (dims, exact[None])}, coordinates),
+    }
+    found = misplaced(Data(setting, 4, 0, studies), 0.5)
+    np.testing.assert_array_equal(found, [False, True, False, True])

@@ -105,10 +105,15 @@ def test_same_numbers_whatever_the_workers(folder, tmp_path):
 def test_only_some_figures(tmp_path):
     report = st.paper.run(tmp_path, only="mapping", **_options())
     assert [path.name for path in (tmp_path / "figures").glob("*.png")] == ["figure-2-mapping.png"]
-    assert "Figure 5" not in report.read_text(encoding="utf-8")
+    html = report.read_text(encoding="utf-8")
+    assert "Figure 5" not in html
+    assert 'class="verdict"' not in html  # nothing was computed that could judge a claim
     # A second run replaces the first.
     st.paper.run(tmp_path, only=["problem", "variance"], **_options())
-    assert "Figure 7" in report.read_text(encoding="utf-8")
+    html = report.read_text(encoding="utf-8")
+    assert "Figure 7" in html
+    assert html.count('class="verdict"') > 20
+    assert "Theory against exact equilibrium" not in html
     shutil.rmtree(tmp_path)
 
 

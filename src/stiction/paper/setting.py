@@ -45,9 +45,9 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
         If the plane state is unknown or the nodes are too few.
     """
     return Problem(
-        Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
-        Interface(length=0.1, nodes=nodes),
-        SlipWeakening(weakening_rate=0.5e12, residual_strength=0.0),
+        solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
+        interface=Interface(length=0.1, nodes=nodes),
+        friction=SlipWeakening(weakening_rate=0.5e12, residual_strength=0.0),
     )
 
 
