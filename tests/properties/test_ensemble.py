@@ -1,6 +1,7 @@
 """Sample i depends on (seed, i) and on nothing else: not on workers, executors or batches."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import pairwise
 from multiprocessing import get_context
 
 import numpy as np
@@ -72,14 +73,12 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
         assert values.tobytes() == whole[name][first : first + samples].tobytes()
 
 
-@given(
-    samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9)
-)
+@given(samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9))
 def test_pieces_cover_all_samples_once(samples, size, first):
     pieces = list(chunks(samples, size, first))
     assert sum(count for _, count in pieces) == samples
     assert pieces[0][0] == first
-    for (start, count), (following, _) in zip(pieces, pieces[1:], strict=False):
+    for (start, count), (following, _) in pairwise(pieces):
         assert start + count == following
     assert all(0 < count <= size for _, count in pieces)
 
@@ -119,9 +118,10 @@ def test_what_else_is_random_is_independent_of_the_strength(arguments, make_stre
 def test_progress_counts_every_sample_once(arguments):
     seen = []
     st.monte_carlo(
-        **arguments, samples=SAMPLES, workers=2, progress=lambda done, total: seen.append(
-            (done, total)
-        )
+        **arguments,
+        samples=SAMPLES,
+        workers=2,
+        progress=lambda done, total: seen.append((done, total)),
     )
     assert seen[-1] == (SAMPLES, SAMPLES)
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})

@@ -87,7 +87,9 @@ def test_check_says_what_will_be_done(command, study):
 
 
 def test_check_lists_every_mistake(command, study):
-    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace("samples = 200", "samples = 0")
+    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace(
+        "samples = 200", "samples = 0"
+    )
     study.write_text(text + '\n[[sweep]]\n"ensemble.sed" = [1]\n')
     code, out, err = command("check", study)
     assert (code, out) == (2, "")

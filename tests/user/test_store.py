@@ -85,7 +85,9 @@ def test_growing_computes_only_the_new_samples(tmp_path, often, reference, name,
     computed = []
     original = work.compute
     monkeypatch.setattr(
-        work, "compute", lambda plan, first, n: (computed.append((first, n)), original(plan, first, n))[1]
+        work,
+        "compute",
+        lambda plan, first, n: (computed.append((first, n)), original(plan, first, n))[1],
     )
     assert make_study().run(out=tmp_path / name, workers=1).identical(reference)
     assert min(first for first, _ in computed) == 500

@@ -70,9 +70,7 @@ def test_python_and_toml_are_the_same_study(tmp_path):
 def test_a_study_is_monte_carlo():
     study = st.Study.from_dict(STUDY)
     result = study.run()
-    direct = st.monte_carlo(
-        study.problem, study.strength, method=study.method, samples=40, seed=3
-    )
+    direct = st.monte_carlo(study.problem, study.strength, method=study.method, samples=40, seed=3)
     assert result.identical(direct)
 
 

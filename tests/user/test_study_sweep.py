@@ -41,9 +41,7 @@ def test_every_point_is_the_study_with_its_values():
         one["strength"]["spectrum"]["correlation_length"] = point.values[LENGTH]
         one["problem"]["solid"]["poisson_ratio"] = point.values["problem.solid.poisson_ratio"]
         alone = st.Study.from_dict(one).run()
-        part = result.isel(
-            correlation_length=point.number // 2, poisson_ratio=point.number % 2
-        )
+        part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
         for name in alone.data_vars:
             np.testing.assert_array_equal(part[name], alone[name])
 
@@ -124,7 +122,9 @@ def test_objects_and_functions_in_python():
         strength=base.strength,
         method=base.method,
         ensemble=base.ensemble,
-        sweep=[{"strength.spectrum": [base.strength.spectrum, lambda k: np.exp(-((k * 2e-3) ** 2))]}],
+        sweep=[
+            {"strength.spectrum": [base.strength.spectrum, lambda k: np.exp(-((k * 2e-3) ** 2))]}
+        ],
     )
     assert study.run()["critical_stress"].shape == (2, 30)
     with pytest.raises(st.InputError):
@@ -206,9 +206,7 @@ def test_methods_side_by_side():
 
 
 def test_kept_profiles():
-    study = swept(
-        {LENGTH: [4e-3, 6e-3]}, ensemble=KEEPING
-    )
+    study = swept({LENGTH: [4e-3, 6e-3]}, ensemble=KEEPING)
     result = study.run()
     assert result["strength"].dims == ("correlation_length", "kept_sample", "x")
     np.testing.assert_array_equal(result["kept_sample"], [0, 1])
@@ -226,7 +224,9 @@ def test_what_may_be_kept_is_limited():
             STUDY | {"ensemble": {"samples": 10240, "keep": ["strength"], "keep_limit": 2.0**20}}
         )
     with pytest.raises(st.InputError, match="number of nodes is swept"):
-        swept({"problem.interface.nodes": [128, 256]}, ensemble={"samples": 3, "keep": ["strength"]})
+        swept(
+            {"problem.interface.nodes": [128, 256]}, ensemble={"samples": 3, "keep": ["strength"]}
+        )
     with pytest.raises(st.InputError, match="did you mean 'strength'"):
         st.Study.from_dict(STUDY | {"ensemble": {"samples": 3, "keep": ["strenght"]}})
 

@@ -1,0 +1,204 @@
+"""Dask's own scheduler and workers on loopback, one of them killed in mid-run; SLURM's job script."""
+
+import copy
+import os
+import signal
+import sys
+import threading
+import time
+
+import pytest
+
+import stiction as st
+from stiction.cli import app as room
+from stiction.ensemble import stored
+from stiction.ensemble.distributed import Cluster, dask_executor, slurm_cluster
+from stiction.runs import StoredRun, run_into
+
+STUDY = {
+    "problem": {
+        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
+        "interface": {"length": 0.1, "nodes": 256},
+        "friction": {"weakening_rate": 0.4e12},
+    },
+    "strength": {
+        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
+        "spectrum": {"type": "power_law", "correlation_length": 3e-3},
+    },
+    "method": {"type": "local_criterion"},
+    "ensemble": {"samples": 60_000, "seed": 3},
+    "sweep": [{"strength.spectrum.correlation_length": [3e-3, 4e-3]}],
+}
+
+# Dask warns of its own affairs (ports, garbage collection) in every version differently.
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def needs(module):
+    return pytest.importorskip(
+        module, reason=f'needs {module}: pip install "stiction[distributed]"'
+    )
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = needs("distributed")
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address=None,
+        memory_limit=0,
+    ) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return st.Study.from_dict(STUDY).run(workers=1)
+
+
+@pytest.mark.slow
+def test_a_running_scheduler_gives_the_same_bits(cluster, tmp_path, reference):
+    with dask_executor(cluster.scheduler_address) as executor:
+        assert st.Study.from_dict(STUDY).run(executor=executor).identical(reference)
+        result = st.Study.from_dict(STUDY).run(out=tmp_path / "run", executor=executor)
+    assert result.identical(reference)
+
+
+@pytest.mark.slow
+def test_a_worker_killed_in_mid_run_loses_and_repeats_nothing(
+    cluster, tmp_path, reference, monkeypatch
+):
+    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.05)
+    victims, done = [], []
+
+    def kill_one(count, total):
+        done.append(count)
+        if count > 5000 and not victims:
+            victims.append(next(iter(cluster.workers.values())).pid)
+            os.kill(victims[0], signal.SIGKILL)
+
+    with dask_executor(cluster.scheduler_address) as executor:
+        run = run_into(
+            st.Study.from_dict(STUDY), tmp_path / "run", executor=executor, progress=kill_one
+        )
+    assert len(victims) == 1
+    assert done[-1] == 120_000  # nothing twice, nothing lost
+    assert run.status().complete
+    assert run.dataset().identical(reference)
+
+
+@pytest.mark.slow
+def test_all_workers_gone_and_back(cluster, tmp_path, reference, monkeypatch):
+    """While nobody works the run waits; what comes back goes on."""
+    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.05)
+    seen = []
+
+    def lose_all(count, total):
+        if count > 5000 and not seen:
+            seen.append(count)
+            cluster.scale(0)
+            threading.Timer(3.0, cluster.scale, (2,)).start()
+
+    with dask_executor(cluster.scheduler_address) as executor:
+        result = st.Study.from_dict(STUDY).run(
+            out=tmp_path / "run", executor=executor, progress=lose_all
+        )
+    assert seen
+    assert result.identical(reference)
+
+
+@pytest.mark.slow
+def test_the_command_line_on_a_running_scheduler(cluster, tmp_path, reference, monkeypatch, capsys):
+    st.Study.from_dict(STUDY).to_toml(tmp_path / "study.toml")
+    command = ["run", tmp_path / "study.toml", "--out", tmp_path / "run"]
+    command += ["--scheduler", cluster.scheduler_address]
+    monkeypatch.setattr(sys, "argv", ["stiction", *map(str, command)])
+    with pytest.raises(SystemExit) as ended:
+        room.main()
+    assert not ended.value.code
+    assert "120000 samples in" in capsys.readouterr().out
+    assert StoredRun(tmp_path / "run").dataset().identical(reference)
+
+
+@pytest.mark.slow
+def test_nobody_answers(tmp_path):
+    needs("distributed")
+    begin = time.monotonic()
+    with (
+        pytest.raises(st.InputError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"),
+        dask_executor("tcp://127.0.0.1:9"),
+    ):
+        pass
+    assert time.monotonic() - begin < 60.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "module", "option"),
+    [
+        ({"scheduler": "tcp://127.0.0.1:9"}, "distributed", "--scheduler"),
+        ({"slurm": Cluster(jobs=1)}, "dask_jobqueue", "--slurm"),
+    ],
+)
+def test_without_the_extra_a_message_says_how_to_get_it(monkeypatch, arguments, module, option):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(st.InputError, match=rf"{option}.*pip install \"stiction\[distributed\]\""):
+        with dask_executor(**arguments):
+            pass
+
+
+@pytest.mark.slow
+def test_the_job_script_of_slurm():
+    needs("dask_jobqueue")
+    study = copy.deepcopy(STUDY) | {
+        "cluster": {
+            "jobs": 4,
+            "cores": 16,
+            "processes": 8,
+            "memory": "32GB",
+            "walltime": "02:30:00",
+            "queue": "short",
+            "account": "friction",
+            "options": {
+                "interface": "lo",
+                "job_extra_directives": ["--exclusive"],
+                "scheduler_options": {"dashboard_address": None},
+            },
+        }
+    }
+    settings = st.Study.from_dict(study).cluster
+    with slurm_cluster(settings) as cluster:
+        script = cluster.job_script()
+    for line in (
+        "#SBATCH -p short",
+        "#SBATCH -A friction",
+        "#SBATCH --cpus-per-task=16",
+        "#SBATCH --mem=30G",  # 32 GB are 29.8 GiB, rounded up
+        "#SBATCH -t 02:30:00",
+        "#SBATCH --exclusive",
+    ):
+        assert line in script.splitlines()
+    assert "--nworkers 8" in script
+    assert "--nthreads 2" in script
+
+
+@pytest.mark.slow
+def test_settings_that_slurm_refuses():
+    needs("dask_jobqueue")
+    with pytest.raises(st.InputError, match="cluster: dask-jobqueue refuses"):
+        slurm_cluster(Cluster(jobs=1))
+
+
+def test_mistakes_in_the_cluster_table_are_named():
+    with pytest.raises(st.InputError) as caught:
+        st.Study.from_dict(STUDY | {"cluster": {"job": 3, "cores": 0}})
+    assert "did you mean 'jobs'" in str(caught.value)
+    assert "cluster.cores" in str(caught.value)
+
+
+def test_the_cluster_is_no_part_of_the_result():
+    with_cluster = st.Study.from_dict(STUDY | {"cluster": {"jobs": 3}})
+    assert with_cluster.attributes == st.Study.from_dict(STUDY).attributes
+    assert with_cluster.to_dict()["cluster"] == {"jobs": 3}
