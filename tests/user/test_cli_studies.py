@@ -294,7 +294,7 @@ def test_profiles_that_do_not_fit(command, study, tmp_path, text, words):
 
 @pytest.mark.slow
 def test_onset_by_every_method(command, study, tmp_path):
-    interface, profile = profile_of(study)
+    _, profile = profile_of(study)
     np.save(tmp_path / "p.npy", profile)
     figure = tmp_path / "onset.png"
     code, out, _ = command("onset", study, "--strength", tmp_path / "p.npy", "--out", figure)
@@ -311,7 +311,7 @@ def test_onset_by_every_method(command, study, tmp_path):
 def test_a_method_that_does_not_apply_says_why(command, study, tmp_path):
     text = TEXT.replace("weakening_rate = 0.25e12", "critical_slip = 8e-6")
     study.write_text(text.replace('"local_criterion"', '"equilibrium"'))
-    interface, profile = profile_of(study)
+    _, profile = profile_of(study)
     np.save(tmp_path / "p.npy", profile)
     code, out, _ = command(
         "onset", study, "--strength", tmp_path / "p.npy", "--method", "local_criterion"

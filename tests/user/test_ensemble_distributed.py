@@ -1,4 +1,4 @@
-"""Dask's own scheduler and workers on loopback, one of them killed in mid-run; SLURM's job script."""
+"""Dask's own scheduler and workers on loopback, one killed in mid-run; SLURM's job script."""
 
 import copy
 import os
@@ -144,9 +144,9 @@ def test_nobody_answers(tmp_path):
 )
 def test_without_the_extra_a_message_says_how_to_get_it(monkeypatch, arguments, module, option):
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(st.InputError, match=rf"{option}.*pip install \"stiction\[distributed\]\""):
-        with dask_executor(**arguments):
-            pass
+    words = rf"{option}.*pip install \"stiction\[distributed\]\""
+    with pytest.raises(st.InputError, match=words), dask_executor(**arguments):
+        pass
 
 
 @pytest.mark.slow
