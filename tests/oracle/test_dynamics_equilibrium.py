@@ -83,3 +83,44 @@ def test_a_run_from_an_equilibrium_finds_the_same_onset(system):
     )  # fmt: skip
     assert float(found["critical_stress"]) == pytest.approx(exact, rel=5e-6)
     assert int(found["implicit_steps"]) > 0
+
+
+@pytest.mark.parametrize(
+    ("mode", "ratio", "plane"),
+    [("II", 0.0, "strain"), ("II", 0.45, "strain"), ("III", 0.25, "strain")],
+)
+def test_everything_may_vary_along_the_interface(mode, ratio, plane):
+    """tau_p, tau_r, W, load profile and initial stress, on a grid that is no power of two."""
+    n, rng = 200, np.random.default_rng(200)
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=ratio, density=1170.0, plane=plane)
+    interface = st.Interface(length=0.1, nodes=n)
+    angle = 2.0 * np.pi * interface.x / interface.length
+
+    def varied(mean, spread, waves):
+        terms = [rng.standard_normal() * np.cos(j * angle + j * j) for j in range(1, waves)]
+        return mean + spread * np.tanh(sum(terms) / np.sqrt(waves / 2))
+
+    rate, profile = varied(2.5e11, 5e10, 6), varied(1.0, 0.2, 5)
+    initial, strength = varied(0.0, 1e5, 8), varied(1.2e6, 4e5, 20)
+    problem = st.Problem(
+        solid,
+        interface,
+        st.SlipWeakening(weakening_rate=rate, residual_strength=varied(2e5, 5e4, 5)),
+        st.Load(profile=profile, initial_stress=initial),
+        mode=mode,
+    )
+    a = circulant(np.fft.irfft(0.5 * problem.effective_modulus * interface.wavenumbers, n))
+    exact = (
+        linprog(
+            np.r_[np.zeros(n), -1.0],
+            A_ub=np.hstack([-(a - np.diag(rate)) * 1e-12, profile[:, None]]),
+            b_ub=(strength - initial) * 1e-6,
+            bounds=[(0.0, None)] * n + [(None, None)],
+            method="highs",
+        ).x[-1]
+        * 1e6
+    )
+    found = Rupture(loading_rate=1e5).prepare(problem)(problem.rows(strength))
+    load = (found["first_instability"][0] - initial.mean()) / profile.mean()
+    # Inertia at 1e5 Pa/s: some 1e-6, as above.
+    assert load == pytest.approx(exact, rel=5e-6)

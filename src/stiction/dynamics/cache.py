@@ -17,7 +17,7 @@ from stiction.dynamics.exponentials import ExponentialSum, fit_exponentials
 
 logger = logging.getLogger("stiction")
 
-_FORMAT = 1  # raise when the fit or the file layout changes, so that old files are left alone
+_FORMAT = 2  # raise when the fit or the file layout changes, so that old files are left alone
 _memory: dict[tuple[str, float, float, float], ExponentialSum] = {}
 _lock = threading.Lock()
 _said = False
