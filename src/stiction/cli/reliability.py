@@ -96,6 +96,8 @@ def reliability(
     table.write_csv(out)
     save(figures.curve_figure(curve), "failure_curve")
     cells = [list(table.columns), *table.cells()]
+    for row, value in zip(cells[1:], curve["stress"].values, strict=True):
+        row[0] = f"{value:.7g}"  # near the bound five digits do not tell the points apart
     widths = [max(len(row[i]) for row in cells) for i in range(len(table.columns))]
     for row in cells:
         line = "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))

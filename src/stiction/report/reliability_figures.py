@@ -106,7 +106,7 @@ def curve_figure(curve: xr.Dataset) -> Figure:
             axes[1].set_xlabel("stress above the least strength (kPa)")
             panel(axes[0], "a")
             panel(axes[1], "b")
-        axes[-1].legend(loc="lower right")
+        axes[0].legend(loc="lower right")
     return figure
 
 
@@ -187,7 +187,7 @@ def tail_figure(study: TailStudy) -> Figure:
             x = curve["stress"].values * 1e-6
             third.plot(x, curve["probability"].values, **series(i), label=name)
         third.set_xlabel("stress (MPa)\n")
-        third.legend()
+        third.legend(loc="upper left", fontsize=6.5, handlelength=1.6, borderaxespad=0.1)
         _decades(first, short)
         for axes, letter in zip((first, second, third), "abc", strict=True):
             panel(axes, letter)
