@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from stiction.problem import Problem
 
 Array = NDArray[np.float64]
 
-QUADRATURE = 400
+QUADRATURE = 256
+PANELS, POINTS = 24, 16
 REACH = 40.0  # correlation lengths; beyond, even the exponential correlation is round-off
 
 
@@ -114,14 +116,15 @@ def nucleation_statistics(
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p] and Var[tau_n] is the double
     integral of the correlation of tau_p against the weights. On a periodic interface it is a sum
     over wavenumbers of the spectrum of tau_p times the squared transform of the weight; on an
-    infinite one Gauss quadrature in both arguments (Chebyshev, second kind). The correlation is
-    that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the Gaussian field.
+    infinite one quadrature of the correlation against the autocorrelation of the weight. The
+    correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the
+    Gaussian field.
     """
     load, initial = _uniform_load(problem)
     weight = weight_of(weights)
     total = math.pi / 2.0 * float(weight.sine[0])
     if infinite:
-        ratio = _infinite_ratio(problem, strength, weight)
+        ratio = _infinite_ratio(problem, strength, weights)
     else:
         multiplier = multiplier_of(problem, problem.nucleation_length, weights)
         ratio = float(np.sum(strength_spectrum(problem, strength) * multiplier**2))
@@ -215,12 +218,32 @@ def _strength_correlation(strength: RandomField, lags: Array) -> Array:
     return correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
 
 
-def _infinite_ratio(problem: Problem, strength: RandomField, weight: Weight) -> float:
+def _infinite_ratio(problem: Problem, strength: RandomField, weights: Weights) -> float:
+    u, share = _autocorrelation(weights)
+    lags = 0.5 * problem.nucleation_length * u
+    return float(2.0 * np.sum(share * _strength_correlation(strength, lags)))
+
+
+@lru_cache(maxsize=2)
+def _autocorrelation(weights: Weights) -> tuple[Array, Array]:
+    """Nodes u on [0, 2] and quadrature weights times int g(s) g(s + u) ds.
+
+    Panels halve towards u = 0, where the correlation of a rough field has a kink and that of a
+    short one all its content. The inner integrand falls like a root at both ends of the overlap,
+    which Chebyshev's second rule takes exactly.
+    """
+    weight = weight_of(weights)
+    x, w = np.polynomial.legendre.leggauss(POINTS)
+    ends = np.concatenate(([0.0], 2.0 ** np.arange(2.0 - PANELS, 2.0)))
+    width = np.diff(ends)[:, None]
+    u = (ends[:-1, None] + 0.5 * width * (x + 1.0)).ravel()
+    measure = (0.5 * width * w).ravel()
     t = np.arange(1, QUADRATURE + 1) * math.pi / (QUADRATURE + 1)
-    s = np.cos(t)
-    share = weight.at(s) * np.sin(t) * math.pi / (QUADRATURE + 1)
-    lags = 0.5 * problem.nucleation_length * np.abs(s[:, None] - s[None, :])
-    return float(share @ _strength_correlation(strength, lags) @ share)
+    half = (1.0 - 0.5 * u)[:, None]  # of the overlap
+    s = half * np.cos(t)
+    product = weight.at(s - 0.5 * u[:, None]) * weight.at(s + 0.5 * u[:, None])
+    overlap = np.sum(product * np.sin(t), axis=1) * half[:, 0] * math.pi / (QUADRATURE + 1)
+    return u, measure * overlap
 
 
 def _square_integral(weight: Weight) -> float:
