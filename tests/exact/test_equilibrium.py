@@ -8,8 +8,10 @@ import pytest
 import stiction as st
 from stiction.equilibrium.bound import smallest_window, window_mode
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
+from stiction.equilibrium.large import Solution
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.setting import Setting
 from stiction.equilibrium.stiffness import apply_stiffness, coupling_strip, stiffness_column
 
 
@@ -104,6 +106,18 @@ def test_conditions_of_optimality(problem, make_strength, ratio):
         assert y.sum() == pytest.approx(1.0, rel=1e-13)
         assert y @ tau_p[sample] == pytest.approx(load, rel=1e-11)
         assert one.certificate_gap.item() < 1e-9 * load
+
+
+def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
+    """From slip and multiplier that are allowed but not optimal."""
+    setting = Setting(problem)
+    excess = make_strength(0.5).sample(problem.interface, samples=1, seed=4)[0]
+    rate = np.full(256, problem.friction.weakening_rate)
+    bound = setting.bound(excess, rate)
+    guess = Solution(0.0, np.zeros(256), np.zeros(256), bound.multiplier)
+    # Without slip nothing below the weakest node is overstressed; above is the local bound.
+    gap = setting.gap(excess, rate, guess, np.empty(256))
+    assert gap == pytest.approx(bound.load - excess.min(), rel=1e-9)
 
 
 def test_gradient_is_the_sensitivity(problem, make_strength):

@@ -13,6 +13,8 @@ import stiction as st
 from stiction.equilibrium.advance import UNSTABLE, advance
 from stiction.equilibrium.events import equilibrium_events
 from stiction.equilibrium.follow import at_rest
+from stiction.equilibrium.frozen import runs_away_frozen
+from stiction.equilibrium.jump import SLIDING, escape_run, jump, step_to_floor
 from stiction.equilibrium.large import LargeProgram
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
@@ -216,3 +218,36 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
     assert one.arrested_events.values.sum() > 0
     np.testing.assert_allclose(two.critical_load, one.critical_load + 0.3e6, rtol=1e-11)
     np.testing.assert_array_equal(two.arrested_events, one.arrested_events)
+
+
+def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
+    """With everything outside a window fixed, and without: the same fate, two samples of each."""
+    problem = st.Problem(solid, st.Interface(0.4, 4096), st.SlipWeakening(weakening_rate=0.5e12))
+    strength = st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=2.6e6),
+        spectrum=st.PowerLawSpectrum(
+            correlation_length=0.5 * problem.nucleation_length, exponent=4.0, truncation=2.5
+        ),
+    )
+    setting = Setting(problem)
+    rows = problem.rows(strength.sample(problem.interface, samples=12, seed=4))
+    fates = []
+    for row in range(12):
+        sample = sample_of(rows, row)
+        found = setting.programme(sample.excess, sample.rate)
+        if np.any(found.slip > sample.critical):
+            continue
+        step_to_floor(sample, found.slip, found.multiplier, np.inf)
+        escape = 1.5 * escape_run(sample, found.load, setting.spacing, setting.modulus)
+        part = runs_away_frozen(
+            setting.grid, sample, found.load, found.slip, found.multiplier, escape, 4000
+        )
+        whole = jump(
+            sample, setting.grid, found.load, found.slip, found.stiff, escape, 4000,
+            make_room(4096),
+        )  # fmt: skip
+        # Only a lower bound: what slides in the window slides.
+        assert not part or whole == SLIDING
+        fates.append((part, whole == SLIDING))
+    assert (True, True) in fates
+    assert (False, False) in fates

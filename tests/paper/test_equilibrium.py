@@ -49,7 +49,8 @@ def test_ten_thousand_samples(solid):
         bias = (local.critical_load - exact.first_instability).values
         assert bias.mean() == pytest.approx(expected, rel=0.05, abs=0.05e3)
         assert exact.slip_patches.values.mean() == pytest.approx(patches, rel=0.05)
-        assert np.all(exact.certificate_gap < 1e-9 * exact.critical_load)
+        # Without the last step back from the onset some would be open by 1e-9.
+        assert np.all(exact.certificate_gap < 2e-10 * exact.critical_load)
         arrested[ratio] = np.mean(exact.arrested_events.values > 0)
     # The paper: randomness of strength alone never arrests a rupture. Here a few in a thousand.
     assert 0.0003 < arrested[0.5] < 0.006

@@ -9,7 +9,16 @@ import numpy as np
 
 from stiction._typing import Array
 from stiction.equilibrium.advance import CROWDED, REACHED, advance
-from stiction.equilibrium.jump import ARRESTED, AT_FLOOR, UNDECIDED, escape_run, jump
+from stiction.equilibrium.frozen import runs_away_frozen
+from stiction.equilibrium.jump import (
+    ARRESTED,
+    AT_FLOOR,
+    SLIDING,
+    UNDECIDED,
+    escape_run,
+    jump,
+    step_to_floor,
+)
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.setting import Setting
 from stiction.equilibrium.spaces import Sample, make_room
@@ -74,10 +83,16 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
     escape = MARGIN * escape_run(sample, state.load, setting.spacing, setting.modulus)
-    fate = jump(
-        sample, setting.grid, state.load, state.slip, state.stiff, state.direction.copy(), escape,
-        JUMP_STEPS, True, make_room(n),
-    )  # fmt: skip
+    unbounded = not np.isfinite(step_to_floor(sample, state.slip, state.direction, np.inf))
+    if unbounded or runs_away_frozen(
+        setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
+    ):
+        fate = SLIDING
+    else:
+        fate = jump(
+            sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
+            make_room(n),
+        )  # fmt: skip
     if fate == UNDECIDED:
         warnings.warn(
             "the jump of an unstable patch did not settle; it is counted as global sliding",

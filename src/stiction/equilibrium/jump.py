@@ -213,10 +213,8 @@ def jump(
     load: float,
     slip: Array,
     stiff: Array,
-    direction: Array,
     escape: float,
     steps: int,
-    exact: bool,
     room: Room,
 ) -> int:
     """Follow an instability at a fixed load to the next least equilibrium, or to none.
@@ -227,16 +225,12 @@ def jump(
     load : float
         tau_0, Pa.
     slip, stiff : (n,) arrays, changed
-        d of the state that became unstable, and K d. A lower bound of the next equilibrium, or it.
-    direction : (n,) array
-        In which it is unstable.
+        d of the state that became unstable, moved along the unstable direction as far as
+        `step_to_floor` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
     escape : float
         Residual nodes in a row that count as global sliding.
     steps : int
-        Elastic steps to try at most.
-    exact : bool
-        Whether to take steps with the true states in between. Without them the answer may be
-        UNDECIDED, and is never ARRESTED.
+        Elastic steps to try at most; UNDECIDED if they are not enough.
     room : Room
 
     Returns
@@ -246,8 +240,6 @@ def jump(
     """
     n = slip.shape[0]
     tolerance = stress_tolerance(sample.excess, sample.profile, load)
-    if not np.isfinite(step_to_floor(sample, slip, direction, np.inf)):
-        return SLIDING
     room.diagonal[:] = grid.column[0]
     count = ZERO
     for i in range(n):
@@ -262,9 +254,7 @@ def jump(
     )
     if size < count:
         return SLIDING
-    other = room
-    if exact:
-        other = make_room(n)
+    other = make_room(n)
     for k in range(steps):
         size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
         if size == CROWDED:
@@ -273,7 +263,7 @@ def jump(
             return SLIDING
         if longest_floor_run(sample, slip) >= escape:
             return SLIDING
-        if exact and k % 4 == 3:
+        if k % 4 == 3:
             status = settle(sample, grid, load, slip, stiff, room, other, size)
             if status == SLIDING:
                 return SLIDING

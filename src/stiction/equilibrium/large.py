@@ -19,10 +19,10 @@ import numpy as np
 import scipy.fft
 
 from stiction._typing import Array
+from stiction.equilibrium.frozen import OUT_OF_REACH, circle_of, padded
 from stiction.equilibrium.program import OVERSTRESS, PIVOT, SOLVED, STALLED, solve_program
 from stiction.equilibrium.segments import Segments
 from stiction.equilibrium.spaces import Grid, make_room
-from stiction.equilibrium.stiffness import coupling_strip
 
 WINDOW = 1024
 """Nodes of the window that is solved first."""
@@ -60,21 +60,15 @@ def window_solution(
     """Critical load of a window if nothing outside slips, its multiplier and slipping nodes."""
     n = excess.shape[0]
     nodes = (centre - WINDOW // 2 + np.arange(WINDOW)) % n
-    # A circle of twice the window: on the far half, whose strength is out of reach, nothing slips.
-    column = np.zeros(2 * WINDOW)
-    column[:WINDOW] = grid.column[:WINDOW]
-    column[WINDOW + 1 :] = column[WINDOW - 1 : 0 : -1]
+    small = circle_of(grid.column, WINDOW)
     room = make_room(2 * WINDOW)
     room.diagonal[:] = grid.column[0]
     room.diagonal[:WINDOW] = diagonal[nodes]
-    strength = np.full(2 * WINDOW, 50.0 * np.abs(excess).max())
-    strength[:WINDOW] = excess[nodes]
-    load_profile = np.full(2 * WINDOW, 1e-9 * profile.mean())
-    load_profile[:WINDOW] = profile[nodes]
+    strength = padded(excess[nodes], OUT_OF_REACH * float(np.abs(excess).max()))
+    load_profile = padded(profile[nodes], 1e-9 * float(profile.mean()))
     local = np.zeros(2 * WINDOW)
     local[:WINDOW] = multiplier[nodes]
     slip, stiff = np.empty(2 * WINDOW), np.empty(2 * WINDOW)
-    small = Grid(column, coupling_strip(column))
     solve_program(strength, load_profile, small, bound, np.inf, local, slip, stiff, room)
     result = np.zeros(n)
     result[nodes] = local[:WINDOW]

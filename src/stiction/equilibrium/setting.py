@@ -20,7 +20,7 @@ LONGEST_RUN = 512
 """Nodes up to which the quick test for arrest follows a run."""
 LARGE_GRID = 4096
 """Nodes from which on the large path may be faster."""
-MANY_NODES = 500
+MANY_NODES = 600
 """Nodes weaker than the upper bound of the load from which on it is."""
 
 
@@ -41,6 +41,7 @@ class Setting:
     """
 
     def __init__(self, problem: Problem) -> None:
+        self.problem = problem
         self.nodes = problem.interface.nodes
         self.spacing = problem.interface.spacing
         self.modulus = problem.effective_modulus

@@ -77,6 +77,9 @@ class Solver:
     def solve(self, rows: Rows) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
         """The onset of each row, and the arrested events of the rows that have any."""
         refuse_overstressed(rows)
+        self.setting.problem.warn_if_coarse(
+            rows, 8.0, "single onsets are about 0.5 % off at 9 nodes and 1 to 2 % at 4"
+        )
         count, nodes = rows.count, rows.nodes
         table = np.empty((count, batch.COLUMNS))
         multipliers = np.empty((count, nodes))
