@@ -14,7 +14,9 @@ import typer
 from stiction import __version__
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
+from stiction.cli.reliability import reliability
 from stiction.cli.runs import export, plot, report, status
+from stiction.cli.rupture import rupture
 from stiction.cli.studies import check, run, schema
 from stiction.ensemble.trouble import RunError
 from stiction.errors import InputError
@@ -58,7 +60,19 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-for command in (paper, run, onset, check, schema, status, export, plot, report):
+for command in (
+    paper,
+    run,
+    onset,
+    rupture,
+    reliability,
+    check,
+    schema,
+    status,
+    export,
+    plot,
+    report,
+):
     app.command()(_interruptible(command))
 
 
