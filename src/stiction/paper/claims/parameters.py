@@ -172,9 +172,7 @@ def printed_modulus(data: Data) -> Finding:
         at_each(data, share, "%"),
         verdict,
         _unless_holds(
-            verdict,
-            "tau_cr is too high by so much; most of what the paper takes for interaction of patches"
-            " is this",
+            verdict, f"tau_cr comes out up to {max(each.value for each in share):.2g} % too high"
         ),
     )
 
