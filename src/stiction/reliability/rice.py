@@ -10,6 +10,8 @@ from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
 
 BATCH = 256
+FEWEST = 5
+"""Crossings below which their rate is not known."""
 
 
 def rice_probability(
@@ -34,7 +36,7 @@ def rice_probability(
     -------
     (k,) array
         1 - S exp(-L nu/S), S the share of the interface with tau_n >= s and nu the down-crossings
-        per length; NaN where no sampled profile goes as low.
+        per length; NaN where fewer than five crossings were seen.
 
     Notes
     -----
@@ -61,4 +63,5 @@ def rice_probability(
     expected = crossings / samples
     with np.errstate(divide="ignore", invalid="ignore"):
         result: Array = np.where(above > 0.0, 1.0 - above * np.exp(-expected / above), 1.0)
-    return np.where(below > 0.0, result, np.nan)
+    known = (crossings >= FEWEST) | (above < 0.5)  # far above the median nothing crosses either
+    return np.where(known, result, np.nan)

@@ -43,7 +43,7 @@ class Level:
     step : float
         b when the level was complete.
     correlation : float
-        gamma of Au and Beck (2001, Eq. 29).
+        gamma of Au and Beck (2001).
     ancestors : int
         Distinct first-level ancestors among the samples that go on.
     """

@@ -82,7 +82,7 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
 
 
 def chain_correlation(failed: NDArray[np.bool_]) -> float:
-    """gamma of Au and Beck (2001, Eq. 29): by how much correlated steps inflate the variance.
+    """gamma of Au and Beck (2001): by how much correlated steps inflate the variance.
 
     Parameters
     ----------

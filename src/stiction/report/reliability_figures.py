@@ -230,9 +230,9 @@ def tail_table(study: TailStudy) -> Table:
     for text, curves in groups:
         for key, curve in curves.items():
             chances = curve["probability"].values[::-1]
-            found = np.interp(
-                np.log(wanted), np.log(chances), curve["stress"].values[::-1], left=np.nan
-            )
+            found = np.interp(np.log(wanted), np.log(chances), curve["stress"].values[::-1])
+            # The curve ends within a sample of the probability asked for; further is not known.
+            found[wanted < 0.9 * chances[0]] = np.nan
             bound = float(curve.attrs["lower_bound"])
             rows.append((text.format(key), bound, *found.tolist()))
     columns = ("system", "bound (Pa)", *(f"stress at P = {p:g} (Pa)" for p in wanted))
