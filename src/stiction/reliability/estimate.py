@@ -199,7 +199,7 @@ def failure_probability(
     for _, random in state.fields:
         warn_if_inaccurate(random, problem.interface)
     budget = budget_of(state, max_evaluations)
-    pilot = min(PILOT.get(state.method.type, 1_000), budget)
+    pilot = min(PILOT.get(state.method.type, 1_000), max(budget // 5, 100))
     request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
     if stress <= low:
