@@ -108,6 +108,19 @@ def test_conditions_of_optimality(problem, make_strength, ratio):
         assert one.certificate_gap.item() < 1e-9 * load
 
 
+def test_first_bound_is_a_bound(problem, make_strength):
+    """A y <= 0 for the window chosen, where the weakening rate varies."""
+    setting = Setting(problem)
+    tau_p = make_strength(0.5).sample(problem.interface, samples=50, seed=6)
+    x = 2.0 * np.pi * np.arange(256) / 256
+    for sample, excess in enumerate(tau_p):
+        rate = 0.4e12 * (1.0 + 0.6 * np.sin((sample % 9 + 1) * x))
+        y = setting.bound(excess, rate).multiplier
+        # The eigenvalue of the window may equal the rate: round-off of its eigenvector.
+        assert (stiffness_times(problem, y) - rate * y).max() < 1e-12 * rate.max() * y.max()
+        assert np.count_nonzero(y) < 128
+
+
 def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     """From slip and multiplier that are allowed but not optimal."""
     setting = Setting(problem)
