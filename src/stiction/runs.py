@@ -21,13 +21,13 @@ from stiction._model import describe
 from stiction.ensemble.files import Lock, cannot_write, sync_folder
 from stiction.ensemble.gather import Gathered
 from stiction.ensemble.run import check_run, warn_of_fields
+from stiction.ensemble.same import refuse_another
 from stiction.ensemble.store import (
     LOCK,
     MANIFEST,
     Store,
     empty,
     prepare_folder,
-    refuse_another,
     writing,
 )
 from stiction.ensemble.stored import run_stored

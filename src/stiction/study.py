@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import json
-import operator
 import tomllib
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import suppress
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import pydantic
 import tomli_w
@@ -20,38 +16,20 @@ import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from stiction._model import Count, Positive, _count, describe, explain, model, to_plain
+from stiction.criterion.method import LocalCriterion
+from stiction.dynamics.method import Rupture
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.gather import GridAxis
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.run import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
+from stiction.equilibrium.method import Equilibrium
 from stiction.errors import InputError
 from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
 from stiction.sweep import Point, Sweep, grid_axes, name_point, points_of, unknown_keys, with_values
 
-METHODS = {
-    "criterion.method": "LocalCriterion",
-    "equilibrium.method": "Equilibrium",
-    "dynamics.method": "Rupture",
-}
-
-
-def known_methods() -> list[Any]:
-    """The methods of the rooms that are there."""
-    found = []
-    for module, name in METHODS.items():
-        with suppress(ImportError):
-            found.append(getattr(import_module(f"stiction.{module}"), name))
-    return found
-
-
-if TYPE_CHECKING:
-    AnyMethod: TypeAlias = Any
-else:
-    _found = known_methods()
-    AnyMethod = _found[0]
-    if len(_found) > 1:
-        AnyMethod = Annotated[functools.reduce(operator.or_, _found), Field(discriminator="type")]
+METHODS: tuple[Any, ...] = (LocalCriterion, Equilibrium, Rupture)
+AnyMethod = Annotated[LocalCriterion | Equilibrium | Rupture, Field(discriminator="type")]
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 

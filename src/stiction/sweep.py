@@ -106,14 +106,14 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
 
 
 def _value(key: str, value: Any, folder: Path | None) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
     if isinstance(value, str) and folder is not None and value.endswith((".npy", ".csv")):
         path = folder / value
         try:
             if path.suffix == ".npy":
-                return np.load(path, allow_pickle=False)
-            return np.loadtxt(path, delimiter=",", ndmin=1)
+                return np.load(path, allow_pickle=False).tolist()
+            return np.loadtxt(path, delimiter=",", ndmin=1).tolist()
         except (OSError, ValueError) as error:
             raise InputError(f"{key}: cannot read {value!r}: {error}") from None
     return value

@@ -440,13 +440,13 @@ def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
     original = work.compute
 
     def slow(plan, first, count):
-        if first >= 64:
+        if first >= 256:
             time.sleep(1.6)
         return original(plan, first, count)
 
     monkeypatch.setattr(work, "compute", slow)
     monkeypatch.setattr(store.Store, "add", spying(store.Store.add, seen := []))
-    make_study(samples=65, sweep=[]).run(out=tmp_path / "run", workers=2)
+    make_study(samples=300, sweep=[]).run(out=tmp_path / "run", workers=2)
     assert len(seen) >= 2
 
 

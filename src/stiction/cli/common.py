@@ -65,7 +65,7 @@ def summary(result: Any) -> str:
 def duration(seconds: float) -> str:
     """Seconds for people."""
     if seconds < 1.0:
-        return f"{seconds * 1e3:.2g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.2g} us"
+        return f"{seconds * 1e3:.3g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.3g} us"
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     if seconds < 7200.0:

@@ -74,9 +74,9 @@ def onset(
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
     """The methods to ask: the study's own as it is, the others with their defaults."""
     from stiction.errors import unknown_name
-    from stiction.study import known_methods
+    from stiction.study import METHODS
 
-    classes = {cls.__dataclass_fields__["type"].default: cls for cls in known_methods()}
+    classes = {cls.__dataclass_fields__["type"].default: cls for cls in METHODS}
     unknown = [
         unknown_name("--method", name, classes) for name in names or () if name not in classes
     ]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.fields.draws import BLOCK
 from stiction.fields.random_field import RandomField
 from stiction.methods import Method, Values, solve, variables_of
 from stiction.problem import Problem
@@ -26,7 +27,7 @@ PROFILES: dict[str, Variable] = {
 }
 """Sampled profiles that may be kept."""
 
-CHUNK = 256
+SLOW = 32
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,10 @@ class Plan:
 
     @property
     def piece(self) -> int:
-        """Samples solved at once: a few tens of milliseconds of work, where the method says so."""
-        return int(getattr(self.method, "chunk_size", CHUNK))
+        """Samples solved at once, as the method likes it."""
+        size = int(getattr(self.method, "chunk_size", BLOCK))
+        # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
+        return size if size < SLOW else max(size, BLOCK)
 
     def profiles(self, first: int, samples: int) -> dict[str, NDArray[np.float64]]:
         """The random profiles of samples first .. first + samples - 1, by name."""

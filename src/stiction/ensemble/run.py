@@ -220,6 +220,8 @@ def monte_carlo(
     initial_stress: RandomField | None = None,
     weakening_rate: RandomField | None = None,
     keep: tuple[str, ...] = (),
+    keep_samples: Sequence[int] | None = None,
+    keep_limit: float = KEEP_LIMIT,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: bool | Callable[[int, int], None] = False,
@@ -244,7 +246,11 @@ def monte_carlo(
         What is random besides the strength, Pa or Pa/m, independent of it.
     keep : tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"sensitivity"``; at most 1 GiB.
+        method can add, such as ``"sensitivity"``.
+    keep_samples : sequence of int, optional
+        Numbers of the samples for which it is kept; all if left out.
+    keep_limit : float
+        Bytes that this may take.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -271,9 +277,10 @@ def monte_carlo(
         "weakening_rate": weakening_rate,
     }
     assert fields.keys() == STREAMS.keys()
-    plan = make_plan(problem, strength, method, seed, fields, tuple(keep))
+    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
+    plan = make_plan(problem, strength, method, seed, fields, tuple(keep), chosen)
     check_run(samples, first, workers, executor)
-    check_size(wide_bytes(plan, samples, first), KEEP_LIMIT)
+    check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],
         samples,

@@ -63,8 +63,9 @@ class Sizer:
         """Samples of the next piece of `span`, of `left` samples in all, for `slots` workers."""
         rates = self._rates.get(span.point)
         rate = min(rates) if rates else self._last
-        size = min(plan.piece, 64) if rate is None else int(self.seconds / max(rate, 1e-9))
-        size = min(size, -(-left // (2 * slots)))
+        size = min(plan.piece, BLOCK) if rate is None else int(self.seconds / max(rate, 1e-9))
+        # A fair share of what is left, but not so small that drawing blocks in parts costs more.
+        size = min(size, max(-(-left // (2 * slots)), BLOCK))
         if plan.wide:
             nodes = plan.problem.interface.nodes
             bytes_each = max(self._bytes, 8.0 * nodes * len(plan.wide))
