@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,12 @@ def _folder(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"--out: {path} cannot be written: {error.strerror}") from None
     return path
+
+
+def _say(text: str) -> None:
+    """What is being done, for who watches a terminal."""
+    if sys.stderr.isatty():
+        typer.echo(text, err=True)
 
 
 def reliability(
@@ -78,6 +85,7 @@ def reliability(
         for ending in ("png", "pdf"):
             figure.savefig(out / f"{name}.{ending}")
 
+    _say(f"the curve down to P = {smallest:g}, by {method.type} ...")
     curve = failure_curve(
         problem,
         field,
@@ -107,6 +115,7 @@ def reliability(
         f" {method.type}, {curve.attrs['event']}"
     )
     if stress is not None:
+        _say(f"the probability below {stress:g} Pa ...")
         found = failure_probability(
             problem, field, stress, method=method, seed=seed, workers=workers, **others
         )
@@ -117,6 +126,7 @@ def reliability(
             )
             save(spot, "weak_spots")
     if probability is not None:
+        _say(f"the stress with P = {probability:g} ...")
         answer = design_stress(
             problem,
             field,
@@ -128,6 +138,7 @@ def reliability(
         )
         typer.echo(str(answer))
     if tails:
+        _say("seven more curves: correlation lengths, interface lengths, distributions ...")
         several = tail_study(
             problem,
             field,
