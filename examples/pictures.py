@@ -1,0 +1,123 @@
+"""The two pictures of the README: the Monte Carlo study, and one rupture in space and time.
+
+Run it with ``python examples/pictures.py [folder]``; it takes about half a minute.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+import stiction as st
+from stiction.report.rupture_figures import rupture_figure
+from stiction.report.style import INK, PAGE, PALE, QUIET, color, new_figure, paper_style
+
+RATIOS = (0.25, 0.5, 1.0, 2.0)
+PIXELS = 1400
+
+
+def main(
+    folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024
+) -> tuple[float, float]:
+    """Draw both; the median critical stress at the ends of the range, MPa."""
+    folder = Path(folder)
+    problem = st.paper.problem(nodes=nodes)
+    onsets, profiles = {}, {}
+    for ratio in RATIOS:
+        strength = st.paper.strength(problem, correlation_ratio=ratio)
+        onsets[ratio] = st.monte_carlo(
+            problem, strength, method=st.LocalCriterion(), samples=samples, seed=0
+        )
+        profiles[ratio] = strength.sample(problem.interface, samples=min(samples, 2000), seed=0)
+    save(monte_carlo(problem, onsets, profiles), folder / "monte_carlo.png")
+    run = st.simulate_rupture(
+        problem, profiles[RATIOS[0]][0], method=st.Rupture(loading_rate=2e7), every=4
+    )
+    save(rupture(run, problem), folder / "rupture.png")
+    first, last = (1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3])
+    return first, last
+
+
+def save(figure: Figure, path: Path) -> None:
+    """With 1400 pixels across, and a palette instead of true colour, to keep it small."""
+    with paper_style():
+        figure.savefig(path, dpi=PIXELS / figure.get_figwidth())
+    Image.open(path).convert("RGB").quantize(240, dither=Image.Dither.NONE).save(
+        path, optimize=True
+    )
+
+
+def monte_carlo(
+    problem: st.Problem, onsets: dict[float, xr.Dataset], profiles: dict[float, Any]
+) -> Figure:
+    """Strength and nucleation stress of the same draws, and the densities behind them."""
+    x = problem.interface.x / problem.interface.length
+    with paper_style():
+        figure = new_figure(PAGE, 3.9)
+        grid = figure.add_gridspec(2, 3, width_ratios=(2.6, 0.75, 1.35))
+        above = figure.add_subplot(grid[0, 0])
+        below = figure.add_subplot(grid[1, 0], sharex=above, sharey=above)
+        beside = [figure.add_subplot(grid[row, 1], sharey=above) for row in (0, 1)]
+        onset = figure.add_subplot(grid[:, 2])
+        for i, ratio in enumerate(RATIOS):
+            style = {"color": color(i), "linewidth": 1.0}
+            tau_p = profiles[ratio] * 1e-6
+            tau_n = st.nucleation_stress(problem, profiles[ratio]) * 1e-6
+            above.plot(x, tau_p[0], **style)
+            below.plot(x, tau_n[0], **style)
+            lowest = int(tau_n[0].argmin())
+            below.plot(x[lowest], tau_n[0, lowest], "o", color=color(i), markersize=3.5)
+            _density(beside[1], tau_n[:, ::16].ravel(), i)
+            estimate = st.density(onsets[ratio].critical_stress.values * 1e-6, bounds=(0.66, 1.66))
+            seen = estimate.value > 2e-3 * estimate.value.max()
+            onset.fill_betweenx(
+                estimate.x[seen], 0, estimate.value[seen], color=color(i), alpha=0.18, linewidth=0
+            )
+            label = rf"$\xi_0/h_\mathrm{{n}} = {ratio:g}$"
+            onset.plot(estimate.value[seen], estimate.x[seen], label=label, **style)
+        strength = st.Beta(alpha=1.5, beta=3.0, low=0.66, high=1.66).distribution
+        y = np.linspace(0.63, 1.69, 300)
+        beside[0].fill_betweenx(y, 0, strength.pdf(y), color=QUIET, alpha=0.2, linewidth=0)
+        beside[0].plot(strength.pdf(y), y, color=INK, linewidth=1.0)
+        for axes in (above, below, *beside, onset):
+            axes.axhline(0.66, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=0)
+        above.set(ylabel="peak strength (MPa)", xlim=(0, 1), ylim=(0.63, 1.69))
+        below.set(ylabel="nucleation stress (MPa)", xlabel="position $x/L$")
+        above.tick_params(labelbottom=False)
+        for axes, name in zip(beside, "pn", strict=True):
+            axes.set(xlim=(0, None), xlabel=rf"density $f(\tau_\mathrm{{{name}}})$")
+            axes.tick_params(labelleft=False, labelbottom=False, bottom=False)
+        onset.set(xlim=(0, None), ylim=(0.655, 0.84))
+        onset.set_ylabel(r"critical stress $\tau_\mathrm{cr}$ (MPa)")
+        onset.set_xlabel(r"density $f(\tau_\mathrm{cr})$")
+        onset.tick_params(labelbottom=False, bottom=False)
+        onset.legend(loc="upper right")
+        above.axhline(strength.mean(), color=PALE, linewidth=0.7, zorder=0)
+        below.axhline(strength.mean(), color=PALE, linewidth=0.7, zorder=0)
+    return figure
+
+
+def _density(axes: Axes, values: Any, index: int) -> None:
+    estimate = st.density(values, bounds=(0.66, 1.66))
+    axes.plot(estimate.value, estimate.x, color=color(index), linewidth=1.0)
+
+
+def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
+    """The figure of `stiction rupture` without the load beside it, less high."""
+    figure = rupture_figure(run, problem)
+    figure.axes[3].remove()
+    figure.axes[0].get_gridspec().set_width_ratios([1e-3, 4.0, 0.08])
+    figure.set_figheight(4.0)
+    return figure
+
+
+if __name__ == "__main__":
+    found = main(*sys.argv[1:2])
+    print("median critical stress: {:.4f} MPa at xi_0/h_n = 0.25, {:.4f} MPa at 2".format(*found))
