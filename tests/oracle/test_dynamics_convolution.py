@@ -57,7 +57,7 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     slip, rate = direct_convolution(run, state, 900)
     run.advance(state, 900)
     assert state.watch[track.SLID] > 100  # through the rupture
-    # The kernel's tolerance is 1e-6; errors of both signs partly cancel.
-    assert np.abs(state.slip - slip).max() < 1e-6 * slip.max()
+    # 1e-6 is asked for; errors of the kernel, up to 1e-6, have both signs and cancel.
+    assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()
     # Behind a steep front the slip rate shows ten times that.
     assert np.abs(state.rate - rate).max() < 3e-5 * rate.max()

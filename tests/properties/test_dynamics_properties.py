@@ -169,3 +169,38 @@ def test_arrested_event_is_counted_and_first_instability_below_the_critical_stre
     found = METHOD.prepare(PROBLEM)(PROBLEM.rows(profile))
     assert found["arrested_events"][0] >= 1
     assert found["first_instability"][0] < 0.9 * found["critical_stress"][0]
+
+
+@pytest.mark.parametrize("rate", [1e5, 2e9])
+def test_work_is_the_load_times_the_slip_of_every_step(rate):
+    """For a uniform load, int tau_0 d<slip> L by the trapezoidal rule, to round-off."""
+    run = simulate_rupture(PROBLEM, strength(7), method=Rupture(loading_rate=rate), variables=[])
+    load = np.r_[float(run["load"][0]), run["step_load"].values]
+    slip = np.r_[0.0, run["step_mean_slip"].values]
+    work = np.cumsum(0.5 * (load[1:] + load[:-1]) * np.diff(slip)) * 0.05
+    assert int(run["explicit_steps"]) > 100
+    assert np.abs(run["step_work"].values - work).max() < 1e-12 * work[-1]
+
+
+def test_creep_stops_where_the_load_falls_and_never_runs_back():
+    """Up to half of the creep, down, and up again."""
+    profile = strength(3)
+    onset = float(METHOD.prepare(PROBLEM)(PROBLEM.rows(profile))["critical_stress"][0])
+    high = 0.5 * (profile.min() + onset)
+    low, end = 0.8 * high, 0.3
+    run = simulate_rupture(
+        PROBLEM, profile, method=METHOD, load=([0.0, 0.1, 0.2, end], [0.0, high, low, high]),
+        variables=["slip", "slip_rate", "shear_stress", "strength"], stop="time", end_time=end,
+    )  # fmt: skip
+    slip, time = run["slip"].values, run["time"].values
+    assert int(run["implicit_steps"]) > 30
+    assert slip.max() > 0.0
+    assert np.all(np.diff(slip, axis=0) >= 0.0)
+    falling = (time > 0.1) & (time <= 0.2)
+    # From the peak of the load on, everything rests: slip is that of the peak, to the last bit.
+    late = slip[falling][np.sum(falling) // 4 :]
+    assert falling.sum() > 4
+    assert np.array_equal(late, np.broadcast_to(late[0], late.shape))
+    assert np.all(run["shear_stress"].values <= run["strength"].values + 0.1)
+    # Back at the same load nothing more has slipped than the solver's accuracy allows.
+    assert slip[-1] == pytest.approx(late[0], abs=1e-4 * slip.max())

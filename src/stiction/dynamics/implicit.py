@@ -20,6 +20,7 @@ from stiction.dynamics.track import (
     LOAD,
     LOAD_STEP,
     LOCAL_STRESS,
+    NEGLIGIBLE,
     NOT_FINITE,
     NOTICED,
     PAST_STEP,
@@ -139,6 +140,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
     rows,
     load_times,
     load_values,
+    turns,
     control,
     record,
 ):
@@ -148,6 +150,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
     Second order: the slip rate at the end of a step follows from the mean rates of this step and
     of the one before (`past`, (nodes,), m/s; none if PAST_STEP is 0), as in the two-step
     backward differences, and the memory sees it rise or fall linearly.
+    `turns` are the times at which the load begins to fall or to rise again, s.
     Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
     stays. A step is repeated at half the size if no slip increments are found (negative
     curvature: the patches are unstable at this size), a node slips too much, or the interface
@@ -175,7 +178,14 @@ def implicit_steps(  # type: ignore[no-untyped-def]
                 break
             size /= root
             step = size
-        if watch[TIME] + size > control[END_TIME]:
+        for turn_time in turns:  # land on each peak of the load, or creep would miss its top
+            ahead = turn_time - watch[TIME]
+            if 1e-6 * control[SMALLEST_STEP] < ahead < size:
+                size = ahead
+                clipped = True
+                break
+        last = watch[TIME] + size > control[END_TIME]
+        if last:
             size = control[END_TIME] - watch[TIME]
             clipped = True
         if size < control[SMALLEST_STEP] and not clipped:
@@ -225,10 +235,12 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             radiated += max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
         radiated *= impedance / n
         before = watch[RADIATED]
+        # A step that raises the load by next to nothing cannot put the onset wrong.
+        matters = abs(load - watch[LOAD]) > control[NEGLIGIBLE]
         racing = radiated > control[NOTICED] and radiated > control[GROWTH] * max(
             before, control[NOTICED]
         )
-        if not solved or largest > 2.0 * control[SLIP_STEP] or (racing and share > 0.0):
+        if not solved or largest > 2.0 * control[SLIP_STEP] or (racing and matters and share > 0.0):
             watch[REJECTED_STEPS] += 1.0
             step = size / 2.0
             if step < control[SMALLEST_STEP]:
@@ -281,8 +293,10 @@ def implicit_steps(  # type: ignore[no-untyped-def]
             return taken, step, ALL_SLID
         if watch[LOCAL_STRESS] - mean_stress > control[DROP_STOP]:
             return taken, step, DROPPED
-        if clipped or watch[TIME] >= control[END_TIME]:
+        if last or watch[TIME] >= control[END_TIME]:
             return taken, step, DONE
+        if clipped:
+            continue
         growing = radiated > control[NOTICED] and radiated > np.sqrt(control[GROWTH]) * before
         if largest > control[SLIP_STEP]:
             step = size / root

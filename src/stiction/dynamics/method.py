@@ -187,6 +187,7 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     control[track.EVENT_DROP_SIZE] = method.event_drop * drop
     control[track.NOTICED] = 1e-7 * drop
     control[track.GROWTH] = _GROWTH
+    control[track.NEGLIGIBLE] = 5e-7 * drop
     control[track.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     constants = np.array(
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]

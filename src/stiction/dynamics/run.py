@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,14 @@ class Run:
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
+    @functools.cached_property
+    def turns(self) -> Floats:
+        """Times at which the load begins to fall or to rise again, s."""
+        times, values = self.history
+        rising = np.sign(np.diff(values))
+        turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
+        return turned
+
     def ended(self, state: State) -> bool:
         """Whether the end time is reached, up to the rounding of a sum of many steps."""
         return bool(self.control[track.END_TIME] - state.time <= 1e-6 * self.medium.step)
@@ -210,7 +219,7 @@ class Run:
             count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
             medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
-            *self.history, self.control, record,
+            *self.history, self.turns, self.control, record,
         )  # fmt: skip
         state.step = float(size)
         return int(taken), int(reason)

@@ -37,8 +37,9 @@ COLUMNS = 7
     EXPLICIT_ONLY,  # 1 to take no implicit steps
     NOTICED,  # radiated stress Z <V> from which the growth of one implicit step is limited, Pa
     GROWTH,  # by this factor
-) = range(14)
-CONTROLS = 14
+    NEGLIGIBLE,  # rise of the load in a step for which that does not matter, Pa
+) = range(15)
+CONTROLS = 15
 
 
 @jit
