@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -33,9 +33,10 @@ def rupture(
 ) -> None:
     """Simulate one interface from its first slip to global sliding.
 
-    Of a study with a sweep, the first point is taken. Writes `rupture.nc` (slip, slip rate and stress over time and x), `rupture.png` and `.pdf` (slip
-    rate in space and time, load, strength), `front.png` and `.pdf` (where the rupture front is and
-    how fast), and with --film an animation.
+    Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
+    Writes `rupture.nc` (slip, slip rate and stress over time and x), `rupture.png` and `.pdf`
+    (slip rate in space and time, load, strength), `front.png` and `.pdf` (where the rupture front
+    is and how fast), and with --film an animation.
     """
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
@@ -49,7 +50,7 @@ def rupture(
     problem, method = plan.problem, plan.method
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
-    extras = {}
+    extras: dict[str, Any] = {}
     if strength is None:
         profiles = plan.profiles(sample, 1)
         tau_p = profiles.pop("strength")
