@@ -240,7 +240,10 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         racing = radiated > control[NOTICED] and radiated > control[GROWTH] * max(
             before, control[NOTICED]
         )
-        if not solved or largest > 2.0 * control[SLIP_STEP] or (racing and matters and share > 0.0):
+        # At the smallest size, waves of an arrested event alone do not call for explicit steps.
+        shorter = 0.5 * size >= control[SMALLEST_STEP] or largest > 0.1 * control[SLIP_STEP]
+        racing = racing and matters and shorter and share > 0.0
+        if not solved or largest > 2.0 * control[SLIP_STEP] or racing:
             watch[REJECTED_STEPS] += 1.0
             step = size / 2.0
             if step < control[SMALLEST_STEP]:
