@@ -76,4 +76,3 @@ def test_mistakes_end_with_a_message(monkeypatch, capsys, study, tmp_path):
     assert run(monkeypatch, "rupture", study, "--out", tmp_path / "r", "--strength", "no.npy") == 2
     assert "no.npy" in capsys.readouterr().err
     assert run(monkeypatch, "rupture", study, "--out", tmp_path / "r", "--sample", -1) == 2
-    assert not (tmp_path / "r").exists()

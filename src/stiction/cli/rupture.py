@@ -69,7 +69,6 @@ def rupture(
             ),
             **extras,
         )
-    out.mkdir(exist_ok=True)
     result.to_netcdf(out / "rupture.nc")
     typer.echo(
         f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
