@@ -167,6 +167,9 @@ def _quantiles(result: xr.Dataset, along: str, within: list[str]) -> Figure:
         axes.set_xticks(place, ticks)
     elif _is_log(place):
         axes.set_xscale("log")
+        if place.size <= 8:  # powers of ten would not name the steps
+            axes.set_xticks(place, [f"{value:.3g}" for value in place])
+            axes.minorticks_off()
     if within:
         axes.legend(title=_label(result[within[0]]))
     return figure
