@@ -126,12 +126,15 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
     finish(start(study, folder / "reference"))  # nothing to do: the time to start
     idle = time.perf_counter() - begin
     reference = result_of(folder / "reference")
-    while counts.kills < kills:
+    while counts.kills < kills or not counts.studies:
         ending = ".nc" if counts.studies % 2 else ""
         out = folder / f"run{counts.studies}{ending}"
         while True:
             before = chunks_in(out)
             process = start(study, out)
+            if counts.kills == kills:
+                finish(process)
+                break
             if chance.random() < 0.25:  # while it starts, reads what is there, or computes
                 wait_for(process, lambda: False, chance.uniform(0.3 * idle, 1.5 * idle))
             else:  # while it computes, or when it has just finished
