@@ -20,6 +20,7 @@ from stiction.ensemble.store import Store
 
 REPEATS = 5
 METHOD = {"type": "equilibrium"}
+BUSY = [sys.executable, "-c", "sum(range(30_000_000))"]
 
 
 def study(samples, method=METHOD):
@@ -49,9 +50,10 @@ def main(samples):
 
     times = {name: [] for name in ("plain", "memory", "stored", "stored, 2 workers", "writing")}
     add = Store.add
-    spent = []
+    spent, offered = [], []
     Store.add = lambda *arguments: spent.append(timed(lambda: add(*arguments)))
     for _ in range(REPEATS):  # in turn, so that a busy moment falls on all alike
+        offered.append(two_cores())
         times["plain"].append(timed(plain))
         times["memory"].append(timed(lambda: one.run(workers=1)))
         for name, workers in (("stored", 1), ("stored, 2 workers", 2)):
@@ -72,7 +74,19 @@ def main(samples):
             f" processor {work:6.2f} s, {ratios[1]:6.3f}"
         )
     pairs = zip(times["stored"], times["stored, 2 workers"], strict=True)
-    print(f"  two workers: {median(one[0] / two[0] for one, two in pairs):.2f} times one")
+    gain = median(one[0] / two[0] for one, two in pairs)
+    print(
+        f"  two workers: {gain:.2f} times one; two processes that share nothing: {median(offered):.2f}"
+    )
+
+
+def two_cores():
+    """What a second core is worth now: two processes that share nothing, beside one."""
+    alone, both = (
+        timed(lambda n=n: [p.wait() for p in [subprocess.Popen(BUSY) for _ in range(n)]])[0]
+        for n in (1, 2)
+    )
+    return 2.0 * alone / both
 
 
 def peak(samples):
