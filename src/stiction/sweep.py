@@ -297,7 +297,8 @@ def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:
     for key in (key for axis in axes for key in axis.keys):
         classes, done = [cls], ""
         for step in key.split("."):
-            names = [f.name for c in classes for f in dataclasses.fields(c) if f.init]
+            found = [f.name for c in classes for f in dataclasses.fields(c) if f.init]
+            names = list(dict.fromkeys(found))
             if classes and step not in names:
                 texts.append(unknown_name(f"sweep: {done or 'the study'}", step, names))
                 break

@@ -53,9 +53,9 @@ def summary(result: Any) -> str:
         if name in result and bool(result[name].notnull().any()):
             variable = result[name]
             low, middle, high = (float(variable.quantile(q)) for q in (0.05, 0.5, 0.95))
-            scale, unit = (1e-6, "MPa") if variable.attrs["units"] == "Pa" else (1.0, "")
+            scale, unit = (1e-6, " MPa") if variable.attrs["units"] == "Pa" else (1.0, "")
             lines.append(
-                f"{name:22s} mean {float(variable.mean()) * scale:.5g} {unit},"
+                f"{name:22s} mean {float(variable.mean()) * scale:.5g}{unit},"
                 f" sd {float(variable.std()) * scale:.3g},"
                 f" 5/50/95 % {low * scale:.5g} / {middle * scale:.5g} / {high * scale:.5g}"
             )

@@ -138,20 +138,15 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
         for _, field in (("strength", plan.strength), *plan.fields)
     ]
     pairs = list(dict.fromkeys(found))
-    for field, interface in pairs[:FEW]:
-        warn_if_inaccurate(field, interface)
-    if len(pairs) > FEW:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            for field, interface in pairs[FEW:]:
-                warn_if_inaccurate(field, interface)
-        if caught:
-            warnings.warn(
-                f"{len(caught)} more combinations of field and interface are inaccurate, such as:"
-                f" {caught[-1].message}",
-                AccuracyWarning,
-                stacklevel=3,
-            )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for field, interface in pairs:
+            warn_if_inaccurate(field, interface)
+    for warning in caught[:FEW]:
+        warnings.warn(str(warning.message), AccuracyWarning, stacklevel=3)
+    if len(caught) > FEW:
+        more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
+        warnings.warn(more, AccuracyWarning, stacklevel=3)
 
 
 def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
