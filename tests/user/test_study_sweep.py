@@ -253,6 +253,15 @@ def test_slip_and_sensitivity_on_request():
         np.testing.assert_array_equal(result[name], direct[name][[1, 4]])
 
 
+def test_warnings_of_many_points_are_summed_up():
+    lengths = {"start": 20e-3, "stop": 30e-3, "count": 9}
+    with pytest.warns(st.AccuracyWarning) as caught:
+        swept({LENGTH: lengths}, ensemble={"samples": 2}).run()
+    texts = [str(warning.message) for warning in caught]
+    assert sum("no mean mode" in text for text in texts) == 4
+    assert sum("5 more warnings like these" in text for text in texts) == 1
+
+
 def test_executors_do_not_change_a_bit():
     study = swept({LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]})
     alone = study.run(workers=1)
