@@ -42,6 +42,10 @@ _HOMES = {
     "failure_curve": "reliability.curve",
     "Ensemble": "study",
     "Study": "study",
+    "Cluster": "ensemble.distributed",
+    "open_run": "runs",
+    "StoredRun": "runs",
+    "RunError": "ensemble.trouble",
     "InputError": "errors",
     "AccuracyWarning": "errors",
 }
