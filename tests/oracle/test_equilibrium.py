@@ -127,7 +127,7 @@ def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
         state = at_rest(sample)
         load, status = advance(
             sample, setting.grid, state.load, np.inf, state.slip, state.stiff, state.direction,
-            5000, make_room(256),
+            make_room(256),
         )  # fmt: skip
         assert status == UNSTABLE
         assert load == pytest.approx(loads[row], rel=1e-11)

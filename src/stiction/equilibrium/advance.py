@@ -2,8 +2,8 @@
 
 Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q the strength less
 the initial stress, W = 0 where the floor is reached. An event is a node at rest that reaches its
-strength (a row of the factor more), a slipping node that reaches its floor (a new factor), or a
-node whose slipping makes A singular: the path has an end there, at this load.
+strength (a row of the factor more), a slipping node that reaches its floor (a diagonal entry that
+rises by W), or a node whose slipping makes A singular: the path has an end there, at this load.
 """
 
 from __future__ import annotations
@@ -13,15 +13,18 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium._compile import ZERO
-from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
+from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
 from stiction.equilibrium.jump import AT_FLOOR
-from stiction.equilibrium.program import PIVOT, singular_direction
+from stiction.equilibrium.program import PIVOT, singular_direction, solve_forward
 from stiction.equilibrium.spaces import MOST_MEMBERS, Grid, Room, Sample
 from stiction.equilibrium.stiffness import apply_stiffness
 
 REACHED = 0
 UNSTABLE = 1
 CROWDED = 2
+
+REFRESH = 16
+"""Events after which slip is solved for anew, lest round-off adds up."""
 
 
 @jit
@@ -50,7 +53,6 @@ def advance(
     slip: Array,
     stiff: Array,
     direction: Array,
-    events: int,
     room: Room,
 ) -> tuple[float, int]:
     """Follow the stable path from one load towards another.
@@ -66,8 +68,6 @@ def advance(
         d and K d.
     direction : (n,) array, output
         If the path ends: in which it is unstable, z >= 0 and A z <= 0.
-    events : int
-        Events at most.
     room : Room
 
     Returns
@@ -83,30 +83,27 @@ def advance(
     residual = np.zeros(n, np.bool_)
     strength = np.empty(n)
     own = grid.column[0]
-    size = ZERO
-    rebuild = True
-    for _ in range(events):
-        if rebuild:
-            count = build(sample, grid, slip, residual, strength, room)
-            if count > MOST_MEMBERS:
-                return load, CROWDED
-            members, order, diagonal = room.members, room.order, room.diagonal
-            size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
-            if size < count:
-                # Stability was lost exactly as the floor was reached.
-                singular_direction(room, size, direction)
-                return load, UNSTABLE
-            extend_forward(room.factor, ZERO, size, room.members, sample.profile, room.forward[0])
-            extend_forward(room.factor, ZERO, size, room.members, strength, room.forward[1])
-            rebuild = False
+    members, order, diagonal = room.members, room.order, room.diagonal
+    count = build(sample, grid, slip, residual, strength, room)
+    if count > MOST_MEMBERS:
+        return load, CROWDED
+    size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
+    if size < count:
+        # Stability was lost exactly as the floor was reached.
+        singular_direction(room, size, direction)
+        return load, UNSTABLE
+    extend_forward(room.factor, ZERO, size, members, sample.profile, room.forward[0])
+    extend_forward(room.factor, ZERO, size, members, strength, room.forward[1])
+    for event in range(2 * n + 1):  # each node begins to slip once, and reaches its floor once
         for t in range(size):
             right[t] = room.forward[0, t]
         back_substitute(room.factor, size, right, rate)
-        apply_stiffness(grid.strip, own, room.members, size, rate, room.halves, stiff_rate)
-        for t in range(size):
-            right[t] = load * room.forward[0, t] - room.forward[1, t]
-        back_substitute(room.factor, size, right, solution)
-        apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff)
+        apply_stiffness(grid.strip, own, members, size, rate, room.halves, stiff_rate)
+        if event % REFRESH == 0:
+            solve_forward(room, size, load, solution)
+            apply_stiffness(grid.strip, own, members, size, solution, room.halves, stiff)
+            for t in range(size):
+                slip[members[t]] = max(solution[t], 0.0)
         step = target - load
         starts = -1
         ends = -1
@@ -118,33 +115,37 @@ def advance(
                     step = margin / closing
                     starts = i
         for t in range(size):
-            i = room.members[t]
+            i = members[t]
             if not residual[i] and rate[t] > 0.0:
-                left = max(sample.critical[i] - solution[t], 0.0)
+                left = max(sample.critical[i] - slip[i], 0.0)
                 if left < step * rate[t]:
                     step = left / rate[t]
                     starts = -1
-                    ends = i
+                    ends = t
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
-            slip[room.members[t]] = max(solution[t] + step * rate[t], 0.0)
+            slip[members[t]] += step * rate[t]
         for i in range(n):
             stiff[i] += step * stiff_rate[i]
         if ends >= 0:
-            slip[ends] = sample.critical[ends]
-            rebuild = True
+            i = members[ends]
+            slip[i] = sample.critical[i]
+            residual[i] = True
+            strength[i] = sample.floor[i]
+            diagonal[i] = own
+            raise_diagonal(room.factor, size, ends, sample.rate[i], room.vectors)
+            extend_forward(room.factor, ends, size, members, sample.profile, room.forward[0])
+            extend_forward(room.factor, ends, size, members, strength, room.forward[1])
         elif starts >= 0:
             if size == MOST_MEMBERS:
                 return load, CROWDED
-            room.order[0] = starts
-            now = append(
-                room.factor, size, room.members, room.order, 1, grid.column, room.diagonal, PIVOT
-            )
+            order[0] = starts
+            now = append(room.factor, size, members, order, 1, grid.column, diagonal, PIVOT)
             if now == size:
                 singular_direction(room, size, direction)
                 return load, UNSTABLE
-            extend_forward(room.factor, size, now, room.members, sample.profile, room.forward[0])
-            extend_forward(room.factor, size, now, room.members, strength, room.forward[1])
+            extend_forward(room.factor, size, now, members, sample.profile, room.forward[0])
+            extend_forward(room.factor, size, now, members, strength, room.forward[1])
             room.inside[starts] = True
             size = now
         else:

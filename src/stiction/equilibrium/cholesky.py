@@ -172,6 +172,34 @@ def append(
     return size
 
 
+@jit_sums
+def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns: Array) -> None:
+    """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
+
+    Parameters
+    ----------
+    factor : (row_start(n + 4),) array, changed
+    size, position : int
+        Rows of the factor, and the row whose diagonal entry rises.
+    amount : float
+    turns : (>= 2, >= size) array, work space
+        Cosine and sine of each rotation.
+    """
+    for r in range(position, size):
+        start = row_start(r)
+        row = factor[start : start + r + 1]
+        # The column that is rotated into the factor: zero below the entry that rises.
+        extra = amount**0.5 if r == position else 0.0
+        for k in range(position, r):
+            entry = row[k]
+            row[k] = turns[0, k] * entry + turns[1, k] * extra
+            extra = turns[0, k] * extra - turns[1, k] * entry
+        pivot = (row[r] * row[r] + extra * extra) ** 0.5
+        turns[0, r] = row[r] / pivot
+        turns[1, r] = extra / pivot
+        row[r] = pivot
+
+
 @jit
 def extend_forward(
     factor: Array, first: int, last: int, members: Array, values: Array, forward: Array

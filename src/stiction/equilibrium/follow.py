@@ -146,7 +146,7 @@ def follow(setting: Setting, sample: Sample, state: State, target: float = np.in
         if not (target == np.inf and state.events and leap(setting, sample, state)):
             state.load, status = advance(
                 sample, setting.grid, state.load, target, state.slip, state.stiff,
-                state.direction, 20 * n, make_room(n),
+                state.direction, make_room(n),
             )  # fmt: skip
             if status == CROWDED:
                 warnings.warn(

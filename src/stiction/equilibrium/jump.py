@@ -31,6 +31,8 @@ UNDECIDED = 2
 ALL = -1
 CROWDED = -2
 
+PATIENCE = 16
+"""Elastic steps after which the true states are tried even if more nodes keep joining."""
 AT_FLOOR = 1.0 - 1e-12
 """Share of d_c from which a node counts as residual."""
 
@@ -76,16 +78,21 @@ def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> f
 
 
 @jit
-def longest_floor_run(sample: Sample, slip: Array) -> int:
-    """Longest run of residual nodes on the circle."""
+def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
+    """Longest run of residual nodes on the circle, and how many there are in all."""
     n = slip.shape[0]
     longest = 0
     run = 0
+    count = 0
     for q in range(2 * n):
         i = q if q < n else q - n
-        run = run + 1 if slip[i] >= AT_FLOOR * sample.critical[i] else 0
+        if slip[i] >= AT_FLOOR * sample.critical[i]:
+            run += 1
+            count += 1
+        else:
+            run = 0
         longest = max(longest, run)
-    return min(longest, n)
+    return min(longest, n), count // 2
 
 
 @jit
@@ -255,22 +262,32 @@ def jump(
     if size < count:
         return SLIDING
     other = make_room(n)
-    for k in range(steps):
+    waited = 0
+    at_floor = 0
+    for _ in range(steps):
+        before = size
         size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
         if size == CROWDED:
             return UNDECIDED
         if size == ALL or unsupported(sample, load, slip):
             return SLIDING
-        if longest_floor_run(sample, slip) >= escape:
+        run, residual = floor_runs(sample, slip)
+        if run >= escape:
             return SLIDING
-        if k % 4 == 3:
-            status = settle(sample, grid, load, slip, stiff, room, other, size)
-            if status == SLIDING:
-                return SLIDING
-            before = size
-            size = join(sample, grid, load, stiff, room, size, tolerance)
-            if size < 0:
-                return UNDECIDED if size == CROWDED else SLIDING
-            if status == ARRESTED and size == before:
-                return ARRESTED
+        waited += 1
+        # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.
+        if waited < PATIENCE and (size > before or residual > at_floor):
+            at_floor = residual
+            continue
+        waited = 0
+        at_floor = residual
+        before = size
+        status = settle(sample, grid, load, slip, stiff, room, other, size)
+        if status == SLIDING:
+            return SLIDING
+        size = join(sample, grid, load, stiff, room, size, tolerance)
+        if size < 0:
+            return UNDECIDED if size == CROWDED else SLIDING
+        if status == ARRESTED and size == before:
+            return ARRESTED
     return UNDECIDED
