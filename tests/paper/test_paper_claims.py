@@ -71,7 +71,7 @@ def findings() -> dict[str, dict[str, Finding]]:
         ("mirror", st.Beta(alpha=3.0, beta=1.5, low=0.66e6, high=1.66e6)),
     ):
         setting = Setting(problem=st.paper.problem(nodes=256), marginal=marginal)
-        context = Context(setting, 300, 0)
+        context = Context(setting, 300, 0, ruptures=6, dynamic=24)
         studies = compute(STUDIES if name == "paper" else ["monte_carlo"], context)
         data = Data(setting, 300, 0, studies)
         result[name] = {claim.name: finding for claim, finding in judged(data)}
@@ -105,6 +105,21 @@ def test_every_claim_has_a_verdict(findings):
         ("precursors-unlikely", Verdict.HOLDS),
         ("mirrored-variability", Verdict.HOLDS),
         ("longer-interface", Verdict.HOLDS),
+        ("simulations-predicted", Verdict.CORRECTED),
+        ("simulations-interaction", Verdict.CORRECTED),
+        ("simulations-trend", Verdict.HOLDS),
+        ("simulated-stress-drop", Verdict.HOLDS),
+        ("applied-load", Verdict.HOLDS),
+        ("kinetic-level", Verdict.HOLDS),
+        ("dynamic-cost", Verdict.FAILS),
+        ("distribution-described", Verdict.HOLDS),
+        ("shear-crack", Verdict.CORRECTED),
+        ("pre-slip", Verdict.HOLDS),
+        ("patches-grow", Verdict.HOLDS),
+        ("wider-range", Verdict.HOLDS),
+        ("cascade", Verdict.HOLDS),
+        ("random-stress-drop", Verdict.CORRECTED),
+        ("free-end", Verdict.HOLDS),
     ],
 )
 def test_verdicts_that_few_samples_decide(findings, name, verdict):

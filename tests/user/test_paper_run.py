@@ -17,7 +17,12 @@ from stiction.paper.studies import STUDIES
 
 
 def _options() -> dict:
-    return {"samples": 64, "setting": Setting(problem=st.paper.problem(nodes=256))}
+    return {
+        "samples": 64,
+        "ruptures": 16,
+        "full": True,
+        "setting": Setting(problem=st.paper.problem(nodes=256)),
+    }
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,19 @@ def paper(
     ),
     samples: Annotated[int, typer.Option(help="Samples for each correlation length.")] = 10_000,
     seed: Annotated[int, typer.Option(help="Seed of the ensemble.")] = 0,
-    quick: Annotated[bool, typer.Option("--quick", help="500 samples, for a first look.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="500 samples, few ruptures: a first look.")
+    ] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="Also a Monte Carlo study by elastodynamics.")
+    ] = False,
+    ruptures: Annotated[
+        int | None,
+        typer.Option(
+            help="Ruptures for each correlation length: 20, or 1,000 with --full.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Workers = None,
     only: Annotated[
         list[str] | None, typer.Option(help="Only this figure; may be given several times.")
@@ -26,10 +38,19 @@ def paper(
 
     Albertini, Karrer, Grigoriu and Kammer (2020), Stochastic properties of static friction. Makes
     a folder with `report.html`, `results.nc`, the figures (PNG and PDF) and the tables behind them.
+    Results are kept there as they come: the same command after an interruption goes on.
     """
     from stiction import paper as room
 
     report = room.run(
-        out=out, samples=samples, seed=seed, quick=quick, workers=workers, only=only, progress=True
+        out=out,
+        samples=samples,
+        seed=seed,
+        quick=quick,
+        full=full,
+        ruptures=ruptures,
+        workers=workers,
+        only=only,
+        progress=True,
     )
     typer.echo(f"report: {report}")

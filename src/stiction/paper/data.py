@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from stiction._typing import Array
 from stiction.paper.setting import Setting
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.paper.data import Array, Data
+from stiction._typing import Array
+from stiction.paper.data import Data
+from stiction.paper.fidelity import Combined, combined_mean
 from stiction.statistics.estimates import Estimate, pooled_moments
 
 
@@ -42,4 +44,74 @@ def misplaced(data: Data, ratio: float, *, printed: bool = False) -> NDArray[np.
     gap = np.abs(local.values - study["critical_position"].values)
     gap = np.minimum(gap, problem.interface.length - gap)
     result: NDArray[np.bool_] = gap > 0.5 * problem.nucleation_length
+    return result
+
+
+def shift_of(data: Data, ratio: float, prediction: str) -> Array:
+    """Relative error of a static prediction of tau_cr against elastodynamics, each rupture.
+
+    `prediction` is "local", "printed" or "exact"; positive where it predicts too much.
+    """
+    runs = data["ruptures"].sel(correlation_ratio=ratio)
+    name = "first_instability" if prediction == "exact" else "critical_stress"
+    found = runs["critical_stress"].values
+    result: Array = (runs[f"{prediction}_{name}"].values - found) / found
+    return result
+
+
+def displaced(data: Data, ratio: float, prediction: str) -> NDArray[np.bool_]:
+    """Whether a prediction puts the onset of a rupture more than h_n/2 from where it began."""
+    problem = data.setting.problem
+    runs = data["ruptures"].sel(correlation_ratio=ratio)
+    gap = np.abs(runs[f"{prediction}_critical_position"].values - runs["critical_position"].values)
+    gap = np.minimum(gap, problem.interface.length - gap)
+    result: NDArray[np.bool_] = gap > 0.5 * problem.nucleation_length
+    return result
+
+
+def dynamic_mean(data: Data, ratio: float) -> Combined:
+    """Mean tau_cr by elastodynamics, Pa: few ruptures, and what equilibrium says of all samples.
+
+    The samples of the ruptures are some of those of the Monte Carlo study where that is larger.
+    """
+    runs = data["ruptures"].sel(correlation_ratio=ratio)
+    dear, cheap = runs["critical_stress"].values, runs["exact_critical_stress"].values
+    return combined_mean(dear, _joined(cheap, runs["number"].values, _exact_all(data, ratio)))
+
+
+def _exact_all(data: Data, ratio: float) -> Array:
+    found: Array = data["interaction"]["critical_stress"].sel(correlation_ratio=ratio).values
+    return found
+
+
+def _joined(first: Array, numbers: Array, every: Array) -> Array:
+    """Those of the dear runs first, then all others."""
+    others = np.setdiff1d(np.arange(every.size), numbers)
+    return np.concatenate([first, every[others]])
+
+
+def fidelity(data: Data, ratio: float) -> tuple[Array, Array]:
+    """tau_cr by elastodynamics of the first samples, and by equilibrium of those and all others."""
+    dear = data["dynamic"]["critical_stress"].sel(correlation_ratio=ratio).values
+    cheap = _exact_all(data, ratio)
+    return dear[: cheap.size], cheap
+
+
+def toughest(data: Data) -> float:
+    """Largest fracture energy, (tau_p,max - tau_r)^2/(2 W), J/m^2; infinite without a bound."""
+    friction = data.setting.problem.friction
+    high = data.setting.bounds[1] - float(np.mean(friction.residual_strength))
+    return high**2 / (2.0 * float(np.max(friction.weakening_rate)))
+
+
+def release_rate(data: Data, stress: float, length: Array | float) -> Array:
+    """Static energy release rate, J/m^2, of a crack of this length in units of h_n.
+
+    pi a drop^2/(2 G*) for half-length a and drop = stress - tau_r: a shear crack between identical
+    half-spaces (Albertini et al., 2020, Sec. 5.2).
+    """
+    problem = data.setting.problem
+    drop = stress - float(np.mean(problem.friction.residual_strength))
+    half = 0.5 * np.asarray(length) * problem.nucleation_length
+    result: Array = np.pi * half * drop**2 / (2.0 * problem.effective_modulus)
     return result

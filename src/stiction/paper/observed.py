@@ -6,18 +6,16 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
 from stiction._model import model
+from stiction._typing import Array
 from stiction.criterion.method import LocalCriterion
 from stiction.criterion.moving_average import average_rows
 from stiction.criterion.nucleation import multiplier_of
 from stiction.problem import Problem
 from stiction.results import Variable
 from stiction.rows import Rows
-
-Array = NDArray[np.float64]
 
 STATIONS = 64
 

@@ -25,6 +25,11 @@ from stiction.report.style import paper_style
 
 QUICK = 500
 FEWEST = 64
+RUNS = 20
+"""Ruptures at each correlation length, as in the paper."""
+_FEW = 2
+_FEWEST_DYNAMIC = 16
+DYNAMIC = 1000
 
 
 def run(
@@ -32,6 +37,8 @@ def run(
     samples: int = 10_000,
     seed: int = 0,
     quick: bool = False,
+    full: bool = False,
+    ruptures: int | None = None,
     workers: int | None = None,
     only: Iterable[str] | None = None,
     progress: bool | Callable[[int, int], None] = False,
@@ -50,7 +57,13 @@ def run(
     seed : int
         Not negative. The same seed gives the same numbers, whatever the workers.
     quick : bool
-        500 samples, for a first look.
+        500 samples and two ruptures at each correlation length, for a first look.
+    full : bool
+        Also the Monte Carlo study by elastodynamics: an ensemble of ruptures at every correlation
+        length, about 0.2 s each on one core.
+    ruptures : int, optional
+        Ruptures at each correlation length of that ensemble, at least 16 (1,000 by default);
+        without `full`, of the comparison with simulations, at least 2 (20 by default).
     workers : int, optional
         Threads; all cores by default.
     only : iterable of str, optional
@@ -66,15 +79,31 @@ def run(
     Path
         Of the report.
 
+    Notes
+    -----
+    Results of each study are kept in the folder. The same call after an interruption computes only
+    what is missing; so does a call for other figures.
+
     Raises
     ------
     InputError
         Naming all that is wrong, unknown figures with the nearest valid name.
     """
     started = time.perf_counter()
-    folder, figures = _checked(out, samples, seed, workers, only)
-    context = Context(setting or Setting(), QUICK if quick else samples, seed, workers)
+    folder, figures = _checked(out, samples, seed, workers, only, full, ruptures)
+    context = Context(
+        setting or Setting(),
+        QUICK if quick else samples,
+        seed,
+        workers,
+        ruptures=_FEW if quick else RUNS if full or ruptures is None else ruptures,
+        dynamic=(ruptures or DYNAMIC) if full else 0,
+        folder=folder,
+    )
+    there = studies.offered(context)
+    figures = [figure for figure in figures if there.issuperset(figure.needs)]
     claims = list(CLAIMS.values()) if only is None else _claims_of(figures)
+    claims = [claim for claim in claims if there.issuperset(claim.needs)]
     needed = {need for item in (*figures, *claims) for need in item.needs}
     with progress_bar(studies.cost(needed, context), "paper", progress) as context.report:
         results = studies.compute(needed, context)
@@ -91,9 +120,14 @@ def run(
     return _write(folder / "report.html", html)
 
 
-def _checked(out: Any, samples: Any, seed: Any, workers: Any, only: Any) -> tuple[Path, list[Any]]:
+def _checked(
+    out: Any, samples: Any, seed: Any, workers: Any, only: Any, full: bool, ruptures: Any
+) -> tuple[Path, list[Any]]:
     problems = []
-    for name, value, smallest in (("samples", samples, FEWEST), ("seed", seed, 0)):
+    counts = [("samples", samples, FEWEST), ("seed", seed, 0)]
+    if ruptures is not None:
+        counts.append(("ruptures", ruptures, _FEWEST_DYNAMIC if full else _FEW))
+    for name, value, smallest in counts:
         if isinstance(value, bool) or not isinstance(value, int) or value < smallest:
             problems.append(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
     if workers is not None and (not isinstance(workers, int) or workers < 1):
@@ -103,6 +137,8 @@ def _checked(out: Any, samples: Any, seed: Any, workers: Any, only: Any) -> tupl
         figures = select(only)
     except InputError as error:
         problems += error.problems
+    if only is not None and not full and any("dynamic" in figure.needs for figure in figures):
+        problems.append("only: the Monte Carlo study by elastodynamics needs full")
     folder = Path(out)
     existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not existing.is_dir():

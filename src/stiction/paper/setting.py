@@ -19,6 +19,8 @@ from stiction.solid import Solid
 
 CORRELATION_RATIOS = (0.25, 0.5, 1.0, 2.0)
 """xi_0/h_n of the paper's Monte Carlo study."""
+SIMULATED_RATIOS = (0.25, 0.5, 2.0)
+"""xi_0/h_n at which the paper ran its simulations, 20 at each."""
 
 
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> Problem:
@@ -100,6 +102,8 @@ class Setting:
         Whether the Gaussian field has the mode k = 0.
     correlation_ratios : tuple of float
         xi_0/h_n of the Monte Carlo study, rising, two to six of them.
+    simulated_ratios : tuple of float
+        xi_0/h_n of the elastodynamic ruptures, rising, one to six of them.
     """
 
     problem: Problem = problem()
@@ -108,12 +112,18 @@ class Setting:
     truncation: Positive = 2.5
     mean_mode: bool = False
     correlation_ratios: tuple[Positive, ...] = CORRELATION_RATIOS
+    simulated_ratios: tuple[Positive, ...] = SIMULATED_RATIOS
 
     @model_validator(mode="after")
     def _rising(self) -> Setting:
-        ratios = self.correlation_ratios
-        if not 2 <= len(ratios) <= 6 or any(left >= right for left, right in pairwise(ratios)):
-            raise InputError(f"correlation_ratios: must be 2 to 6 rising numbers, got {ratios!r}")
+        problems = []
+        for name, fewest in (("correlation_ratios", 2), ("simulated_ratios", 1)):
+            ratios = getattr(self, name)
+            rising = all(left < right for left, right in pairwise(ratios))
+            if not (rising and fewest <= len(ratios) <= 6):
+                problems.append(f"{name}: must be {fewest} to 6 rising numbers, got {ratios!r}")
+        if problems:
+            raise InputError(problems)
         return self
 
     def field(self, correlation_ratio: float, **changes: Any) -> RandomField:

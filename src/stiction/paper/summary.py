@@ -16,7 +16,7 @@ from stiction.paper.claims import SUBJECTS, Claim, Finding, Verdict
 from stiction.paper.claims.claim import rounded
 from stiction.paper.claims.rules import kilopascal, megapascal
 from stiction.paper.data import Data
-from stiction.paper.derived import misplaced, overprediction
+from stiction.paper.derived import displaced, misplaced, overprediction, shift_of
 from stiction.report.page import ShownClaim, ShownFigure, render
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean, standard_deviation
@@ -118,7 +118,35 @@ def _points(data: Data, findings: Judged) -> list[str]:
             " longest correlation length; the local criterion puts the onset in the wrong place in"
             f" {wrong[0]:.2g} and {wrong[1]:.2g} % of samples."
         )
+    if "ruptures" in data.studies:
+        points.append(_about_ruptures(data))
+    if "arrest" in data.studies and data["arrest"].sizes["event"]:
+        stay = data["arrest"]["dynamic_arrests"].values > 0
+        points.append(
+            f"Randomness of strength alone can arrest a rupture, rarely: of {stay.size} samples"
+            " whose first instability comes to rest by equilibrium, inertia carries"
+            f" {int((~stay).sum())} through and leaves {int(stay.sum())} arrested."
+        )
     return points
+
+
+def _about_ruptures(data: Data) -> str:
+    ratios = data.setting.simulated_ratios
+
+    def error(prediction: str) -> float:
+        shifts = np.concatenate([shift_of(data, ratio, prediction) for ratio in ratios])
+        return 100.0 * float(np.sqrt(np.mean(shifts**2)))
+
+    wrong, runs = (
+        sum(int(displaced(data, ratio, "local").sum()) for ratio in ratios),
+        data["ruptures"]["critical_stress"].size,
+    )
+    return (
+        f"{runs} elastodynamic ruptures let go at the stress that exact equilibrium predicts to"
+        f" {error('exact'):.2g} %, the local criterion to {error('local'):.2g} %, and the formula"
+        f" with the printed modulus to {error('printed'):.2g} % (root mean square); in {wrong} of"
+        f" {runs} the local criterion puts the onset in the wrong place."
+    )
 
 
 def _exceptions(findings: Judged) -> list[tuple[str, list[str]]]:
@@ -145,6 +173,7 @@ def _key_table(data: Data) -> Table | None:
         for label, study in (
             ("local criterion", "monte_carlo"),
             ("exact equilibrium", "interaction"),
+            ("elastodynamics", "dynamic"),
         )
         if study in data.studies
     ]
@@ -236,7 +265,22 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
         ),
         ("Correlation lengths", "xi_0/h_n = " + ", ".join(f"{ratio:g}" for ratio in data.ratios)),
         ("Samples", f"{data.samples:,} at each correlation length, seed {data.seed}"),
+        ("Ruptures", _rupture_counts(data)),
     ]
+
+
+def _rupture_counts(data: Data) -> str:
+    parts = []
+    if "ruptures" in data.studies:
+        study = data["ruptures"]
+        ratios = ", ".join(f"{ratio:g}" for ratio in data.setting.simulated_ratios)
+        parts.append(
+            f"{study.sizes['sample']} at each of xi_0/h_n = {ratios}, at"
+            f" {study.attrs['loading_rate']:g} Pa/s"
+        )
+    if "dynamic" in data.studies:
+        parts.append(f"{data['dynamic'].sizes['sample']:,} at each correlation length")
+    return "; ".join(parts) or "none"
 
 
 def _marginal(marginal: Any) -> str:

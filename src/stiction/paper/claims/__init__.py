@@ -13,6 +13,7 @@ from stiction.paper.claims import (  # importing them registers their claims
     onset,
     parameters,
     rupture,
+    simulation,
     what_if,
 )
 from stiction.paper.claims.claim import (
@@ -40,5 +41,6 @@ __all__ = [
     "onset",
     "parameters",
     "rupture",
+    "simulation",
     "what_if",
 ]

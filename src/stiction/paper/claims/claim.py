@@ -105,7 +105,8 @@ SUBJECTS = {
     "nucleation": "Nucleation stress",
     "onset": "Critical stress and position of onset",
     "interaction": "Theory against exact equilibrium",
-    "rupture": "Run-away propagation",
+    "simulation": "Theory against elastodynamic simulation",
+    "rupture": "Nucleation and run-away propagation",
     "what_if": "What if",
 }
 """Titles of the subjects, by module, in the order in which they are shown."""

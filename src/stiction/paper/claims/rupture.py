@@ -1,15 +1,16 @@
-"""Claims about run-away propagation that the energy balance decides."""
+"""Claims about nucleation and run-away propagation: patches, energy balance, arrest."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
 from stiction.paper.claims.claim import Finding, Quantity, Verdict, claim
-from stiction.paper.claims.rules import at_each
+from stiction.paper.claims.rules import above, at_each, below, worst
 from stiction.paper.data import Data
-from stiction.statistics.estimates import Estimate, mean
+from stiction.statistics.estimates import Estimate, mean, share
 
 
 @claim(
@@ -72,3 +73,172 @@ def release_rate_grows(data: Data) -> Finding:
         verdict,
         "" if verdict is Verdict.HOLDS else "faster: neighbouring periods help",
     )
+
+
+@claim(
+    where="Sec. 5.2",
+    says="Shorter than about 3 h_n a rupture may be arrested, longer it cannot be.",
+    printed="3",
+    needs=("arrest",),
+)
+def longest_arrest(data: Data) -> Finding:
+    """Longest patch that came to rest by equilibrium, in units of h_n."""
+    length = data["arrest"]["length"].values / data.setting.problem.nucleation_length
+    if length.size == 0:
+        return Finding(
+            (Quantity("arrested events", Estimate(0.0)),), Verdict.OPEN, "none in these samples"
+        )
+    longest = float(length.max())
+    return Finding(
+        (
+            Quantity("longest arrested patch", Estimate(longest), "h_n"),
+            Quantity("samples", Estimate(float(length.size))),
+        ),
+        Verdict.HOLDS if longest <= 3.5 else Verdict.FAILS,
+    )
+
+
+@claim(
+    where="Sec. 5.2",
+    says="Randomness of strength alone does not arrest a rupture in the dynamic problem.",
+    needs=("arrest", "interaction"),
+)
+def inertia_and_arrest(data: Data) -> Finding:
+    """Share of the samples arrested by equilibrium that inertia does not carry through."""
+    events = data["arrest"]
+    shares = [
+        float((data["interaction"]["arrested_events"].sel(correlation_ratio=r).values > 0).mean())
+        for r in data.ratios
+    ]
+    count = events.sizes["event"]
+    if count == 0:
+        return Finding(
+            (Quantity("arrested by equilibrium", Estimate(0.0)),), Verdict.OPEN, "none to run again"
+        )
+    stay = share(events["dynamic_arrests"].values > 0)
+    both = stay.scaled(max(shares))
+    none = stay.value == 0.0
+    verdict = Verdict.HOLDS if none else below(both, 0.01)
+    return Finding(
+        (
+            Quantity("run again", Estimate(float(count))),
+            Quantity("of these arrested with inertia, too", stay),
+            Quantity("share of all samples, at most", both),
+        ),
+        Verdict.CORRECTED if verdict is Verdict.HOLDS and not none else verdict,
+        "extremely rare, but not never" if not none else "",
+    )
+
+
+@claim(
+    where="Sec. 5.2",
+    says="The unstable patch becomes a shear crack, driven by the static energy release rate.",
+    needs=("ruptures",),
+)
+def shear_crack(data: Data) -> Finding:
+    """Median front speed over the shear wave speed: below one the quasi-static picture applies."""
+    speed = data.setting.problem.solid.shear_wave_speed
+    runs = data["ruptures"]
+    ratios = data.setting.simulated_ratios
+    median = [
+        mean(runs["median_rupture_speed"].sel(correlation_ratio=r).values / speed) for r in ratios
+    ]
+    largest = [mean(runs["rupture_speed"].sel(correlation_ratio=r).values / speed) for r in ratios]
+    fast = [each.value > 1.0 for each in median]
+    seismic = [
+        float((data.setting.mean - s) / s)
+        for s in (float(runs["critical_stress"].sel(correlation_ratio=r).mean()) for r in ratios)
+    ]
+    return Finding(
+        (
+            *(
+                Quantity(f"median speed/c_s, xi_0/h_n = {r:g}", each)
+                for r, each in zip(ratios, median, strict=True)
+            ),
+            *(
+                Quantity(f"largest speed/c_s, xi_0/h_n = {r:g}", each)
+                for r, each in zip(ratios, largest, strict=True)
+            ),
+        ),
+        Verdict.CORRECTED if any(fast) else Verdict.HOLDS,
+        "it soon runs faster than shear waves, where that balance no longer applies: the strength"
+        f" excess over the stress drop is only {min(seismic):.2f} to {max(seismic):.2f}"
+        if any(fast)
+        else "",
+    )
+
+
+@claim(
+    where="Sec. 5.4",
+    says="Nucleation is of the pre-slip type: long slow slip, then abrupt acceleration.",
+    needs=("representative", "ruptures"),
+)
+def pre_slip(data: Data) -> Finding:
+    """Slow slip against rupture in time, and foreshocks: arrested events before the onset."""
+    run = data["representative"]
+    onset, start, end = float(run["onset_time"]), *run["step_time"].values[[0, -1]]
+    ratio = (onset - start) / (end - onset)
+    foreshocks = share(data["ruptures"]["arrested_events"].values.ravel() > 0)
+    slow = ratio > 10.0
+    rare = foreshocks.value <= 0.05
+    return Finding(
+        (
+            Quantity("slow slip over rupture, in time", Estimate(float(f"{ratio:.3g}"))),
+            Quantity("share of runs with a foreshock", foreshocks),
+        ),
+        Verdict.HOLDS if slow and rare else Verdict.CORRECTED if slow else Verdict.FAILS,
+    )
+
+
+@claim(
+    where="Abstract, Sec. 5.2",
+    says="Many patches slip at once, and their number grows with the load.",
+    needs=("growth",),
+)
+def patches_grow(data: Data) -> Finding:
+    """Mean number at 0.92, 0.96 and just below the load of the onset, shortest correlation."""
+    study = data["growth"]["patches"].sel(correlation_ratio=data.ratios[0])
+    levels = (0.92, 0.96, 0.999)
+    numbers = [study.sel(level=level, method="nearest").values for level in levels]
+    series = [mean(each) for each in numbers]
+    # The same samples at each load: the steps are known better than the numbers.
+    steps = [mean(right - left) for left, right in pairwise(numbers)]
+    return Finding(
+        tuple(
+            Quantity(f"tau_0 = {level:g} tau_cr", each)
+            for level, each in zip(levels, series, strict=True)
+        ),
+        worst([above(series[-1], 1.0), *(above(step, 0.0) for step in steps)]),
+        f"at xi_0/h_n = {data.ratios[0]:g}",
+    )
+
+
+@claim(
+    where="Sec. 5.2",
+    says="Patches may merge, the critical one among them.",
+    needs=("growth",),
+)
+def patches_merge(data: Data) -> Finding:
+    """Mergers before the onset, and share of samples whose critical patch has merged."""
+    study = data["growth"].sel(correlation_ratio=data.ratios[0])
+    mergers = mean(study["mergers"].values[:, -1])
+    critical = share(study["critical_merged"].values > 0)
+    return Finding(
+        (Quantity("mergers", mergers), Quantity("samples whose critical patch merged", critical)),
+        worst([above(mergers, 0.0), above(critical, 0.0)]),
+        f"at xi_0/h_n = {data.ratios[0]:g}",
+    )
+
+
+@claim(
+    where="Sec. 5.2",
+    says="The patch that becomes unstable need not be the first to appear.",
+    needs=("growth",),
+)
+def not_the_first(data: Data) -> Finding:
+    """Share of samples whose critical patch does not hold the weakest node."""
+    series = [
+        share(data["growth"]["critical_first"].sel(correlation_ratio=ratio).values == 0)
+        for ratio in data.ratios
+    ]
+    return Finding(at_each(data, series), above(series[0], 0.0), "share of samples")

@@ -12,17 +12,34 @@ from typing import Any
 
 from stiction.errors import InputError, unknown_name
 from stiction.paper.figures import (
+    energy,
+    fidelity,
+    growth,
     interaction,
     mapping,
     monte_carlo,
+    prediction,
     problem,
+    rupture,
     statistics,
     variance,
 )
 
 FIGURES: dict[str, Any] = {
     figure.name: figure
-    for figure in (problem, mapping, monte_carlo, statistics, variance, interaction)
+    for figure in (
+        problem,
+        mapping,
+        rupture,
+        prediction,
+        monte_carlo,
+        statistics,
+        variance,
+        interaction,
+        energy,
+        growth,
+        fidelity,
+    )
 }
 
 

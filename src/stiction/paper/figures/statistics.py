@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from stiction.paper.data import Data
 from stiction.report.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel
 from stiction.report.tables import Table
+from stiction.statistics.estimates import mean
 from stiction.statistics.quantiles import quantiles
 
 name = "statistics"
@@ -21,6 +22,12 @@ needs = ("monte_carlo", "theory", "trend", "window")
 PROBABILITIES = (0.25, 0.5, 0.75)
 
 
+_DYNAMIC = (
+    " Bars with caps in (b): mean of the elastodynamic ruptures of Figure 4 with two standard"
+    " errors to either side."
+)
+
+
 def caption(data: Data) -> str:
     """What is seen."""
     exact = "interaction" in data.studies
@@ -29,6 +36,7 @@ def caption(data: Data) -> str:
         " stress, against the correlation length. Filled symbols and lines: Monte Carlo study,"
         f" {data.samples:,} samples each. Thin lines in (b): side study over a wider range at fixed"
         f" interface length.{' Diamonds: means by exact equilibrium.' if exact else ''}"
+        f"{_DYNAMIC if 'ruptures' in data.studies else ''}"
         " Squares at the left edge: limit of vanishing correlation length."
         " Bars at the right edge: quartiles and median in the limit of long correlation with the"
         " interface as many correlation lengths long as at the last point: in (a) those of the"
@@ -132,7 +140,9 @@ def draw(data: Data) -> Figure:
             label="exact mean",
             zorder=6,
         )
-        critical.legend(loc="upper right")
+    if "ruptures" in data.studies:
+        _dynamic(critical, data)
+    critical.legend(loc="upper right")
     for axes in (nucleation, critical):
         if np.isfinite(setting.bounds[0]):
             _bound(axes, setting.bounds[0] / setting.mean)
@@ -140,6 +150,28 @@ def draw(data: Data) -> Figure:
     for axes, letter in zip((nucleation, critical, wide), "abc", strict=True):
         panel(axes, letter)
     return figure
+
+
+def _dynamic(axes: Axes, data: Data) -> None:
+    """Means over the ruptures, beside those of the Monte Carlo study."""
+    runs = data["ruptures"]
+    ratios = data.setting.simulated_ratios
+    found = [
+        mean(data.relative(runs["critical_stress"].sel(correlation_ratio=ratio).values))
+        for ratio in ratios
+    ]
+    axes.errorbar(
+        [1.07 * ratio for ratio in ratios],
+        [each.value for each in found],
+        [2.0 * each.error for each in found],
+        fmt="_",
+        color=ACCENT,
+        markersize=4,
+        capsize=2.5,
+        linewidth=1.0,
+        label="dynamic mean",
+        zorder=7,
+    )
 
 
 _ZERO, _INFINITY = 0.6, 1.6

@@ -8,15 +8,16 @@ import xarray as xr
 
 from stiction.criterion.method import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
-from stiction.paper.studies.context import Context
+from stiction.paper.studies.context import Context, work
 
 name = "interaction"
 title = "Exact equilibrium on the same samples"
 
 
 def cost(context: Context) -> int:
-    """All samples at every correlation length, twice."""
-    return 2 * context.samples * len(context.setting.correlation_ratios)
+    """All samples at every correlation length, exactly and by the printed formula."""
+    each = work(Equilibrium(), 1) + work(LocalCriterion(), 1)
+    return each * context.samples * len(context.setting.correlation_ratios)
 
 
 def compute(context: Context) -> xr.Dataset:

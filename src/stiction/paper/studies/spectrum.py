@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.stats import ks_2samp
 
+from stiction._typing import Array
 from stiction.criterion.method import LocalCriterion
 from stiction.paper.studies.context import Context
 from stiction.paper.studies.summary import stack, summarise
@@ -28,7 +28,7 @@ def compute(context: Context) -> xr.Dataset:
     """Summary of tau_cr for each exponent, its e-folding length that of the setting's field."""
     setting = context.setting
     by_exponent = {}
-    reference: dict[float, NDArray[np.float64]] = {}
+    reference: dict[float, Array] = {}
     # The setting's own exponent comes first: the others are measured against it.
     for factor in sorted(FACTORS, key=lambda factor: factor != 1.0):
         exponent = max(setting.exponent * factor, 0.75)
@@ -42,7 +42,7 @@ def compute(context: Context) -> xr.Dataset:
             part = summarise(stress)
             usual = reference.setdefault(ratio, stress)
             part["distance"] = ((), float(ks_2samp(stress, usual).statistic))
-            for key, change in _changes(stress, usual).items():
+            for key, change in relative_changes(stress, usual).items():
                 part[f"{key}_change"] = ((), change.value, {"units": "1"})
                 part[f"{key}_change_error"] = ((), change.error, {"units": "1"})
             by_ratio[ratio] = part
@@ -50,17 +50,17 @@ def compute(context: Context) -> xr.Dataset:
     return stack(by_exponent, "exponent", "exponent of the spectrum").sortby("exponent")
 
 
-def _changes(stress: NDArray[np.float64], usual: NDArray[np.float64]) -> dict[str, Estimate]:
+def relative_changes(stress: Array, usual: Array) -> dict[str, Estimate]:
     """Relative changes of mean and standard deviation between samples of the same draws.
 
     The draws are shared, so most of the sampling error cancels; the errors come from the
     difference of the influence functions.
     """
 
-    def influence(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def influence(values: Array) -> Array:
         return 0.5 * ((values - values.mean()) ** 2 / values.var() - 1.0)
 
-    def error(differences: NDArray[np.float64]) -> float:
+    def error(differences: Array) -> float:
         return float(differences.std(ddof=1) / np.sqrt(differences.size))
 
     shift = stress / usual.mean() - usual / usual.mean()
