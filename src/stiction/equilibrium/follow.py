@@ -142,8 +142,11 @@ def follow(setting: Setting, sample: Sample, state: State, target: float = np.in
         Load to stop at, Pa.
     """
     n = sample.excess.shape[0]
+    leaping = target == np.inf
     while not state.sliding and state.load < target:
-        if not (target == np.inf and state.events and leap(setting, sample, state)):
+        # Where one leap failed most others would.
+        leaping = leaping and (not state.events or leap(setting, sample, state))
+        if not (leaping and state.events):
             state.load, status = advance(
                 sample, setting.grid, state.load, target, state.slip, state.stiff,
                 state.direction, make_room(n),
