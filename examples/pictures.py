@@ -114,6 +114,8 @@ def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
     figure = rupture_figure(run, problem)
     figure.axes[3].remove()
     figure.axes[0].get_gridspec().set_width_ratios([1e-3, 4.0, 0.08])
+    figure.axes[2].tick_params(labelleft=True)
+    figure.axes[2].set_ylabel("$t/T$")
     figure.set_figheight(4.0)
     return figure
 

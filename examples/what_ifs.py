@@ -1,0 +1,87 @@
+"""Runs the what-if studies of this folder, draws a figure of each and writes what they show.
+
+``python examples/what_ifs.py`` writes docs/what-ifs.md and its pictures, in about two minutes;
+``python examples/what_ifs.py length plane`` runs some of them and prints what they show.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import textwrap
+from pathlib import Path
+
+from PIL import Image
+from what_if_parts import PARTS
+
+import stiction as st
+from stiction.report.style import paper_style
+
+HERE = Path(__file__).parent
+INTRODUCTION = """# What if
+
+The discussion of Albertini et al. (2020) asks what would change if strength, spectrum, interface or
+load were different. Each question is a study of its own, a TOML file in `examples/` that
+`stiction check`, `run` and `report` take; `python examples/what_ifs.py` runs them all, draws these
+figures and writes this page, numbers included. Stresses are onsets by exact equilibrium, with every
+interaction between patches, unless something else is said; lines are means and shades span 5 to
+95 % of the samples.
+"""
+
+
+def run(name: str, samples: int | None = None) -> tuple[str, object, list[str]]:
+    """Title, figure and sentences of one what-if.
+
+    Parameters
+    ----------
+    name : str
+        ``what_if_<name>.toml`` is the study.
+    samples : int, optional
+        Fewer than the study asks for.
+    """
+    study = st.Study.from_toml(HERE / f"what_if_{name}.toml")
+    draw, keep = PARTS[name]
+    few = study.ensemble.samples if samples is None else samples
+    ensemble = dataclasses.replace(study.ensemble, samples=few, keep=keep)
+    study = dataclasses.replace(study, ensemble=ensemble)
+    result = study.run(progress=True)
+    with paper_style():
+        figure, sentences = draw(study, result)
+    return study.title, figure, sentences
+
+
+def save(figure: object, path: Path) -> None:
+    """With a palette instead of true colour, to keep it small."""
+    with paper_style():
+        figure.savefig(path, dpi=170)
+    Image.open(path).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(
+        path, optimize=True
+    )
+
+
+def main(folder: str | Path = HERE.parent / "docs", samples: int | None = None) -> Path:
+    """Run all, and write the page and its pictures."""
+    folder = Path(folder)
+    (folder / "images").mkdir(parents=True, exist_ok=True)
+    parts = [INTRODUCTION]
+    for name in PARTS:
+        title, figure, sentences = run(name, samples)
+        save(figure, folder / "images" / f"what_if_{name}.png")
+        parts.append(
+            f"## {title}\n\n![{title}](images/what_if_{name}.png)\n\n"
+            + textwrap.fill(" ".join(sentences), 100, break_on_hyphens=False)
+            + f"\n\nStudy: `examples/what_if_{name}.toml`.\n"
+        )
+    page = folder / "what-ifs.md"
+    page.write_text("\n".join(parts), encoding="utf-8")
+    return page
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        for chosen in sys.argv[1:]:
+            heading, drawing, texts = run(chosen)
+            save(drawing, Path(f"what_if_{chosen}.png"))
+            print(heading, *texts, sep="\n")
+    else:
+        print(main())
