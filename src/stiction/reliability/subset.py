@@ -35,7 +35,7 @@ class Level:
     Attributes
     ----------
     threshold : float
-        The next level holds the samples at or below it (the last level: the failures, below it).
+        The next level holds the samples below it (the last level: the failures).
     probability : float
         Estimated share of this level that lies there.
     acceptance : float
@@ -58,7 +58,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Samples of one level: standard normal, given that the value is at most `ceiling`.
+    """Samples of one level: standard normal, given that the value is below `ceiling`.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Population:
     ancestors : (samples,) int array
     chains : int
         Sample i belongs to chain i modulo this.
-    draws : (samples, dimension) array
+    draws : (about samples, dimension) array
         Empty for early levels.
     """
 
@@ -88,7 +88,7 @@ class Descent:
     Attributes
     ----------
     samples : int
-        N, samples of each level.
+        N, samples of the first level and, within a few, of each other.
     populations : tuple of Population
     levels : tuple of Level
     evaluations : int
@@ -162,7 +162,7 @@ def _grow(
         candidate = math.sqrt(1.0 - step * step) * states[t - 1]
         candidate += noise
         outcome = function(candidate)
-        taken = outcome <= ceiling
+        taken = outcome < ceiling
         states[t] = np.where(taken[:, None], candidate, states[t - 1])
         found[t] = np.where(taken, outcome, found[t - 1])
         share = float(taken.mean())
@@ -225,10 +225,14 @@ def descend(
     -----
     Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
     (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.
+
+    The threshold of a level is the lowest value that does *not* go on, and only samples strictly
+    below it do: then the product of the shares is unbiased although the levels are chosen from
+    the samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). With the highest value
+    that goes on as the threshold, each level would add one part in N p_0 to the estimate.
     """
     count = max(2, round(samples * level_probability))
-    steps = max(2, round(samples / count))
-    samples = count * steps
+    samples = count * max(2, round(samples / count))
     draws = rng.standard_normal((samples, dimension))
     values = function(draws)
     ancestors, chains = np.arange(samples), samples
@@ -242,14 +246,10 @@ def descend(
         if len(populations) > KEEP:
             old = populations[-KEEP - 1]
             populations[-KEEP - 1] = replace(old, draws=np.empty((0, dimension)))
-        order = np.argsort(values, kind="stable")
-        lowest = float(values[order[count - 1]])
+        lowest = float(np.partition(values, count)[count])
         final = lowest < threshold
-        chosen = np.zeros(samples, dtype=bool)
-        if final:
-            chosen = values < threshold
-        else:
-            chosen[order[:count]] = True
+        # States repeat along chains: with ties at the threshold a few fewer go on.
+        chosen = values < (threshold if final else lowest)
         share = float(chosen.mean())
         shaped = chosen.reshape(-1, chains)
         levels.append(
@@ -262,19 +262,22 @@ def descend(
                 ancestors=int(np.unique(ancestors[chosen]).size),
             )
         )
-        complete = final or log_probability + math.log(share) <= math.log(max(probability, 1e-300))
-        cost = count * (steps - 1)
-        stuck = lowest >= ceiling or len(levels) >= MOST_LEVELS
+        stuck = share == 0.0 or len(levels) >= MOST_LEVELS
+        if share > 0.0:
+            reached = log_probability + math.log(share)
+            complete = final or reached <= math.log(max(probability, 1e-300))
+        seeds = rng.permutation(np.flatnonzero(chosen))
+        steps = max(2, round(samples / max(seeds.size, 1)))
+        cost = seeds.size * (steps - 1)
         over = max_evaluations is not None and evaluations + cost > max_evaluations
         if complete or stuck or over:
             break
         log_probability += math.log(share)
         ceiling = lowest
-        seeds = rng.permutation(order[:count])
         family = ancestors[seeds]
         draws, values, acceptance, step = _grow(
             function, draws[seeds], values[seeds], ceiling, steps, step, rng
         )
-        ancestors, chains = np.tile(family, steps), count
+        ancestors, chains = np.tile(family, steps), seeds.size
         evaluations += cost
     return Descent(samples, tuple(populations), tuple(levels), evaluations, complete)
