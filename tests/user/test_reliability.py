@@ -163,8 +163,9 @@ def test_budget_too_small_for_any_failure(system):
         nothing = failure_probability(
             *system, 0.6605e6, method=Equilibrium(), algorithm="two_level", max_evaluations=100
         )
-    assert nothing.probability == 0.0
-    assert nothing.interval[1] < 1e-6
+    # A dozen of its samples show next to nothing, and the interval says so.
+    assert nothing.evaluations <= 100
+    assert nothing.interval[0] < 3e-9 < nothing.interval[1]
 
 
 def test_a_median_interface_that_fails_at_once(system):

@@ -8,26 +8,35 @@ import numpy as np
 import xarray as xr
 
 from stiction._model import describe, to_plain
+from stiction._typing import Array
 from stiction.errors import InputError
-from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.fields.random_field import RandomField
 from stiction.methods import Method
 from stiction.problem import Problem
 from stiction.reliability.design import (
+    TailRequest,
     check_probability,
     check_sampling,
     stress_interval,
     subset_tail,
 )
 from stiction.reliability.estimate import budget_of, check_target
-from stiction.reliability.limit_state import Event, LimitState, make_limit_state
+from stiction.reliability.limit_state import (
+    Event,
+    LimitState,
+    make_limit_state,
+    whole_number,
+)
 from stiction.reliability.plain import BATCH
 from stiction.reliability.result import say
-from stiction.reliability.rice import rice_probability
 from stiction.reliability.uncertainty import binomial_interval, lognormal_interval
 from stiction.results import Variable, to_dataset
+from stiction.statistics.rice import rice_distribution
 
 COMMONEST = 0.5
 RICE_SAMPLES = 2_000
+FEWEST_CROSSINGS = 5
+"""Crossings below which their rate is not known."""
 
 VARIABLES: dict[str, Variable] = {
     "stress": Variable("Pa", "stress", ("point",)),
@@ -57,6 +66,17 @@ def _plain(state: LimitState, seed: int, stress: Any, samples: int, confidence: 
         for k in counts
     ]
     return np.array(rows).T
+
+
+def _rice(problem: Problem, strength: RandomField, stress: Array, seed: int) -> Array:
+    """Rice's formula at falling stresses, NaN where crossings are too few to know their rate."""
+    levels = np.unique(stress)
+    found = rice_distribution(problem, strength, profiles=RICE_SAMPLES, seed=seed, stress=levels)
+    crossings = found.crossing_rate * RICE_SAMPLES * problem.interface.length
+    # Far above the median of tau_n nothing crosses either, but the interface lies below.
+    known = (crossings > FEWEST_CROSSINGS - 0.5) | (found.point_survival < 0.5)
+    chance: Array = np.where(known, found.probability, np.nan)
+    return chance[np.searchsorted(levels, stress)]
 
 
 def failure_curve(
@@ -122,22 +142,22 @@ def failure_curve(
         ("points_per_decade", points_per_decade, 1),
         ("plain_samples", plain_samples, 0),
     ):
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not (whole and value >= least):
+        if not whole_number(value, least):
             text = f"{name}: must be a whole number >= {least}, got {describe(value)}"
             problems.append(text)
-    try:
-        state = make_limit_state(problem, strength, method, seed, fields, event, workers)
-        problems += check_sampling(state)
-    except InputError as error:
-        problems += error.problems
-    if problems:
-        raise InputError(problems)
-    for _, random in state.fields:
-        warn_if_inaccurate(random, problem.interface)
-    tail = subset_tail(
-        state, float(smallest), int(seed), target_cov, budget_of(state, max_evaluations)
+    state = make_limit_state(
+        problem,
+        strength,
+        method,
+        seed,
+        fields,
+        event,
+        workers,
+        problems=problems,
+        check=check_sampling,
     )
+    budget = budget_of(state, max_evaluations)
+    tail = subset_tail(TailRequest(state, float(smallest), target_cov, int(seed), budget))
     deepest = float(smallest)
     if not tail.runs[0].complete:
         deepest = tail.probability(float(np.nextafter(tail.runs[0].levels[-1].threshold, np.inf)))
@@ -171,9 +191,7 @@ def failure_curve(
         "stress_high": sides[:, 1],
     }
     if state.not_alike_everywhere() is None:
-        values["rice_probability"] = rice_probability(
-            problem, strength, stress, samples=RICE_SAMPLES, seed=seed
-        )
+        values["rice_probability"] = _rice(problem, strength, stress, int(seed))
     if plain_samples:
         plain = _plain(state, int(seed), stress, int(plain_samples), confidence)
         values |= dict(zip(("plain_probability", "plain_low", "plain_high"), plain, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -11,25 +11,27 @@ import numpy as np
 
 from stiction._model import describe
 from stiction.criterion.method import LocalCriterion
-from stiction.errors import InputError
-from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.fields.random_field import RandomField
 from stiction.methods import Method
 from stiction.problem import Problem
 from stiction.reliability.estimate import (
+    ALIKE,
     FREQUENT,
     budget_of,
     check_algorithm,
     check_target,
     usable_first_stage,
 )
-from stiction.reliability.limit_state import Event, LimitState, make_limit_state
+from stiction.reliability.limit_state import Event, LimitState, make_limit_state, real_number
 from stiction.reliability.pooled import AnyTailRun, Tail, run_until_precise
 from stiction.reliability.result import say
-from stiction.reliability.sampled import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST
+from stiction.reliability.sampled import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
 from stiction.reliability.subset import Descent, descend
-from stiction.reliability.two_level import Bridge, bridge
+from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
 
+PILOT = 500
+"""Plain samples by which 'auto' judges the first stage."""
 DEEPER = 0.3
 """Runs go on to this share of the probability, to know the lower end of the interval."""
 
@@ -89,8 +91,7 @@ class DesignStress:
 
 def check_probability(name: str, value: Any) -> list[str]:
     """Why a number is no probability to sample for."""
-    real = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not real or not 0.0 < value < 1.0:
+    if not real_number(value) or not 0.0 < value < 1.0:
         return [f"{name}: must lie between 0 and 1, got {describe(value)}"]
     if value < 1e-30:
         return [f"{name}: must be at least 1e-30, got {value!r}"]
@@ -110,39 +111,66 @@ def stress_interval(
     return low, tail.quantile(min(probability * math.exp(width), 1.0))
 
 
-def subset_tail(
-    state: LimitState, probability: float, seed: int, target_cov: float, budget: int
-) -> Tail[Descent]:
+@dataclass(frozen=True)
+class TailRequest:
+    """How far down, and how precisely.
+
+    Attributes
+    ----------
+    state : LimitState
+    probability, target_cov : float
+    seed, budget : int
+    spent : int
+        Evaluations already made to choose the algorithm.
+    """
+
+    state: LimitState
+    probability: float
+    target_cov: float
+    seed: int
+    budget: int
+    spent: int = 0
+
+    def pooled(
+        self, make: Callable[[int, int, int], AnyTailRun], first: int, largest: int
+    ) -> Tail[AnyTailRun]:
+        """Runs until the probability is known as precisely as asked at its own quantile."""
+
+        def judge(runs: Sequence[AnyTailRun]) -> float:
+            tail = Tail(runs)
+            return tail.coefficient_of_variation(tail.quantile(self.probability))
+
+        return Tail(
+            run_until_precise(
+                make,
+                judge,
+                target_cov=self.target_cov,
+                first=first_size(first, self.budget),
+                largest=largest,
+                max_evaluations=self.budget,
+            )
+        )
+
+
+def subset_tail(request: TailRequest) -> Tail[Descent]:
     """The tail down to a probability, by subset simulation."""
+    state = request.state
 
     def make(samples: int, number: int, left: int) -> Descent:
         return descend(
             state,
             state.dimension,
-            rng=generator(seed, 5, number),
+            rng=generator(request.seed, 5, number),
             samples=samples,
-            probability=DEEPER * probability,
+            probability=DEEPER * request.probability,
             max_evaluations=left,
         )
 
-    def judge(runs: Sequence[Descent]) -> float:
-        tail = Tail(runs)
-        return tail.coefficient_of_variation(tail.quantile(probability))
-
-    runs = run_until_precise(
-        make,
-        judge,
-        target_cov=target_cov,
-        first=SUBSET,
-        largest=SUBSET_MOST,
-        max_evaluations=budget,
-    )
-    return Tail(runs)
+    return request.pooled(make, SUBSET, SUBSET_MOST)
 
 
-def _two_level_tail(
-    state: LimitState, probability: float, seed: int, target_cov: float, budget: int
-) -> Tail[Bridge]:
+def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
+    state = request.state
     cheap = state.by(LocalCriterion())
 
     def make(samples: int, number: int, left: int) -> Bridge:
@@ -151,38 +179,37 @@ def _two_level_tail(
             state,
             state.dimension,
             samples=samples,
-            rng=generator(seed, 6, number),
+            rng=generator(request.seed, 6, number),
             max_evaluations=left,
-            probability=probability,
+            probability=request.probability,
         )
 
-    def judge(runs: Sequence[Bridge]) -> float:
-        tail = Tail(runs)
-        return tail.coefficient_of_variation(tail.quantile(probability))
+    return request.pooled(make, BRIDGE, BRIDGE_MOST)
 
-    runs = run_until_precise(
-        make,
-        judge,
-        target_cov=target_cov,
-        first=BRIDGE,
-        largest=BRIDGE_MOST,
-        max_evaluations=budget,
-    )
-    return Tail(runs)
+
+def _chosen(state: LimitState, probability: float, seed: int, budget: int) -> tuple[str, str, int]:
+    """Algorithm, reason, and the evaluations it took to choose."""
+    if probability >= FREQUENT or usable_first_stage(state) is not None:
+        return "subset", "the method itself goes down the tail", 0
+    draws = state.draws(seed, 0, min(PILOT, budget // 5))
+    share = agreement(state.by(LocalCriterion())(draws), state(draws))
+    seen = f"of {draws.shape[0]} plain samples the local criterion picks {share:.0%} of the weakest"
+    if share >= ALIKE:
+        return "two_level", f"{seen}, at a tenth of the cost of equilibrium", draws.shape[0]
+    return "subset", f"{seen} only", draws.shape[0]
 
 
 def _finish(
-    state: LimitState,
+    request: TailRequest,
     tail: Tail[AnyTailRun],
-    probability: float,
-    target_cov: float,
     confidence: float,
     algorithm: str,
     reason: str,
     first_stage: int,
 ) -> DesignStress:
+    state, probability, target_cov = request.state, request.probability, request.target_cov
     lowest = state.bounds[0]
-    evaluations = sum(run.evaluations for run in tail.runs)
+    evaluations = request.spent + sum(run.evaluations for run in tail.runs)
     doubts = []
     if tail.runs[0].complete:
         stress = tail.quantile(probability)
@@ -194,7 +221,8 @@ def _finish(
                 f" {target_cov:g}: {evaluations} evaluations do not suffice; raise max_evaluations"
             )
     else:
-        seen = tail.runs[0].extent[0] if evaluations else state.bounds[1]
+        asked = tail.runs[0].evaluations > 0
+        seen = tail.runs[0].extent[0] if asked else state.bounds[1]
         stress, cov, interval = seen, math.inf, (lowest, seen)
         doubts.append(
             f"{evaluations} evaluations do not reach P = {probability:g}: the stress lies below"
@@ -249,8 +277,9 @@ def design_stress(
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
     algorithm : {"auto", "subset", "two_level"}
-        'auto' takes two levels for equilibrium where the local criterion holds and the
-        probability is below 1 %, else subset simulation by the method itself.
+        'auto' takes two levels for equilibrium if the probability is below 1 % and the local
+        criterion picks the same plain samples as the weakest, else subset simulation by the
+        method itself.
     target_cov : float
         Coefficient of variation to reach, of the failure probability at the stress.
     seed, max_evaluations, confidence, event, workers
@@ -280,30 +309,30 @@ def design_stress(
     }
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_probability("probability", probability)
-    try:
-        state = make_limit_state(problem, strength, method, seed, fields, event, workers)
-        problems += check_sampling(state)
-        problems += check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
-    except InputError as error:
-        problems += error.problems
-    if problems:
-        raise InputError(problems)
-    for _, random in state.fields:
-        warn_if_inaccurate(random, problem.interface)
-    budget, reason, chosen = budget_of(state, max_evaluations), "as asked", str(algorithm)
+    state = make_limit_state(
+        problem,
+        strength,
+        method,
+        seed,
+        fields,
+        event,
+        workers,
+        problems=problems,
+        check=lambda state: (
+            check_sampling(state)
+            or check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
+        ),
+    )
+    budget, spent = budget_of(state, max_evaluations), 0
+    chosen, reason = str(algorithm), "as asked"
     if algorithm == "auto":
-        if usable_first_stage(state) is None and probability < FREQUENT:
-            chosen, reason = "two_level", "the local criterion resembles equilibrium and is cheap"
-        else:
-            chosen, reason = "subset", "the method itself goes down the tail"
+        chosen, reason, spent = _chosen(state, float(probability), int(seed), budget)
+    request = TailRequest(state, float(probability), target_cov, int(seed), budget - spent, spent)
     if chosen == "two_level":
-        bridges = _two_level_tail(state, float(probability), int(seed), target_cov, budget)
+        bridges = _two_level_tail(request)
         cheap = sum(run.first_stage_evaluations for run in bridges.runs)
-        return _finish(
-            state, bridges, float(probability), target_cov, confidence, chosen, reason, cheap
-        )
-    tail = subset_tail(state, float(probability), int(seed), target_cov, budget)
-    return _finish(state, tail, float(probability), target_cov, confidence, chosen, reason, 0)
+        return _finish(request, bridges, confidence, chosen, reason, cheap)
+    return _finish(request, subset_tail(request), confidence, chosen, reason, 0)
 
 
 def check_sampling(state: LimitState) -> list[str]:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-import numpy as np
-
 from stiction._model import describe
 from stiction.criterion.method import LocalCriterion
-from stiction.errors import InputError, unknown_name
-from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.errors import unknown_name
+from stiction.fields.random_field import RandomField
 from stiction.methods import Method
 from stiction.problem import Problem
-from stiction.reliability.limit_state import Event, LimitState, make_limit_state
-from stiction.reliability.plain import NOTHING, Count, count_on
+from stiction.reliability.limit_state import (
+    Event,
+    LimitState,
+    make_limit_state,
+    real_number,
+    whole_number,
+)
+from stiction.reliability.plain import Count, tally
 from stiction.reliability.result import FailureProbability
 from stiction.reliability.sampled import (
     Request,
@@ -23,6 +27,7 @@ from stiction.reliability.sampled import (
     by_subset,
     by_two_levels,
 )
+from stiction.reliability.two_level import agreement
 
 Algorithm = Literal["auto", "plain", "subset", "importance", "two_level"]
 ALGORITHMS = ("auto", "plain", "subset", "importance", "two_level")
@@ -30,6 +35,8 @@ ALGORITHMS = ("auto", "plain", "subset", "importance", "two_level")
 BUDGET = {"local_criterion": 2_000_000, "equilibrium": 200_000, "rupture": 1_000}
 """Most evaluations if the user does not say: up to a minute, for rupture a few."""
 PILOT = {"rupture": 100}
+ALIKE = 0.9
+"""Share of the weakest plain samples that the local criterion must pick to lead to the rarest."""
 FREQUENT = 0.01
 """From here on plain sampling needs no more evaluations than subset simulation."""
 
@@ -37,12 +44,11 @@ FREQUENT = 0.01
 def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list[str]:
     """What is wrong with the options that all of the room share."""
     problems = []
-    if not 0.0 < target_cov < math.inf:
-        problems.append(f"target_cov: must be positive, got {target_cov!r}")
-    if not 0.0 < confidence < 1.0:
-        problems.append(f"confidence: must lie between 0 and 1, got {confidence!r}")
-    whole = isinstance(max_evaluations, int | np.integer) and not isinstance(max_evaluations, bool)
-    if max_evaluations is not None and not (whole and max_evaluations >= 100):
+    if not (real_number(target_cov) and 0.0 < target_cov < math.inf):
+        problems.append(f"target_cov: must be a positive number, got {describe(target_cov)}")
+    if not (real_number(confidence) and 0.0 < confidence < 1.0):
+        problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
+    if max_evaluations is not None and not whole_number(max_evaluations, 100):
         problems.append(
             f"max_evaluations: must be a whole number >= 100, got {describe(max_evaluations)}"
         )
@@ -97,13 +103,20 @@ def _chosen(request: Request) -> tuple[str, str, Count | None]:
     state = request.state
     if state.method.type == "rupture":
         return "plain", "a rupture simulation takes too long for long chains of samples", None
-    pilot = count_on(state, request.seed, request.stress, request.pilot, NOTHING)
+    draws = state.draws(request.seed, 0, request.pilot)
+    values = state(draws)
+    pilot = tally(values, request.stress)
     seen = f"{pilot.failures} failures among {pilot.samples} plain samples"
     if pilot.probability >= FREQUENT:
         return "plain", f"{seen}: frequent enough to count", pilot
     if usable_first_stage(state) is None:
-        text = f"{seen}: rare; the local criterion resembles equilibrium and is a tenth of its cost"
-        return "two_level", text, pilot
+        share = agreement(state.by(LocalCriterion())(draws), values)
+        if share >= ALIKE:
+            text = (
+                f"{seen}: rare; the local criterion resembles equilibrium, at a tenth of its cost"
+            )
+            return "two_level", text, pilot
+        seen += f"; the local criterion picks only {share:.0%} of the weakest of them"
     return "subset", f"{seen}: rare, and subset simulation does not need to know where", pilot
 
 
@@ -139,8 +152,9 @@ def failure_probability(
         Plain Monte Carlo; subset simulation; importance sampling around the most likely weak spot
         at a random place (where the interface is alike everywhere); subset simulation by the local
         criterion with equilibrium at its end. 'auto' counts failures among a thousand plain
-        samples and goes on counting from 1 % on; below, it takes two levels for equilibrium and
-        subset simulation otherwise. `reason` in the result says which and why.
+        samples and goes on counting from 1 % on; below, it takes two levels for equilibrium, if
+        the local criterion picks the same samples as the weakest, and subset simulation
+        otherwise. `reason` in the result says which and why.
     target_cov : float
         Coefficient of variation to reach.
     seed : int
@@ -186,20 +200,21 @@ def failure_probability(
         "weakening_rate": weakening_rate,
     }
     problems = check_target(target_cov, confidence, max_evaluations)
-    real = isinstance(stress, int | float | np.number) and not isinstance(stress, bool)
-    if not (real and math.isfinite(stress)):
+    if not (real_number(stress) and math.isfinite(stress)):
         problems.append(f"stress: must be a finite number in Pa, got {describe(stress)}")
-    try:
-        state = make_limit_state(problem, strength, method, seed, fields, event, workers)
-        problems += check_algorithm(state, algorithm, ALGORITHMS)
-    except InputError as error:
-        problems += error.problems
-    if problems:
-        raise InputError(problems)
-    for _, random in state.fields:
-        warn_if_inaccurate(random, problem.interface)
+    state = make_limit_state(
+        problem,
+        strength,
+        method,
+        seed,
+        fields,
+        event,
+        workers,
+        problems=problems,
+        check=lambda state: check_algorithm(state, algorithm, ALGORITHMS),
+    )
     budget = budget_of(state, max_evaluations)
-    pilot = min(PILOT.get(state.method.type, 1_000), max(budget // 5, 100))
+    pilot = min(PILOT.get(state.method.type, 1_000), max(budget // 5, 50))
     request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
     if stress <= low:

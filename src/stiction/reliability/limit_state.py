@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,18 +10,31 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stiction._model import describe
 from stiction._typing import Array
 from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.run import make_plan
 from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
-from stiction.fields.random_field import RandomField
+from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.problem import Problem
 
 Event = Literal["critical_stress", "first_instability"]
 
 PIECE = 16
 """Fewest rows worth a thread of their own."""
+
+
+def whole_number(value: Any, least: int) -> bool:
+    """Whether a value is a whole number, and not less than `least`."""
+    return (
+        isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(value >= least)
+    )
+
+
+def real_number(value: Any) -> bool:
+    """Whether a value is a number and neither text nor a truth value; NaN and infinity are."""
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -91,7 +104,9 @@ class LimitState:
         return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
 
     def _stress(self, draws: Array) -> Array:
-        result: Array = np.asarray(self.onset(self.profiles(draws))[self.event])
+        # On a coarse grid the local criterion rings, up to a little below the bound.
+        found = self.onset(self.profiles(draws))[self.event]
+        result: Array = np.maximum(found, self.bounds[0])
         return result
 
     def __call__(self, draws: Array) -> Array:
@@ -99,7 +114,7 @@ class LimitState:
         pieces = min(self.workers, max(1, draws.shape[0] // PIECE))
         if pieces == 1:
             return self._stress(draws)
-        _ = self._solver  # prepared before the threads need it
+        _ = self._solver, self.bounds  # prepared before the threads need them
         with ThreadPoolExecutor(pieces) as pool:
             return np.concatenate(list(pool.map(self._stress, np.array_split(draws, pieces))))
 
@@ -125,9 +140,11 @@ class LimitState:
         mean = float(np.mean(np.broadcast_to(profile, (nodes,))))
         # The mean of the initial stress is itself random where it is a field: take its lowest.
         initial = float(np.mean(np.broadcast_to(least, (nodes,))))
-        # The rounded weight of the local criterion integrates to a little more than one.
-        slack = 1.001 if getattr(self.method, "weights", "exact") == "rounded" else 1.0
-        return initial + lowest_load * mean, high * slack
+        # The rounded weight of the local criterion integrates to a little more than one: it takes
+        # tau_p - tau_i for that much higher.
+        rounded = getattr(self.method, "weights", "exact") == "rounded"
+        slack = 1e-3 * (high - float(np.min(least))) if rounded else 0.0
+        return initial + lowest_load * mean, high + slack
 
     def no_single_length(self) -> str | None:
         """Why the local criterion cannot serve as a first stage, or None if it can."""
@@ -162,23 +179,42 @@ def make_limit_state(
     strength: RandomField,
     method: Any,
     seed: int,
-    fields: dict[str, RandomField | None],
+    fields: Mapping[str, RandomField | None],
     event: str,
     workers: int | None,
+    *,
+    problems: Sequence[str] = (),
+    check: Callable[[LimitState], list[str]] | None = None,
 ) -> LimitState:
-    """The limit state of these arguments, or one `InputError` with all that is wrong with them."""
-    problems: list[str] = []
-    try:
-        make_plan(problem, strength, method, seed, fields)
-    except InputError as error:
-        problems += error.problems
+    """The limit state of these arguments, or one `InputError` with all that is wrong with them.
+
+    Parameters
+    ----------
+    problem, strength, method, seed, event, workers
+        As in `failure_probability`.
+    fields : mapping
+        What else is random, by name, or None.
+    problems : sequence of str
+        What is wrong with other arguments; reported with the rest.
+    check : callable, optional
+        What else is wrong, once there is a limit state.
+    """
+    found = list(problems)
     if event not in ("critical_stress", "first_instability"):
-        problems.append(f"event: must be 'critical_stress' or 'first_instability', got {event!r}")
-    if workers is not None and (isinstance(workers, bool) or not workers >= 1):
-        problems.append(f"workers: must be a whole number >= 1, got {workers!r}")
-    if problems:
-        raise InputError(problems)
-    random = tuple((name, field) for name, field in fields.items() if field is not None)
-    count = usable_cores() if workers is None else int(workers)
-    kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
-    return LimitState(problem, (("strength", strength), *random), method, kind, count)
+        found.append(f"event: must be 'critical_stress' or 'first_instability', got {event!r}")
+    if workers is not None and not whole_number(workers, 1):
+        found.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
+    state = None
+    try:
+        make_plan(problem, strength, method, seed, dict(fields))
+        random = tuple((name, field) for name, field in fields.items() if field is not None)
+        kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
+        state = LimitState(problem, (("strength", strength), *random), method, kind)
+        found += check(state) if check else []
+    except InputError as error:
+        found += error.problems
+    if found or state is None:
+        raise InputError(found)
+    for _, field in state.fields:
+        warn_if_inaccurate(field, problem.interface)
+    return replace(state, workers=usable_cores() if workers is None else int(workers))

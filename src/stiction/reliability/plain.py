@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._typing import Array
 from stiction.reliability.limit_state import LimitState
 
 BATCH = 1024
@@ -28,7 +29,7 @@ class Count:
 
     failures: int
     samples: int
-    numbers: NDArray[np.int64]
+    numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def probability(self) -> float:
@@ -40,23 +41,27 @@ class Count:
         """Binomial standard error over the estimate."""
         if self.failures == 0:
             return math.inf
-        return math.sqrt((1.0 - self.probability) / self.failures)
+        # Where none held, as if one more had been drawn that did: nothing is certain by counting.
+        held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
+        return math.sqrt(held / self.failures)
 
 
-NOTHING = Count(0, 0, np.zeros(0, dtype=np.int64))
+NOTHING = Count(0, 0)
+
+
+def tally(values: Array, stress: float, so_far: Count = NOTHING) -> Count:
+    """The count after the next samples, of these stresses at onset."""
+    failed = values < stress
+    numbers = np.concatenate([so_far.numbers, so_far.samples + np.flatnonzero(failed)])
+    return Count(so_far.failures + int(failed.sum()), so_far.samples + values.size, numbers[:SHOWN])
 
 
 def count_on(state: LimitState, seed: int, stress: float, samples: int, so_far: Count) -> Count:
     """The count extended to a number of samples."""
-    failures, done = so_far.failures, so_far.samples
-    numbers = [so_far.numbers]
-    while done < samples:
-        batch = min(BATCH, samples - done)
-        failed = state(state.draws(seed, done, batch)) < stress
-        numbers.append(done + np.flatnonzero(failed))
-        failures += int(failed.sum())
-        done += batch
-    return Count(failures, done, np.concatenate(numbers)[:SHOWN])
+    while so_far.samples < samples:
+        batch = min(BATCH, samples - so_far.samples)
+        so_far = tally(state(state.draws(seed, so_far.samples, batch)), stress, so_far)
+    return so_far
 
 
 def count_failures(
@@ -80,7 +85,7 @@ def count_failures(
         cov = count.coefficient_of_variation
         if cov <= target_cov or count.samples >= max_evaluations:
             return count
-        # Ten times more where nothing is known; else what is missing, and a little.
+        # Four times more where nothing is known; else what is missing, and a little.
         known = count.failures >= 10
         wanted = 1.05 * count.samples * (cov / target_cov) ** 2 if known else 4.0 * count.samples
         wanted = max(wanted, count.samples + first)

@@ -32,6 +32,8 @@ SHOWN = 20
 """Failing profiles kept."""
 FEWEST_FAMILIES = 5.0
 FEWEST_WEIGHTS, LARGEST_SHARE = 10.0, 0.2
+LEAST_SHARE = 0.02
+"""Of the samples below the first stage's ceiling, those that fail: fewer, and it is no guide."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class Request:
     def after(self, spent: int) -> Request:
         """The same with less left of the budget."""
         return replace(self, budget=max(0, self.budget - spent), spent=self.spent + spent)
+
+
+def first_size(usual: int, budget: int) -> int:
+    """Samples of a first run: fewer than usual where the budget would not even hold four levels."""
+    return min(usual, max(budget // 4, 20))
 
 
 def _missed(request: Request, cov: float) -> list[str]:
@@ -168,7 +175,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         make,
         judge,
         target_cov=request.target_cov,
-        first=SUBSET,
+        first=first_size(SUBSET, request.budget),
         largest=SUBSET_MOST,
         max_evaluations=request.budget,
     )
@@ -176,6 +183,12 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
     diagnostics = subset_diagnostics(tail, stress)
     interval = lognormal_interval(probability, cov, request.confidence)
+    if all(len(run.levels) == 1 for run in runs) and runs[0].complete:
+        # So likely that there was nothing to go down to: the samples are independent.
+        seen = [run.populations[0].values < stress for run in runs]
+        count = Count(sum(int(s.sum()) for s in seen), sum(s.size for s in seen))
+        cov = count.coefficient_of_variation
+        interval = binomial_interval(count.failures, count.samples, request.confidence)
     doubts = _missed(request, cov)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
@@ -233,7 +246,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         make,
         judge,
         target_cov=request.target_cov,
-        first=BRIDGE,
+        first=first_size(BRIDGE, request.budget),
         largest=BRIDGE_MOST,
         max_evaluations=request.budget,
     )
@@ -250,15 +263,23 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
             " rarer than the last level by the local criterion; raise max_evaluations"
         ]
     last = min(run.last for run in runs)
+    failures = sum(int(np.sum(run.values < stress)) for run in runs)
+    share = failures / max(1, sum(run.values.size for run in runs))
     if last < 0.8 and probability > 0.0:
         doubts.append(
             f"the local criterion misses {1.0 - last:.0%} of the failures: the estimate may be low;"
             " compare with algorithm='subset'"
         )
+    if probability > 0.0 and share < LEAST_SHARE:
+        doubts.append(
+            f"only {share:.1%} of what the local criterion lets go lets go by equilibrium: it is a"
+            " poor guide here, and failures that it does not see would be missed; compare with"
+            " algorithm='subset'"
+        )
     largest = max(runs, key=lambda run: run.samples)
     diagnostics = {
         "runs": len(runs),
-        "middle_factor": float(np.mean(largest.values < stress)) if largest.complete else 0.0,
+        "middle_factor": share,
         "last_factor": last,
         "ceiling": largest.ceiling,
         "walk_acceptance": min(run.acceptance for run in runs),
@@ -289,9 +310,14 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
     (_, field), problem = state.fields[0], state.problem
     # The problem is uniform: stress = tau_i + load p and load = average of (tau_p - tau_i)/p.
     point = design_point(problem, field, stress)
-    origin = float(state(np.zeros((1, state.dimension)))[0])
-    shift = point.draws if origin > stress else np.zeros_like(point.draws)
-    mixture = Mixture(shift, problem.interface.nodes, field.mean_mode)
+    if float(state(np.zeros((1, state.dimension)))[0]) <= stress:
+        text = (
+            "the median interface already fails at this stress: there is nothing to shift, and"
+            " this is plain Monte Carlo"
+        )
+        counted = by_counting(request, reason, None)
+        return replace(counted, warnings=(*counted.warnings, *say([text])))
+    mixture = Mixture(point.draws, problem.interface.nodes, field.mean_mode)
     rng = generator(request.seed, 4)
     found: list[Array] = []
     kept: list[Array] = []
@@ -305,7 +331,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         kept.append(draws[failed][:SHOWN])
         count += size
         sample = np.concatenate(found)
-        probability = float(sample.mean())
+        probability = min(float(sample.mean()), 1.0)
         cov = (
             float(sample.std()) / probability / math.sqrt(count) if probability > 0.0 else math.inf
         )
@@ -322,13 +348,8 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             f"the weights are worth {size_of:.0f} equal ones only, and the largest is"
             f" {share:.0%} of the sum: the shift does not suit the failures; use 'subset'"
         )
-    if not point.converged and origin > stress:
+    if not point.converged:
         doubts.append("the search for the most likely weak spot did not settle")
-    if origin <= stress:
-        doubts.append(
-            "the median interface already fails at this stress: nothing is shifted, and this is"
-            " plain Monte Carlo"
-        )
     draws = np.concatenate(kept)
     chances = np.exp(mixture.log_weights(draws)) if draws.size else np.zeros(0)
     # A few of the failures, each as likely as its weight: what a weak interface looks like.

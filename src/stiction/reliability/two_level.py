@@ -6,6 +6,10 @@ With L the cheap stress and E the exact one, for any ceiling b,
 
 whatever L is. Where L follows E closely the last factor is near one and the middle one is not
 small, so that a few hundred exact evaluations do what thousands would.
+
+The last factor is measured by walks that start from failures with L < b. Failures which L does not
+see, and to which no short walk leads, stay unseen: whether L ranks samples as E does has to be
+known from elsewhere (`agreement`).
 """
 
 from __future__ import annotations
@@ -62,7 +66,8 @@ class Bridge:
     acceptance : float
         Share of steps accepted by the walks in the failure set.
     complete : bool
-        Whether any failure was found.
+        Whether the exact limit state was asked. If it found no failure, the estimate is zero:
+        leaving such a run out of a mean would favour runs that found one.
     """
 
     samples: int
@@ -86,7 +91,7 @@ class Bridge:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress seen."""
+        """Lowest and highest stress seen, Pa."""
         return float(self.values.min()), float(self.values.max())
 
     def probability(self, value: float) -> float:
@@ -98,6 +103,19 @@ class Bridge:
         """Squared coefficient of variation of `probability(value)`."""
         family = self.ancestors[self.values < value]
         return ancestral_variance(family, self.values.size) + self.wobble
+
+
+def agreement(cheap: Array, exact: Array) -> float:
+    """Share of the exactly weakest fiftieth of samples that is in the cheaply weakest tenth.
+
+    Parameters
+    ----------
+    cheap, exact : (samples,) arrays
+        Stresses of the same samples; a few hundred.
+    """
+    weakest = np.argsort(exact)[: max(5, exact.size // 50)]
+    seen = np.argsort(cheap)[: max(10, exact.size // 10)]
+    return float(np.isin(weakest, seen).mean())
 
 
 def _threshold(population: Population, values: Array, probability: float) -> float:
@@ -114,7 +132,7 @@ def _covered(
     Walkers of one ancestor are alike: each family is one observation.
     """
     walkers = families.size
-    covered = (cheap(states) <= ceiling).reshape(-1, walkers)
+    covered = (cheap(states) < ceiling).reshape(-1, walkers)
     last = max(float(covered.mean()), 1.0 / samples)
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last)
@@ -158,7 +176,7 @@ def bridge(
     first_stage, spent = descent.evaluations, 0
     best: Bridge | None = None
     for population in reversed(descent.populations):
-        if population.draws.shape[0] == 0 or spent + samples > max_evaluations:
+        if population.draws.shape[0] == 0 or spent + samples + STEPS > max_evaluations:
             break
         looked = rng.permutation(population.values.size)[:samples]
         draws, families = population.draws[looked], population.ancestors[looked]
@@ -167,19 +185,20 @@ def bridge(
         limit = _threshold(population, values, probability) if threshold is None else threshold
         failed = values < limit
         if not failed.any():
-            continue
+            if best is not None:
+                break
+            if threshold is None:  # this level is rarer than the probability asked for
+                continue
         last, wobble, acceptance = 1.0, 0.0, 1.0
         kept, kept_values = draws[failed], values[failed]
-        if math.isfinite(population.ceiling):
+        if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
             walkers = min(kept_values.size, max(16, samples // STEPS), room)
-            if walkers < 2:
-                break
             states, found, acceptance, _ = conditional_chains(
                 exact,
                 kept[:walkers],
                 kept_values[:walkers],
-                float(np.nextafter(limit, -math.inf)),
+                limit,
                 STEPS,
                 descent.levels[-1].step,
                 rng,

@@ -76,7 +76,12 @@ class RiceDistribution:
 
 
 def rice_distribution(
-    problem: Problem, strength: RandomField, *, profiles: int = 512, seed: int = 0
+    problem: Problem,
+    strength: RandomField,
+    *,
+    profiles: int = 512,
+    seed: int = 0,
+    stress: Any = None,
 ) -> RiceDistribution:
     """Distribution of the critical stress of the local criterion from a few hundred profiles.
 
@@ -96,6 +101,8 @@ def rice_distribution(
         How many profiles to sample, at least 16.
     seed : int
         The profiles are samples 0.. of this seed.
+    stress : (m,) array, optional
+        Levels x, Pa, rising; by default 1024 from the lowest to the highest tau_n sampled.
 
     Returns
     -------
@@ -105,7 +112,8 @@ def rice_distribution(
     Raises
     ------
     InputError
-        If the problem has no nucleation stress, its load is not uniform, or the profiles are few.
+        If the problem has no nucleation stress, its load is not uniform, the profiles are few or
+        the levels do not rise.
     """
     _uniform_load(problem)
     if isinstance(profiles, bool) or not isinstance(profiles, int) or profiles < 16:
@@ -117,17 +125,22 @@ def rice_distribution(
             tau_p = strength.sample(problem.interface, samples=count, seed=seed, first=first)
             yield nucleation_stress(problem, tau_p)
 
-    # Two passes over the same samples instead of keeping them: memory does not grow with them.
-    low, high = np.inf, -np.inf
+    if stress is None:
+        # Two passes over the same samples instead of keeping them: memory does not grow with them.
+        low, high = np.inf, -np.inf
+        for tau_n in batches():
+            low, high = min(low, float(tau_n.min())), max(high, float(tau_n.max()))
+        levels = np.linspace(low, high, LEVELS)
+    else:
+        levels = np.ascontiguousarray(stress, dtype=np.float64)
+        if levels.ndim != 1 or levels.size == 0 or not np.all(np.diff(levels) > 0.0):
+            raise InputError("stress: must be a (m,) array of rising levels, Pa")
+    crossings = np.zeros(levels.size + 1, dtype=np.int64)
+    below = np.zeros(levels.size + 1, dtype=np.int64)
     for tau_n in batches():
-        low, high = min(low, float(tau_n.min())), max(high, float(tau_n.max()))
-    crossings = np.zeros(LEVELS + 1, dtype=np.int64)
-    below = np.zeros(LEVELS + 1, dtype=np.int64)
-    for tau_n in batches():
-        _count_crossings(tau_n, low, (high - low) / (LEVELS - 1), crossings, below)
-    levels = np.linspace(low, high, LEVELS)
-    seen = np.cumsum(crossings)[:LEVELS]
-    survival = 1.0 - np.cumsum(below)[:LEVELS] / (profiles * problem.interface.nodes)
+        _count_crossings(tau_n, levels, crossings, below)
+    seen = np.cumsum(crossings)[:-1]
+    survival = 1.0 - np.cumsum(below)[:-1] / (profiles * problem.interface.nodes)
     rate = seen / (profiles * problem.interface.length)
     with np.errstate(divide="ignore", invalid="ignore"):
         exponent = np.where(survival > 0.0, problem.interface.length * rate / survival, np.inf)
@@ -145,20 +158,19 @@ def rice_distribution(
 
 @jit
 def _count_crossings(
-    rows: Array, low: float, step: float, crossings: NDArray[np.int64], below: NDArray[np.int64]
+    rows: Array, levels: Array, crossings: NDArray[np.int64], below: NDArray[np.int64]
 ) -> None:
     """Steps whose cumulative sums count down-crossings of, and nodes at or below, each level."""
-    last = crossings.size - 1
     for row in range(rows.shape[0]):
         before = rows[row, rows.shape[1] - 1]
+        stop = np.searchsorted(levels, before)
         for i in range(rows.shape[1]):
             now = rows[row, i]
             # The first level at or above a value; a fall from `before` to `now` crosses those
             # from that of `now` to that of `before`, exclusive.
-            start = min(max(int(np.ceil((now - low) / step)), 0), last)
+            start = np.searchsorted(levels, now)
             below[start] += 1
             if now < before:
-                stop = min(max(int(np.ceil((before - low) / step)), 0), last)
                 crossings[start] += 1
                 crossings[stop] -= 1
-            before = now
+            before, stop = now, start
