@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-import tempfile
 import threading
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import platformdirs
 
+from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.exponentials import ExponentialSum, fit_exponentials
 
 logger = logging.getLogger("stiction")
@@ -37,37 +36,20 @@ def _path(key: tuple[str, float, float, float]) -> Path:
 
 def _read(path: Path) -> ExponentialSum | None:
     try:
-        with np.load(path, allow_pickle=False) as data:
-            return ExponentialSum(
-                data["poles"], data["weights"], float(data["error"]), float(data["t_max"])
-            )
-    except FileNotFoundError:
-        return None
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
-        return None  # damaged: it is built and written again
+        data = read_arrays(path)
+        poles, weights = data["poles"], data["weights"]
+        kernel = ExponentialSum(poles, weights, float(data["error"]), float(data["t_max"]))
+        whole = poles.dtype == weights.dtype == np.complex128 and poles.shape == weights.shape
+        return kernel if whole and poles.ndim == 1 and np.all(poles.real < 0.0) else None
+    except (*UNREADABLE, TypeError):
+        return None  # not there, or damaged: it is built and written again
 
 
 def _write(path: Path, kernel: ExponentialSum) -> None:
     global _said
-    temporary = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Written aside and renamed: a reader sees the whole file or none.
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as stream:
-            temporary = stream.name
-            np.savez(
-                stream,
-                poles=kernel.poles,
-                weights=kernel.weights,
-                error=kernel.error,
-                t_max=kernel.t_max,
-            )
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
+        write_atomically(path, vars(kernel))
     except OSError as error:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
         if not _said:
             _said = True
             logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import tempfile
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.dynamics import track
+from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.run import Run, State
 from stiction.errors import InputError
 
-FORMAT = 1
+FORMAT = 2
 
 _NAMES = {
     "nodes": "number of nodes",
@@ -63,20 +61,6 @@ def identity(run: Run) -> dict[str, NDArray[Any]]:
     return {name: np.asarray(value) for name, value in values.items()}
 
 
-def write_atomically(path: Path, arrays: dict[str, Any]) -> None:
-    """Write an .npz aside, sync it, rename it: the old file stays whole until the new one is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as stream:
-        try:
-            np.savez(stream, **arrays)
-            stream.flush()
-            os.fsync(stream.fileno())
-        except BaseException:
-            os.unlink(stream.name)
-            raise
-    os.replace(stream.name, path)
-
-
 def write_checkpoint(path: str | Path, run: Run, state: State) -> None:
     """Save the state of a run, with all that it depends on.
 
@@ -85,11 +69,19 @@ def write_checkpoint(path: str | Path, run: Run, state: State) -> None:
     path : path
         Replaced as a whole if it exists.
     run, state
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; a file that was there before is left as it was.
     """
     arrays: dict[str, Any] = {"format": FORMAT}
     arrays |= {f"run_{name}": value for name, value in identity(run).items()}
     arrays |= {f"state_{f.name}": getattr(state, f.name) for f in dataclasses.fields(State)}
-    write_atomically(Path(path), arrays)
+    try:
+        write_atomically(Path(path), arrays)
+    except OSError as error:
+        raise OSError(f"checkpoint: cannot write {str(path)!r} ({error})") from error
 
 
 def _difference(name: str, here: NDArray[Any], there: NDArray[Any]) -> str:
@@ -115,19 +107,24 @@ def read_checkpoint(path: str | Path, run: Run) -> State:
         strength, load or method; every difference is named.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
+        arrays = read_arrays(Path(path))
     except FileNotFoundError:
         raise InputError(f"restart: there is no checkpoint {str(path)!r}") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"restart: {str(path)!r} is not a readable checkpoint: {error}") from None
     found = arrays.get("format")
-    if found is None or int(found) != FORMAT:
-        given = "none" if found is None else int(found)
+    if found is None or found.ndim > 0 or found[()] != FORMAT:
+        given = "none" if found is None else repr(found.tolist())
         raise InputError(
             f"restart: {str(path)!r} has format version {given}, this version reads {FORMAT}"
         )
     here = identity(run)
+    fresh = vars(run.start(0.0))
+    expected = {f"run_{name}" for name in here} | {f"state_{name}" for name in fresh}
+    if missing := expected - set(arrays):
+        raise InputError(
+            f"restart: {str(path)!r} is damaged, it lacks {', '.join(sorted(missing))}"
+        )
     problems = []
     for name, value in here.items():
         saved = arrays[f"run_{name}"]
@@ -135,7 +132,16 @@ def read_checkpoint(path: str | Path, run: Run) -> State:
             problems.append(f"restart: other {_difference(name, value, saved)}")
     if problems:
         raise InputError(problems)
-    values = {f.name: arrays[f"state_{f.name}"] for f in dataclasses.fields(State)}
+    values: dict[str, Any] = {name: arrays[f"state_{name}"] for name in fresh}
+    for name, like in fresh.items():
+        kind, shape = np.asarray(like).dtype, np.shape(like)
+        if values[name].dtype != kind or values[name].shape != shape:
+            problems.append(
+                f"restart: {str(path)!r} is damaged, {name} must be {kind} of shape {shape}, got "
+                f"{values[name].dtype} of shape {values[name].shape}"
+            )
+    if problems:
+        raise InputError(problems)
     values["explicit"] = bool(values["explicit"])
     values["step"] = float(values["step"])
     return State(**values)

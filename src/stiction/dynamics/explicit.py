@@ -16,8 +16,8 @@ from stiction.dynamics.track import (
     DROP_STOP,
     DROPPED,
     EXPLICIT_STEPS,
+    KINETIC,
     LOAD,
-    LOCAL_STRESS,
     NOT_FINITE,
     REC_LOAD,
     REC_MEAN_SLIP,
@@ -172,7 +172,9 @@ def explicit_steps(  # type: ignore[no-untyped-def]
         watch[EXPLICIT_STEPS] += 1.0
         watch[STEP] = step
         load_before = load
-        observe(watch, time, load, mean_stress, radiated, node)
+        fall = observe(watch, time, load, mean_stress, radiated, node)
+        if slid == n and watch[KINETIC] == -np.inf:
+            watch[KINETIC] = mean_stress
         if keep:
             record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
                 time,
@@ -183,7 +185,7 @@ def explicit_steps(  # type: ignore[no-untyped-def]
             record[taken, REC_STEP], record[taken, REC_WORK] = step, watch[WORK]
         if slid >= control[SLID_STOP]:
             return taken + 1, ALL_SLID
-        if watch[LOCAL_STRESS] - mean_stress > control[DROP_STOP]:
+        if fall > control[DROP_STOP]:
             return taken + 1, DROPPED
         watch[CALM_STEPS] = watch[CALM_STEPS] + 1.0 if top < control[CALM_RATE] else 0.0
         if watch[CALM_STEPS] >= control[CALM_COUNT]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,9 +50,11 @@ TIME = Variable("s", "time from zero load", ("time",))
 
 def check_variables(names: Sequence[str]) -> None:
     """Refuse unknown names of fields."""
-    if isinstance(names, str):
-        raise InputError(f"variables: must be a list of names, got the string {names!r}")
-    problems = [unknown_name("variables", name, FIELDS) for name in names if name not in FIELDS]
+    if isinstance(names, str) or not isinstance(names, Collection):
+        raise InputError(f"variables: must be a list of names, got {names!r}")
+    problems = [
+        unknown_name("variables", str(name), FIELDS) for name in names if name not in FIELDS
+    ]
     if problems:
         raise InputError(problems)
 
@@ -67,6 +69,11 @@ class Frames:
 
     def __len__(self) -> int:
         return len(self._frames)
+
+    @property
+    def pending(self) -> int:
+        """Frames and recorded steps not yet taken away."""
+        return len(self._frames) + sum(record.shape[0] for record in self._records)
 
     def add_steps(self, record: Floats) -> None:
         """Keep the record of some steps."""

@@ -16,10 +16,10 @@ from stiction.dynamics.track import (
     END_TIME,
     GROWTH,
     IMPLICIT_STEPS,
+    KINETIC,
     LARGEST_STEP,
     LOAD,
     LOAD_STEP,
-    LOCAL_STRESS,
     NEGLIGIBLE,
     NOT_FINITE,
     NOTICED,
@@ -282,7 +282,9 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         watch[IMPLICIT_STEPS] += 1.0
         watch[STEP] = watch[PAST_STEP] = size
         watch[RADIATED] = radiated
-        observe(watch, time, load, mean_stress, radiated, node)
+        fall = observe(watch, time, load, mean_stress, radiated, node)
+        if slid == n and watch[KINETIC] == -np.inf:
+            watch[KINETIC] = mean_stress
         if record.shape[0] > 0:
             record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
                 time,
@@ -294,7 +296,7 @@ def implicit_steps(  # type: ignore[no-untyped-def]
         taken += 1
         if slid >= control[SLID_STOP]:
             return taken, step, ALL_SLID
-        if watch[LOCAL_STRESS] - mean_stress > control[DROP_STOP]:
+        if fall > control[DROP_STOP]:
             return taken, step, DROPPED
         if last or watch[TIME] >= control[END_TIME]:
             return taken, step, DONE

@@ -27,7 +27,10 @@ def _sampled(function: Callable[[float], float], end: float) -> History:
     """Straight pieces that follow a callable, halved until they do."""
 
     def value(t: float) -> float:
-        result = float(function(t))
+        try:
+            result = float(function(t))
+        except (TypeError, ValueError):
+            raise InputError(f"load: the callable returns no number at t = {t:.6g} s") from None
         if not np.isfinite(result):
             raise InputError(f"load: the callable returns {result!r} at t = {t:.6g} s")
         return result
@@ -96,8 +99,8 @@ def load_history(load: Any, end_time: float | None) -> History:
     return times, values
 
 
-def first_reach(history: History, target: float) -> float:
-    """First time at which tau_0 reaches `target`, s.
+def first_reach(history: History, target: float, what: str = "first slip") -> float:
+    """First time at which tau_0 reaches `target`, s; `what` says in messages why it must.
 
     Raises
     ------
@@ -113,14 +116,14 @@ def first_reach(history: History, target: float) -> float:
     if falling.size:
         at = times[falling[0]]
         raise InputError(
-            f"load: goes down at t = {at:.6g} s before anything slips (first slip at tau_0 = "
+            f"load: goes down at t = {at:.6g} s before anything slips ({what} at tau_0 = "
             f"{target:.6g} Pa); begin with a load that does not fall"
         )
     low = last - 1
     slope = (values[last] - values[low]) / (times[last] - times[low])
     if slope <= 0.0:
         raise InputError(
-            f"load: stays at or below {values.max():.6g} Pa, but the first slip needs tau_0 = "
+            f"load: stays at or below {values.max():.6g} Pa, but the {what} needs tau_0 = "
             f"{target:.6g} Pa"
         )
     return float(times[low] + (target - values[low]) / slope)

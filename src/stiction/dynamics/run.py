@@ -120,16 +120,19 @@ class Run:
         stress = stress - self.medium.impedance * rate
         watch[track.TIME], watch[track.LOAD] = time, load
         watch[track.MEAN_STRESS] = watch[track.PEAK_STRESS] = stress.mean()
-        watch[track.LOCAL_STRESS], watch[track.EVENT_START] = stress.mean(), time
+        watch[track.LOCAL_STRESS] = stress.mean()
+        watch[track.LOCAL_RADIATED] = self.medium.impedance * rate.mean()
         watch[track.PEAK_TIME], watch[track.PEAK_LOAD] = time, load
         watch[track.PEAK_NODE] = int(np.argmax(stress - limit))
-        watch[track.FIRST_STRESS] = watch[track.BAD_NODE] = -1.0
+        watch[track.FIRST_STRESS] = watch[track.KINETIC] = -np.inf  # not yet
+        watch[track.BAD_NODE] = -1.0
         watch[track.EVENT_DROP] = self.control[track.EVENT_DROP_SIZE]
         watch[track.TOP_RATE] = rate.max()
         watch[track.SLID] = np.count_nonzero(delta >= self.rows[3])
         arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
         size = self.control[track.SMALLEST_STEP]
-        first = max(size, 0.1 * self.control[track.LOAD_STEP] / max(self.slope(time), 1e-300))
+        slope = self.slope(time)
+        first = 0.1 * self.control[track.LOAD_STEP] / slope if slope > 0.0 else size
         return State(
             slip=delta,
             rate=rate,
@@ -141,7 +144,7 @@ class Run:
             arrival=arrival,
             watch=watch,
             explicit=bool(self.control[track.EXPLICIT_ONLY] > 0.0),
-            step=min(first, self.control[track.LARGEST_STEP]),
+            step=min(max(size, first), self.control[track.LARGEST_STEP]),
         )
 
     def slope(self, time: float) -> float:
@@ -161,6 +164,16 @@ class Run:
     def ended(self, state: State) -> bool:
         """Whether the end time is reached, up to the rounding of a sum of many steps."""
         return bool(self.control[track.END_TIME] - state.time <= 1e-6 * self.medium.step)
+
+    def resting(self, state: State) -> bool:
+        """Whether nothing slips and the load, beyond its last piece, never rises again."""
+        times, values = self.history
+        return bool(
+            not state.explicit
+            and state.time >= times[-1]
+            and values[-1] <= values[-2]
+            and self.medium.impedance * state.rate.max() <= self.control[track.RESIDUAL]
+        )
 
     def _to_explicit(self, state: State) -> None:
         pairs = self.medium.kernel.poles.size

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import os
 import warnings
 from collections.abc import Callable, Sequence
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -12,7 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._model import describe, to_plain
+from stiction._model import describe, real_array, to_plain
 from stiction.dynamics import track
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.frames import Frames, check_variables
@@ -20,6 +23,7 @@ from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
     check_finite,
+    check_pace,
     first_slip,
     front_speed,
     make_run,
@@ -34,6 +38,7 @@ from stiction.results import Variable
 
 Stop = Literal["sliding", "onset", "arrest", "time"]
 
+_MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are streamed
 _NEAR_ONSET = 0.02  # fall of the mean stress, in units of tau_p - tau_r, that counts as 'around'
 
 _ALONG: dict[str, Variable] = {
@@ -76,15 +81,21 @@ def _progress(state: State) -> Progress:
     )
 
 
+def _finite(value: Any) -> bool:
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    return number and math.isfinite(float(value))
+
+
 def _check(options: dict[str, Any]) -> None:
     problems = []
     for name in ("every", "every_implicit", "every_near_onset", "checkpoint_every", "chunk"):
         value = options[name]
-        if value is not None and (not isinstance(value, int) or value < 1):
+        whole = isinstance(value, Integral) and not isinstance(value, bool)
+        if value is not None and not (whole and value >= 1):
             problems.append(f"{name}: must be a whole number of steps, at least 1, got {value!r}")
     for name in ("interval", "end_time"):
         value = options[name]
-        if value is not None and not (np.isfinite(value) and value > 0.0):
+        if value is not None and not (_finite(value) and value > 0.0):
             problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
     if options["stop"] not in get_args(Stop):
         problems.append(f"stop: must be one of {get_args(Stop)}, got {options['stop']!r}")
@@ -92,6 +103,16 @@ def _check(options: dict[str, Any]) -> None:
         problems.append("end_time: needed with stop='time', got None")
     if (options["initial_slip"] is None) != (options["initial_load"] is None):
         problems.append("initial_slip and initial_load: give both or neither")
+    elif options["initial_load"] is not None and not _finite(options["initial_load"]):
+        problems.append(f"initial_load: must be a number, Pa, got {options['initial_load']!r}")
+    for name in ("store", "checkpoint", "restart"):
+        value = options[name]
+        if value is not None and not isinstance(value, str | os.PathLike):
+            problems.append(f"{name}: must be a path, got {describe(value)}")
+        elif name == "checkpoint" and value is not None and Path(value).is_dir():
+            problems.append(f"checkpoint: {str(value)!r} is a folder; name a file")
+    if options["progress"] is not None and not callable(options["progress"]):
+        problems.append(f"progress: must be callable, got {describe(options['progress'])}")
     if not isinstance(options["method"], Rupture):
         problems.append(
             "method: must be a method object st.Rupture(loading_rate=...), got "
@@ -103,14 +124,26 @@ def _check(options: dict[str, Any]) -> None:
 
 def _initial(run: Run, slip: Any, load: float | None) -> State:
     if slip is None or load is None:
-        return run.start(first_slip(run))
-    start = np.asarray(slip, dtype=np.float64)
-    if start.shape != (run.medium.nodes,) or not np.all(start >= 0.0):
+        time = first_slip(run)
+        check_pace(run, time)
+        return run.start(time)
+    nodes = run.medium.nodes
+    try:
+        start = real_array(slip)
+    except TypeError:
+        start = np.full(1, np.nan)
+    if start.shape != (nodes,) or not (np.all(np.isfinite(start)) and np.all(start >= 0.0)):
         raise InputError(
-            f"initial_slip: must be ({run.medium.nodes},) and nowhere negative, got "
-            f"{describe(np.asarray(slip))}"
+            f"initial_slip: must be ({nodes},) numbers in m, finite and nowhere negative, got "
+            f"{describe(slip)}"
         )
-    return run.start(first_reach(run.history, float(load)), start)
+    time = first_reach(run.history, float(load), "initial_load")
+    if time == 0.0 and run.history[1][0] > load:
+        raise InputError(
+            f"initial_load: {load:.6g} Pa is below the load at t = 0, {run.history[1][0]:.6g} Pa"
+        )
+    check_pace(run, time)
+    return run.start(time, start)
 
 
 def simulate_rupture(
@@ -163,12 +196,14 @@ def simulate_rupture(
         given). Since steps shorten as the interface accelerates, frames are dense in time around
         onset anyhow.
     interval : float, optional
-        Smallest time between frames, s.
+        s; at most one frame in each interval of this length, counted from zero load.
     steps : bool
         Keep time, load, mean stress, ... of every step, over 'step'.
     stop : {"sliding", "onset", "arrest", "time"}
         When every node is at its residual strength; when the mean stress has fallen by
-        `method.event_drop`; when an instability has come to rest; or only at `end_time`.
+        `method.event_drop`; when an instability has come to rest (or every node is at its
+        residual strength after all); or only at `end_time`. Unless it waits for `end_time`, a run
+        also ends where nothing slips and the load has stopped rising for good ("rest").
     end_time : float, optional
         s; the run never goes beyond it (except for a part of the last explicit step).
     store : path, optional
@@ -211,7 +246,7 @@ def simulate_rupture(
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
     drop = float(np.mean(run.rows[0] - run.rows[1]))
-    if stop in ("arrest", "time"):
+    if stop == "time":
         run.control[track.SLID_STOP] = np.inf
     if stop == "onset":
         run.control[track.DROP_STOP] = method.event_drop * drop
@@ -239,12 +274,12 @@ def simulate_rupture(
     x = problem.interface.x
 
     def flush() -> None:
-        if stream is not None and len(frames):
-            stream.append(chunk_dataset(frames.take(), x, attributes))
+        if stream is not None and frames.pending:
+            stream.append(chunk_dataset(frames.take(), x, attributes), state.steps)
 
     if restart is None:
         frames.add(state)
-    last_frame = state.time
+    before = state.time
     next_checkpoint = state.steps + checkpoint_every
     reason = "max_steps"
     near = _NEAR_ONSET * drop
@@ -255,21 +290,22 @@ def simulate_rupture(
             falling = state.watch[track.LOCAL_STRESS] - state.mean_stress
             if every_near_onset is not None and state.explicit and falling < near:
                 count = every_near_onset
+            count = min(count, method.max_steps - state.steps)
             part = record[:count] if steps else NOTHING
             taken, code = run.advance(state, count, part)
             frames.add_steps(part[:taken])
             if code == track.NOT_FINITE:
                 check_finite(run, state, code)
             ended = _reason(code, run, state, stop)
-            if ended or interval is None or state.time - last_frame >= interval:
+            if ended or interval is None or state.time // interval > before // interval:
                 frames.add(state)
-                last_frame = state.time
+            before = state.time
             if progress is not None:
                 progress(_progress(state))
             if ended:
                 reason = ended
                 break
-            if stream is not None and len(frames) >= chunk:
+            if len(frames) >= chunk or frames.pending >= _MOST_STEPS:
                 flush()
             if checkpoint is not None and state.steps >= next_checkpoint:
                 flush()
@@ -280,14 +316,13 @@ def simulate_rupture(
         warnings.warn(str(error), AccuracyWarning, stacklevel=2)
     except BaseException:
         # Interrupted or out of disk: what was computed is worth keeping.
-        if stream is not None and len(frames):
-            _quietly(flush)
+        _quietly(flush)
         raise
     attributes["stopped"] = reason
+    flush()  # before the checkpoint, which counts on the frames up to it
     if checkpoint is not None and not reason.startswith("not finite"):
         write_checkpoint(checkpoint, run, state)
     if stream is not None:
-        flush()
         dataset = open_rupture(stream.folder, variables=(), steps=False)
         dataset.attrs["stopped"] = reason
         dataset.attrs["store"] = str(stream.folder)
@@ -313,6 +348,8 @@ def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
         return "arrest"
     if run.ended(state):
         return "time"
+    if stop != "time" and run.resting(state):
+        return "rest"
     return None
 
 

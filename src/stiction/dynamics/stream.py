@@ -16,7 +16,7 @@ from stiction.dynamics.frames import FIELDS, SCALARS, STEPS, TIME
 from stiction.errors import InputError
 from stiction.results import POSITION, to_dataset
 
-FORMAT = 1
+FORMAT = 2
 _MANIFEST = "rupture.json"
 
 
@@ -55,10 +55,10 @@ class Stream:
 
     def __init__(self, folder: str | Path, *, resume: bool = False) -> None:
         self.folder = Path(folder)
-        self.chunks: list[str] = []
+        self.chunks: dict[str, int] = {}  # and the last step each of them holds
         manifest = self.folder / _MANIFEST
         if manifest.exists() and resume:
-            self.chunks = list(_read_manifest(self.folder)["chunks"])
+            self.chunks = dict(_read_manifest(self.folder)["chunks"])
         elif self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
             raise InputError(
                 f"store: {str(self.folder)!r} exists and is not empty; give a new folder, or "
@@ -67,21 +67,15 @@ class Stream:
         self.folder.mkdir(parents=True, exist_ok=True)
 
     def drop_after(self, step: int) -> None:
-        """Forget chunks with frames later than a step: the restarted run writes them again."""
-        kept = []
-        for name in self.chunks:
-            with xr.open_dataset(self.folder / name, engine="netcdf4") as data:
-                last = int(data["step_number"].values[-1]) if data.sizes["time"] else 0
-            if last > step:
-                break
-            kept.append(name)
-        for name in self.chunks[len(kept) :]:
+        """Forget chunks with anything later than a step: the restarted run writes it again."""
+        kept = [name for name, last in self.chunks.items() if last <= step]
+        for name in list(self.chunks)[len(kept) :]:
             (self.folder / name).unlink(missing_ok=True)
-        self.chunks = kept
+        self.chunks = {name: self.chunks[name] for name in kept}
         self._write_manifest()
 
-    def append(self, dataset: xr.Dataset) -> None:
-        """Write one more chunk.
+    def append(self, dataset: xr.Dataset, last_step: int) -> None:
+        """Write one more chunk, which goes up to a step.
 
         Raises
         ------
@@ -94,10 +88,10 @@ class Stream:
                 self.folder / name,
                 lambda path: dataset.to_netcdf(path, engine="netcdf4"),
             )
-            self.chunks.append(name)
+            self.chunks[name] = last_step
             self._write_manifest()
         except (OSError, RuntimeError) as error:  # the NetCDF library reports a full disk so
-            self.chunks = [chunk for chunk in self.chunks if chunk != name]
+            self.chunks.pop(name, None)
             raise OSError(
                 f"store: cannot write {name} to {str(self.folder)!r} ({error}); the "
                 f"{len(self.chunks)} chunks before it are complete and can be opened"

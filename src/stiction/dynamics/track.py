@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from stiction._jit import jit
 
 # Fields of the `watch` array: plain float64, so that compiled steps and checkpoints share it.
@@ -10,8 +12,9 @@ PEAK_STRESS, PEAK_TIME, PEAK_LOAD, PEAK_NODE = 4, 5, 6, 7
 LOCAL_STRESS, IN_EVENT, FIRST_STRESS, ARRESTED = 8, 9, 10, 11
 EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
 EXPLICIT_STEPS, IMPLICIT_STEPS, REJECTED_STEPS, CALM_STEPS = 16, 17, 18, 19
-STEP, EVENT_START, RADIATED, PAST_STEP = 20, 21, 22, 23
-FIELDS = 24
+STEP, LOCAL_RADIATED, RADIATED, PAST_STEP = 20, 21, 22, 23
+KINETIC = 24  # Pa, mean stress when every node first was at its residual; -inf before
+FIELDS = 25
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED = range(6)
@@ -42,13 +45,20 @@ COLUMNS = 7
 CONTROLS = 15
 
 
+_AT_PEAK = 0.1  # of EVENT_DROP: so close below its maximum, the mean stress still is at it
+
+
 @jit
 def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-untyped-def]
-    """Update peaks and events with the state after a step.
+    """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
 
-    An event begins when the mean stress has fallen by EVENT_DROP below its last local maximum; it
-    was arrested if the stress radiated by slip, Z <V>, then falls below a tenth of that drop or
-    the mean stress rises above that maximum again before the whole interface slides.
+    The fall counts from the last local maximum, and only as far as waves carry it away: where the
+    load itself goes down, nothing has become unstable. An event begins when the fall exceeds
+    EVENT_DROP; it was arrested if the stress radiated by slip, Z <V>, then falls below a tenth of
+    that or the mean stress rises above that maximum again before the whole interface slides.
+
+    At slow loading all creeping patches are about equally slow at the maximum itself, so that
+    the place of the onset is read just after it.
     """
     watch[MEAN_STRESS] = mean_stress
     if mean_stress > watch[PEAK_STRESS]:
@@ -58,14 +68,19 @@ def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-
             load,
             node,
         )
+    fall = min(watch[LOCAL_STRESS] - mean_stress, radiated - watch[LOCAL_RADIATED])
+    if watch[PEAK_STRESS] - mean_stress < _AT_PEAK * watch[EVENT_DROP] and fall > 0.0:
+        watch[PEAK_NODE] = node
     if watch[IN_EVENT] > 0.0:
         if mean_stress > watch[LOCAL_STRESS] or radiated < 0.1 * watch[EVENT_DROP]:
             watch[IN_EVENT] = 0.0
-            watch[ARRESTED] += 1.0
-            watch[LOCAL_STRESS] = mean_stress
+            if watch[KINETIC] == -np.inf:  # after global sliding there is nothing left to arrest
+                watch[ARRESTED] += 1.0
+            watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
     elif mean_stress > watch[LOCAL_STRESS]:
-        watch[LOCAL_STRESS], watch[EVENT_START] = mean_stress, time
-    elif watch[LOCAL_STRESS] - mean_stress > watch[EVENT_DROP]:
+        watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
+    elif fall > watch[EVENT_DROP]:
         watch[IN_EVENT] = 1.0
-        if watch[FIRST_STRESS] < 0.0:
+        if watch[FIRST_STRESS] == -np.inf:
             watch[FIRST_STRESS] = watch[LOCAL_STRESS]
+    return fall
