@@ -122,6 +122,60 @@ def test_only_some_figures(tmp_path):
     shutil.rmtree(tmp_path)
 
 
+def test_the_same_command_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
+    """What is done is kept: nothing of it is computed again, and the results are the same."""
+    from stiction.paper import studies
+
+    class Interrupted(BaseException):
+        pass
+
+    def interrupt(context):
+        raise Interrupted
+
+    options = {**_options(), "full": False, "ruptures": 2, "only": ["problem", "growth"]}
+    with monkeypatch.context() as patch:
+        patch.setattr(studies.STUDIES["growth"], "compute", interrupt)
+        with pytest.raises(Interrupted):
+            st.paper.run(tmp_path, **options)
+    kept = {path.name.partition("-")[0] for path in (tmp_path / "studies").glob("*.nc")}
+    assert kept == {"theory", "monte_carlo"}
+    assert not (tmp_path / "report.html").exists()
+    done = []
+    for name in kept:
+        monkeypatch.setattr(studies.STUDIES[name], "compute", lambda context: done.append(context))
+    steps = []
+    st.paper.run(tmp_path, progress=lambda *step: steps.append(step), **options)
+    assert not done
+    assert steps[-1][0] == steps[-1][1]
+    # Another seed is another study.
+    with pytest.raises(AttributeError):
+        st.paper.run(tmp_path, **{**options, "seed": 1})
+    assert done
+
+
+def test_what_is_kept_but_damaged_is_computed_again(tmp_path):
+    options = {**_options(), "full": False, "only": ["mapping", "growth"]}
+    st.paper.run(tmp_path, **options)
+    (path,) = (tmp_path / "studies").glob("growth-*.nc")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    st.paper.run(tmp_path, **options)
+    assert path.stat().st_size == len(whole)
+
+
+@pytest.mark.slow
+def test_more_dynamic_samples_cost_only_what_is_new(tmp_path):
+    options = {**_options(), "only": ["fidelity"]}
+    st.paper.run(tmp_path, **{**options, "ruptures": 16})
+    with xr.open_dataset(tmp_path / "results.nc", group="dynamic") as study:
+        few = study["critical_stress"].values.copy()
+    steps = []
+    st.paper.run(tmp_path, progress=lambda *step: steps.append(step), **{**options, "ruptures": 24})
+    with xr.open_dataset(tmp_path / "results.nc", group="dynamic") as study:
+        np.testing.assert_array_equal(study["critical_stress"].values[:, :16], few)
+        assert study.sizes["sample"] == 24
+
+
 def test_all_mistakes_at_once(tmp_path):
     file = tmp_path / "file"
     file.write_text("")
@@ -132,3 +186,7 @@ def test_all_mistakes_at_once(tmp_path):
     for key in ("samples", "seed", "workers", "out"):
         assert f"{key}:" in text
     assert len(caught.value.problems) == 5
+    with pytest.raises(st.InputError, match="needs full"):
+        st.paper.run(tmp_path, only="fidelity")
+    with pytest.raises(st.InputError, match="ruptures"):
+        st.paper.run(tmp_path, full=True, ruptures=2)

@@ -234,6 +234,7 @@ def correlation_length(data: Data) -> Finding:
             Quantity("the same of tau_p", found[1]),
         ),
         Verdict.HOLDS if alike else Verdict.FAILS,
+        f"but the decay length is only {found[0].value:.2f} of xi_0" if alike else "",
     )
 
 

@@ -46,9 +46,8 @@ def tables(data: Data) -> list[Table]:
         for p, found in zip(
             PROBABILITIES, combined_quantiles(dear, cheap, PROBABILITIES), strict=True
         ):
-            error = found.estimate.error * np.sqrt(found.saving)
             rows.append(
-                (ratio, f"{100 * p:g} %", float(np.quantile(dear, p)), float(error),
+                (ratio, f"{100 * p:g} %", float(np.quantile(dear, p)), found.plain_error,
                  found.estimate.value, found.estimate.error, found.saving)
             )  # fmt: skip
     return [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import xarray as xr
 
 from stiction.paper.studies.context import Context, work
@@ -22,14 +24,11 @@ def cost(context: Context) -> int:
 def compute(context: Context) -> xr.Dataset:
     """Onset of samples 0, 1, ... of the Monte Carlo study, with inertia.
 
-    With a folder, runs are stored as they are done and an interrupted study goes on.
+    With a folder, runs are stored as they are done: an interrupted study goes on, and more of them
+    later cost only what is new.
     """
     setting = context.setting
-    place = None
-    if context.folder is not None:
-        import sys
-
-        place = place_of(sys.modules[__name__], context)
+    place = place_of(sys.modules[__name__], context, depends=("seed",))
     parts = []
     for ratio in setting.correlation_ratios:
         study = Study(

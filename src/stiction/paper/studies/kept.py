@@ -29,11 +29,12 @@ def _sources() -> str:
     return digest.hexdigest()
 
 
-def place_of(study: Any, context: Context) -> Path | None:
+def place_of(study: Any, context: Context, depends: tuple[str, ...] | None = None) -> Path | None:
     """Where its result is kept, without the ending; nowhere without a folder."""
     if context.folder is None:
         return None
-    depends = getattr(study, "depends", ("samples", "seed"))
+    if depends is None:
+        depends = getattr(study, "depends", ("samples", "seed"))
     defined = {
         "study": study.name,
         "needs": [str(place_of(_named(name), context)) for name in getattr(study, "needs", ())],

@@ -24,3 +24,30 @@ buttons.forEach((button) => {
     });
   });
 });
+// A click on a column's head sorts by it, numbers as numbers.
+const value = (row, column) => {
+  const text = row.cells[column].textContent.trim().replace(/\u2212/g, "-").replace(/,/g, "");
+  const number = parseFloat(text);
+  return Number.isNaN(number) ? text : number;
+};
+document.querySelectorAll(".numbers").forEach((table) => {
+  table.querySelectorAll("th").forEach((head, column) => {
+    head.addEventListener("click", () => {
+      const falling = head.getAttribute("aria-sort") === "ascending";
+      table.querySelectorAll("th").forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", falling ? "descending" : "ascending");
+      const rows = [...table.tBodies[0].rows];
+      rows.sort((a, b) => {
+        const [left, right] = [value(a, column), value(b, column)];
+        const order = typeof left === typeof right
+          ? (left > right) - (left < right)
+          : String(left).localeCompare(String(right));
+        return falling ? -order : order;
+      });
+      table.tBodies[0].append(...rows);
+    });
+  });
+});
+window.addEventListener("beforeprint", () => {
+  document.querySelectorAll("details.printed").forEach((part) => { part.open = true; });
+});
