@@ -7,7 +7,13 @@ import pytest
 
 import stiction as st
 from stiction.equilibrium.bound import smallest_window, window_mode
-from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
+from stiction.equilibrium.cholesky import (
+    append,
+    back_substitute,
+    raise_diagonal,
+    row_start,
+    substitute,
+)
 from stiction.equilibrium.large import Solution
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
@@ -64,6 +70,22 @@ def test_growing_factor_is_the_cholesky_factor(groups):
     back_substitute(factor, size, forward, solution)
     # The condition number is below 100, so that 1e-12 is generous.
     np.testing.assert_allclose(matrix @ solution, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("position", [0, 17, 40])
+def test_factor_of_a_matrix_with_a_raised_diagonal_entry(position):
+    column = stiffness_column(256, 0.1, 1e9)
+    nodes = np.random.default_rng(3).permutation(256)[:41]
+    factor, members = np.empty(row_start(260)), np.empty(260, dtype=np.int64)
+    append(factor, 0, members, nodes, 41, column, np.full(256, column[0]), 0.0)
+    raise_diagonal(factor, 41, position, 0.3 * column[0], np.empty((2, 41)))
+    matrix = column[np.abs(nodes[:, None] - nodes)]
+    matrix[position, position] += 0.3 * column[0]
+    reference = np.linalg.cholesky(matrix)
+    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(41)]
+    ours = np.array([np.pad(row, (0, 41 - row.size)) for row in rows])
+    # Rotations are as stable as the factorisation itself.
+    np.testing.assert_allclose(ours, reference, atol=1e-12 * reference.max())
 
 
 def test_factor_stops_at_the_node_that_makes_the_matrix_singular():

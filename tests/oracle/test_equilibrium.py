@@ -159,6 +159,24 @@ def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, r
         np.testing.assert_allclose(large.slip, dense.slip, atol=1e-10 * sample.critical.max())
 
 
+def test_patches_alike_on_a_long_interface(solid):
+    """Thirty-two periods of a profile let go at the load of one: all patches are singular at once.
+
+    By symmetry there is a multiplier with the period of the profile. Conjugate gradients stall
+    here, and the dense factor must take over.
+    """
+    dip = 1e6 + 0.3e6 * np.cos(2.0 * np.pi * np.arange(128) / 128)
+    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    loads = []
+    for periods in (1, 32):
+        problem = st.Problem(solid, st.Interface(0.0135 * periods, 128 * periods), friction)
+        sample = sample_of(problem.rows(np.tile(dip, periods)), 0)
+        found = Setting(problem).programme(sample.excess, sample.rate)
+        assert found is not None
+        loads.append(found.load)
+    assert loads[1] == pytest.approx(loads[0], rel=1e-11)
+
+
 @pytest.mark.parametrize("high", [1.66e6, 2.5e6, 4.0e6])
 @pytest.mark.parametrize("low", [0.1e6, 0.66e6])
 def test_events_against_relaxation(problem, low, high):

@@ -9,6 +9,7 @@ import stiction as st
 from stiction.equilibrium.events import equilibrium_events
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
+from stiction.equilibrium.solver import Solver
 
 
 def test_unstable_before_it_is_loaded(problem):
@@ -69,3 +70,9 @@ def test_variables_are_labelled(problem, make_strength):
     for name, variable in method.variables.items():
         assert onset[name].attrs["units"] == variable.units
         assert onset[name].dims == variable.dims
+
+
+@pytest.mark.parametrize("gap", [1.0, np.nan])
+def test_bounds_that_do_not_close_are_not_passed_over(gap):
+    with pytest.warns(st.AccuracyWarning, match="did not close in 1 of 2"):
+        Solver._check(np.array([1e-6, gap]), np.full(2, 1e6))

@@ -43,9 +43,7 @@ class Solution:
     slip: Array
     stiff: Array
     multiplier: Array
-    cuts: int = 0
     status: int = SOLVED
-    iterations: int = 0
 
 
 def window_solution(
@@ -182,11 +180,10 @@ class LargeProgram:
             self.nodes.remove(negative)
             slip[negative] = 0.0
 
-    def run(self) -> Solution:
-        """Solve."""
+    def run(self, patience: float = np.inf) -> Solution:
+        """Solve, or give up as STALLED after `patience` iterations."""
         n = self.excess.shape[0]
         tolerance = OVERSTRESS * self.scale
-        cuts = 0
         status = STALLED
         slip = np.zeros(n)
         load = min(self.bound, self.cap)
@@ -195,6 +192,8 @@ class LargeProgram:
         slip, _ = self.slip_at(load, slip, share)
         stiff = self.stiffness(slip)
         for _ in range(PASSES):
+            if self.iterations > patience:
+                break
             margin = self.excess - load * self.profile + stiff
             margin[self.nodes.inside] = 0.0
             over = np.flatnonzero(margin < -max(tolerance, 10.0 * share * self.scale))
@@ -233,7 +232,6 @@ class LargeProgram:
                     self.nodes.append(np.array([node]))
                     slip = slip + (-margin[node] / pivot) * y
                 else:
-                    cuts += 1
                     value = self.cut(node, y)
                     settled = value >= load - tolerance
                     load = min(load, self.bound)
@@ -244,6 +242,4 @@ class LargeProgram:
                         break
             stiff = self.stiffness(slip)
         slip = np.maximum(slip, 0.0)
-        return Solution(
-            load, slip, self.stiffness(slip), self.multiplier, cuts, status, self.iterations
-        )
+        return Solution(load, slip, self.stiffness(slip), self.multiplier, status)

@@ -11,7 +11,7 @@ from stiction._model import to_plain
 from stiction._typing import Array
 from stiction.equilibrium.follow import State, at_rest, follow, residual_nodes
 from stiction.equilibrium.setting import Setting
-from stiction.equilibrium.solver import refuse_overstressed, sample_of
+from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.spaces import Sample
 from stiction.errors import InputError
 from stiction.problem import Problem
@@ -118,7 +118,6 @@ def equilibrium_path(
     )
     if rows.count != 1:
         raise InputError(f"tau_p: must be one profile of shape (nodes,), got {rows.count} samples")
-    refuse_overstressed(rows)
     setting = Setting(problem)
     sample = sample_of(rows, 0)
     path = Path(setting, sample)

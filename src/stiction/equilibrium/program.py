@@ -140,7 +140,7 @@ def solve_program(
     slip: Array,
     stiff: Array,
     room: Room,
-) -> tuple[float, int, int, int]:
+) -> tuple[float, int]:
     """Critical load with slip and multiplier, from an upper bound and its multiplier.
 
     Parameters
@@ -162,7 +162,7 @@ def solve_program(
 
     Returns
     -------
-    load, size, cuts, status : float, int, int, int
+    load, status : float, int
         SOLVED, STALLED after too many passes, or OVERFULL: more members than there is room for.
     """
     load = min(bound, cap)
@@ -174,7 +174,6 @@ def solve_program(
     inside[:] = False
     stiff[:] = 0.0
     size = ZERO
-    cuts = 0
     status = STALLED
     for _ in range(PASSES):
         count = overstressed(load, excess, profile, stiff, room, tolerance)
@@ -195,7 +194,6 @@ def solve_program(
         failed = size < before + count
         settled = False
         if failed:
-            cuts += 1
             direction = room.vectors[3]
             singular_direction(room, size, direction)
             above = 0.0
@@ -234,4 +232,4 @@ def solve_program(
     slip[:] = 0.0
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
-    return load, size, cuts, status
+    return load, status

@@ -22,6 +22,8 @@ LARGE_GRID = 4096
 """Nodes from which on the large path may be faster."""
 MANY_NODES = 600
 """Nodes weaker than the upper bound of the load from which on it is."""
+PATIENCE = 1000
+"""Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
 
 
 @dataclass
@@ -97,22 +99,32 @@ class Setting:
             Load (Pa) not to go beyond.
         """
         bound = self.bound(excess, rate)
-        if not self.is_large(excess, bound):
-            room = make_room(self.nodes)
-            room.diagonal[:] = self.grid.column[0] - rate
-            slip, stiff = np.empty(self.nodes), np.empty(self.nodes)
-            load, _, cuts, status = solve_program(
-                excess, self.profile, self.grid, bound.load, cap, bound.multiplier, slip, stiff,
-                room,
-            )  # fmt: skip
-            if status != OVERFULL:
-                if status != SOLVED:
-                    return None
-                return Solution(load, slip, stiff, bound.multiplier, cuts, status, 0)
-        solution = LargeProgram(
+        if self.is_large(excess, bound):
+            found = self._by_segments(excess, rate, bound, cap, PATIENCE)
+            if found is not None:
+                return found
+        # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
+        room = make_room(self.nodes)
+        room.diagonal[:] = self.grid.column[0] - rate
+        slip, stiff, multiplier = (
+            np.empty(self.nodes),
+            np.empty(self.nodes),
+            bound.multiplier.copy(),
+        )
+        load, status = solve_program(
+            excess, self.profile, self.grid, bound.load, cap, multiplier, slip, stiff, room
+        )
+        if status == SOLVED:
+            return Solution(load, slip, stiff, multiplier)
+        return self._by_segments(excess, rate, bound, cap) if status == OVERFULL else None
+
+    def _by_segments(
+        self, excess: Array, rate: Array, bound: Bound, cap: float, patience: float = np.inf
+    ) -> Solution | None:
+        found = LargeProgram(
             excess, self.profile, rate, self.grid, bound.load, bound.multiplier, cap
-        ).run()
-        return solution if solution.status == SOLVED else None
+        ).run(patience)
+        return found if found.status == SOLVED else None
 
     def gap(self, excess: Array, rate: Array, solution: Solution, stiff_multiplier: Array) -> float:
         """Distance of the bounds by slip and multiplier, Pa; K y is left in the last argument."""
