@@ -8,6 +8,8 @@ from scipy.stats import binom
 
 import stiction as st
 from stiction.reliability.estimate import failure_probability
+from stiction.reliability.limit_state import make_limit_state
+from stiction.reliability.plain import Count
 from stiction.reliability.tails import weakest_link
 from stiction.reliability.uncertainty import (
     ancestral_variance,
@@ -35,6 +37,13 @@ def test_beyond_the_bounds_nothing_is_sampled(system, stress, expected):
     assert result.stress_above_bound == stress - 0.66e6
 
 
+def test_all_of_a_count_is_not_certainty():
+    assert Count(0, 100).coefficient_of_variation == math.inf
+    # As if one in 101 had held.
+    assert Count(100, 100).coefficient_of_variation == pytest.approx(1.0 / math.sqrt(101 * 100))
+    assert Count(50, 100).coefficient_of_variation == pytest.approx(0.1)
+
+
 def test_bounds_follow_load_and_initial_stress():
     """Nothing slips below min (tau_p - tau_i)/p; in mean stress that is <tau_i> + load <p>."""
     nodes = 256
@@ -49,6 +58,18 @@ def test_bounds_follow_load_and_initial_stress():
     assert below.probability == 0.0
     onset = st.onset(problem, field.sample(base.interface, samples=500), method=st.LocalCriterion())
     assert float(onset["critical_stress"].min()) > below.lower_bound
+
+
+def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
+    """Strength in jumps between its two bounds, on few nodes: the filtered profile overshoots."""
+    problem = st.paper.problem(nodes=256)
+    marginal = st.Beta(alpha=0.2, beta=0.2, low=0.66e6, high=1.66e6)
+    field = st.RandomField(marginal, st.paper.strength(problem, 0.5).spectrum)
+    profiles = field.sample(problem.interface, samples=200)
+    found = st.onset(problem, profiles, method=st.LocalCriterion())
+    assert float(found["critical_stress"].min()) < 0.66e6
+    state = make_limit_state(problem, field, st.LocalCriterion(), 0, {}, "critical_stress", 1)
+    assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
 
 def test_binomial_interval_has_its_coverage():

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from stiction.reliability.pooled import Tail, run_until_precise
 from stiction.reliability.subset import descend
-from stiction.reliability.two_level import bridge
+from stiction.reliability.two_level import agreement, bridge
 from stiction.reliability.uncertainty import generator
 
 DIMENSION = 600
@@ -163,3 +163,46 @@ def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
     seen = math.exp(run.log_probability) * np.mean(run.values < -4.0)
     assert run.probability(-4.0) == pytest.approx(seen / run.last, rel=1e-12)
     assert run.wobble > 0.0
+
+
+def test_a_poor_first_stage_is_told_by_its_ranks():
+    rng = np.random.default_rng(0)
+    exact = rng.standard_normal(1000)
+    assert agreement(exact, exact) == 1.0
+    assert agreement(3.0 * exact**3 + 7.0, exact) == 1.0
+    # Independent ranks: a tenth, and 20 samples to tell it from.
+    assert agreement(rng.standard_normal(1000), exact) < 0.5
+    # Half of the failures come from what the cheap limit state does not see.
+    draws = rng.standard_normal((1000, 2))
+    assert agreement(draws[:, 0], draws.min(axis=1)) < 0.8
+
+
+def test_runs_over_two_levels_that_find_no_failure_count_as_well():
+    """The exact limit state lets go of one in a thousand of what the cheap one does."""
+
+    def cheap(draws):
+        return draws[:, 0]
+
+    def exact(draws):
+        return np.where(draws[:, 1] < -3.0, draws[:, 0], draws[:, 0] + 10.0)
+
+    runs = [
+        bridge(
+            cheap,
+            exact,
+            10,
+            samples=100,
+            rng=generator(seed, 4),
+            max_evaluations=10**5,
+            threshold=-2.0,
+        )
+        for seed in range(600)
+    ]
+    found = np.array([run.probability(-2.0) for run in runs])
+    truth = norm.cdf(-2.0) * norm.cdf(-3.0)
+    assert all(run.complete for run in runs)
+    assert np.mean(found == 0.0) > 0.9
+    # Some 20 runs find one: four standard errors of their number. Were those that find none left
+    # out, or replaced by a look at a more frequent level, the mean would be thirty times too high.
+    error = found.std(ddof=1) / math.sqrt(found.size)
+    assert abs(found.mean() - truth) < 4.0 * error

@@ -59,8 +59,13 @@ def test_everything_wrong_is_named_at_once(system):
         failure_probability(*system, 0.67e6, method=LOCAL, seed=-1)
     with pytest.raises(st.InputError, match="event"):
         failure_probability(*system, 0.67e6, method=LOCAL, event="collapse")
-    with pytest.raises(st.InputError, match="workers"):
-        failure_probability(*system, 0.67e6, method=LOCAL, workers=0)
+    for workers in (0, "two", 1.5):
+        with pytest.raises(st.InputError, match="workers"):
+            failure_probability(*system, 0.67e6, method=LOCAL, workers=workers)
+    for name in ("target_cov", "confidence", "max_evaluations"):
+        for value in ("much", None if name != "max_evaluations" else True, [0.1]):
+            with pytest.raises(st.InputError, match=name):
+                failure_probability(*system, 0.67e6, method=LOCAL, **{name: value})
 
 
 def test_unknown_algorithm_offers_the_nearest(system):
@@ -144,6 +149,42 @@ def test_too_few_evaluations_return_what_there_is(system, algorithm):
     assert low < 8e-5 < high < 0.1
 
 
+@pytest.mark.parametrize("algorithm", ["auto", "plain", "subset", "importance", "two_level"])
+@pytest.mark.parametrize("allowed", [100, 400])
+def test_the_smallest_budgets_are_kept_to(system, algorithm, allowed):
+    with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
+        result = failure_probability(
+            *system,
+            0.665e6,
+            method=Equilibrium(),
+            algorithm=algorithm,
+            target_cov=0.05,
+            max_evaluations=allowed,
+        )
+    assert 0 < result.evaluations <= allowed
+    # P is about 7e-5.
+    assert result.interval[0] < 7e-5 < result.interval[1]
+
+
+def test_auto_leaves_a_first_stage_that_picks_others():
+    """With a wide range of strength most first instabilities are arrested."""
+    base = st.paper.problem(nodes=256)
+    field = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.1e6, high=4e6),
+        st.PowerLawSpectrum(correlation_length=2.0 * base.nucleation_length),
+    )
+    result = failure_probability(
+        base, field, 0.34e6, method=Equilibrium(), target_cov=0.5, max_evaluations=1500
+    )
+    assert result.algorithm == "subset"
+    assert "the local criterion picks only" in result.reason
+    answer = design_stress(
+        base, field, probability=5e-3, method=Equilibrium(), target_cov=0.5, max_evaluations=1500
+    )
+    assert answer.algorithm == "subset"
+    assert "only" in answer.reason
+
+
 def test_budget_too_small_for_any_failure(system):
     with pytest.warns(st.AccuracyWarning, match="come down to"):
         result = failure_probability(
@@ -173,6 +214,9 @@ def test_a_median_interface_that_fails_at_once(system):
     result = failure_probability(*system, 0.99e6, method=LOCAL, algorithm="subset")
     assert result.probability == 1.0
     assert len(result.levels) == 1
+    # A thousand of a thousand: by Clopper and Pearson at least 0.025^(1/1000).
+    assert result.interval == (pytest.approx(0.025**0.001), 1.0)
+    assert result.coefficient_of_variation == pytest.approx(1e-3, rel=0.01)
     with pytest.warns(st.AccuracyWarning, match="median interface"):
         shifted = failure_probability(*system, 0.99e6, method=LOCAL, algorithm="importance")
     assert shifted.probability == pytest.approx(1.0)
@@ -226,6 +270,11 @@ def test_command_names_mistakes(app, tmp_path):
     with pytest.raises(st.InputError, match="cannot be read"):
         CliRunner().invoke(app, [str(tmp_path / "none.toml")], catch_exceptions=False)
     (tmp_path / "file").write_text("")
+    late = ["examples/reliability.toml", "--out", str(tmp_path / "out"), "--stress", "nan"]
+    with pytest.raises(st.InputError) as caught:
+        CliRunner().invoke(app, [*late, "--probability", "2"], catch_exceptions=False)
+    assert all(name in str(caught.value) for name in ("--stress", "--probability"))
+    assert not (tmp_path / "out").exists()
     example = "examples/reliability.toml"
     with pytest.raises(st.InputError, match="--out"):
         CliRunner().invoke(

@@ -65,8 +65,8 @@ def reliability(
     a whole lets go below it.
     """
     from stiction.reliability.curve import failure_curve
-    from stiction.reliability.design import design_stress
-    from stiction.reliability.estimate import failure_probability
+    from stiction.reliability.design import check_probability, design_stress
+    from stiction.reliability.estimate import check_stress, failure_probability
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
     from stiction.study import Study
@@ -79,6 +79,11 @@ def reliability(
         "initial_stress": loaded.initial_stress,
         "weakening_rate": loaded.weakening_rate,
     }
+    # What is asked for last is refused first: the curve may take minutes.
+    mistakes = [] if stress is None else check_stress("--stress", stress)
+    mistakes += [] if probability is None else check_probability("--probability", probability)
+    if mistakes:
+        raise InputError(mistakes)
     _folder(out)
 
     def save(figure: Any, name: str) -> None:
@@ -148,6 +153,7 @@ def reliability(
             plain_samples=plain_samples,
             seed=seed,
             workers=workers,
+            **others,
         )
         figures.tail_table(several).write_csv(out)
         save(figures.tail_figure(several), "failure_tails")

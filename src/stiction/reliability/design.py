@@ -217,7 +217,7 @@ def _finish(
         interval = stress_interval(tail, probability, cov, confidence, lowest)
         if cov > target_cov:
             doubts.append(
-                f"the coefficient of variation of the probability is {cov:.2g}, not"
+                f"the coefficient of variation of the probability is {cov:.3g}, not"
                 f" {target_cov:g}: {evaluations} evaluations do not suffice; raise max_evaluations"
             )
     else:

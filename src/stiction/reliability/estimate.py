@@ -55,6 +55,13 @@ def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list
     return problems
 
 
+def check_stress(name: str, value: Any) -> list[str]:
+    """Why a number is no stress."""
+    if real_number(value) and math.isfinite(value):
+        return []
+    return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
+
+
 def usable_first_stage(state: LimitState) -> str | None:
     """Why two levels are not possible, or None if they are."""
     if state.method.type != "equilibrium":
@@ -200,8 +207,7 @@ def failure_probability(
         "weakening_rate": weakening_rate,
     }
     problems = check_target(target_cov, confidence, max_evaluations)
-    if not (real_number(stress) and math.isfinite(stress)):
-        problems.append(f"stress: must be a finite number in Pa, got {describe(stress)}")
+    problems += check_stress("stress", stress)
     state = make_limit_state(
         problem,
         strength,

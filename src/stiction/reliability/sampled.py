@@ -75,7 +75,7 @@ def _missed(request: Request, cov: float) -> list[str]:
     if cov <= request.target_cov:
         return []
     return [
-        f"the coefficient of variation is {cov:.2g}, not {request.target_cov:g}:"
+        f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}:"
         f" {request.budget + request.spent} evaluations do not suffice; raise max_evaluations"
     ]
 

@@ -113,6 +113,9 @@ def tail_study(
     target_cov: float = 0.3,
     plain_samples: int = 10_000,
     seed: int = 0,
+    residual_strength: RandomField | None = None,
+    initial_stress: RandomField | None = None,
+    weakening_rate: RandomField | None = None,
     workers: int | None = None,
 ) -> TailStudy:
     """Failure curves for several correlation lengths, two lengths and three lower ends.
@@ -126,10 +129,17 @@ def tail_study(
     method : LocalCriterion or Equilibrium
     smallest, target_cov, plain_samples, seed, workers
         As in `failure_curve`.
+    residual_strength, initial_stress, weakening_rate : RandomField, optional
+        What is random besides the strength; the same in all curves.
 
     Returns
     -------
     TailStudy
+
+    Raises
+    ------
+    InputError
+        If something varies along the interface, or the spectrum has no correlation length.
     """
     if isinstance(strength.spectrum, CustomSpectrum):
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
@@ -139,6 +149,9 @@ def tail_study(
         "target_cov": target_cov,
         "plain_samples": plain_samples,
         "seed": seed,
+        "residual_strength": residual_strength,
+        "initial_stress": initial_stress,
+        "weakening_rate": weakening_rate,
         "workers": workers,
     }
     long = longer(problem, LONGER)
