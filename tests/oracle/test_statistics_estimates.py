@@ -110,6 +110,18 @@ def test_density_does_not_leak_through_bounds():
     assert scipy.stats.gaussian_kde(sample)(0.0)[0] < 0.6
 
 
+@pytest.mark.parametrize(
+    "sample",
+    [np.repeat([1.0, 2.0, 3.0], 10), np.concatenate([np.arange(20.0), 1e4 + np.arange(20.0)])],
+    ids=["ties", "far apart"],
+)
+def test_density_of_spikes_still_has_mass_one(sample):
+    """A kernel as narrow as a cell rings; what is cut off below zero must not be added."""
+    found = density(sample, bounds=(0.0, None))
+    assert found.value.min() >= 0.0
+    assert found.value.sum() * (found.x[1] - found.x[0]) == pytest.approx(1.0, abs=1e-9)
+
+
 def test_density_from_counts_is_the_same():
     sample = RNG.beta(2.0, 3.0, size=5000)
     low, high = 0.0, 1.0

@@ -141,7 +141,9 @@ def density_of_counts(counts: Any, low: float, high: float, *, effective: float)
     smooth = scipy.fft.idct(cosine * np.exp(-0.5 * (k * math.pi) ** 2 * time), type=2) * cells
     width = high - low
     bandwidth = math.sqrt(time) * width
-    value = np.maximum(smooth, 0.0) / width
+    # Where the bandwidth is down to a cell the cosine series rings below zero.
+    value = np.maximum(smooth, 0.0)
+    value *= cells / (value.sum() * width)
     roughness = 1.0 / (2.0 * math.sqrt(math.pi) * bandwidth)  # integral of the kernel squared
     return Density(
         x=low + (np.arange(cells) + 0.5) * (width / cells),
