@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 _COLORS = "inferno_r"
 _SLOWEST, _FASTEST = 1e-6, 10.0  # m/s, ends of the colour scale
-_BEFORE = 12e-6  # s of creep before the peak that the zoom shows
+_BEFORE = 0.11  # creep before the peak that the zoom shows, in units of L/c_s
 _MEGA, _MILLI, _MICRO = 1e6, 1e3, 1e6
 
 
@@ -133,7 +133,8 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         top.set_ylabel(r"$\tau_p$ (MPa)")
         top.set_ylim(strength.min() - 0.05, height + 0.25 * np.ptp(strength))
 
-        near = np.flatnonzero(times >= onset - _BEFORE)
+        before = _BEFORE * problem.interface.length / problem.solid.shear_wave_speed
+        near = np.flatnonzero(times >= onset - before)
         near = near if near.size > 2 else np.arange(times.size)
         _mesh(zoom, x, (times[near] - onset) * _MICRO, rate[near])
         zoom.set_ylabel(r"$t - T$ (µs)")
