@@ -44,6 +44,7 @@ def test_unknown_option():
         ([np.nan], "finite"),
         ([], "one-dimensional"),
         ("many", "array of numbers"),
+        ([1e5 + 1j], "complex"),
     ],
 )
 def test_loads_of_a_path(problem, loads, message):

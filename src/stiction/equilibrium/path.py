@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiction._model import to_plain
+from stiction._model import real_array, to_plain
 from stiction._typing import Array
 from stiction.equilibrium.follow import State, at_rest, follow, residual_nodes
 from stiction.equilibrium.setting import Setting
@@ -56,11 +56,9 @@ class Path:
 
 def _check_loads(loads: Any) -> Array:
     try:
-        given = np.atleast_1d(np.asarray(loads, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(
-            f"loads: must be an array of numbers (Pa), got {type(loads).__name__}"
-        ) from None
+        given = np.atleast_1d(real_array(loads))
+    except TypeError as error:
+        raise InputError(f"loads: must be an array of numbers (Pa); {error}") from None
     if given.ndim != 1 or given.size == 0 or not np.all(np.isfinite(given)):
         raise InputError(
             f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
