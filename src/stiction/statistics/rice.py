@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,8 @@ LEVELS = 1024
 BATCH = 256
 TRUSTED_PROBABILITY = 0.1
 FEWEST_CROSSINGS = 10
+ENOUGH_POINTS = 32
+"""Points in h_n at which crossings are counted; at 8, one in six of the rare ones is missed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +122,16 @@ def rice_distribution(
     if isinstance(profiles, bool) or not isinstance(profiles, int) or profiles < 16:
         raise InputError(f"profiles: must be a whole number >= 16, got {profiles!r}")
 
+    # A dip that only just reaches down between two nodes is a crossing as well.
+    factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / problem.nucleation_length)
+    points = factor * problem.interface.nodes
+
     def batches() -> Any:
         for first in range(0, profiles, BATCH):
             count = min(BATCH, profiles - first)
             tau_p = strength.sample(problem.interface, samples=count, seed=seed, first=first)
-            yield nucleation_stress(problem, tau_p)
+            tau_n = nucleation_stress(problem, tau_p)
+            yield tau_n if factor == 1 else _refined(tau_n, points)
 
     if stress is None:
         # Two passes over the same samples instead of keeping them: memory does not grow with them.
@@ -140,7 +148,7 @@ def rice_distribution(
     for tau_n in batches():
         _count_crossings(tau_n, levels, crossings, below)
     seen = np.cumsum(crossings)[:-1]
-    survival = 1.0 - np.cumsum(below)[:-1] / (profiles * problem.interface.nodes)
+    survival = 1.0 - np.cumsum(below)[:-1] / (profiles * points)
     rate = seen / (profiles * problem.interface.length)
     with np.errstate(divide="ignore", invalid="ignore"):
         exponent = np.where(survival > 0.0, problem.interface.length * rate / survival, np.inf)
@@ -154,6 +162,14 @@ def rice_distribution(
         trusted=(probability <= TRUSTED_PROBABILITY) & (seen >= FEWEST_CROSSINGS),
         profiles=profiles,
     )
+
+
+def _refined(rows: Array, points: int) -> Array:
+    """Rows evaluated at more points, by their trigonometric interpolant."""
+    spectrum = np.fft.rfft(rows, axis=1)
+    spectrum[:, -1] *= 0.5  # the highest wave of an even grid stands for both of its signs
+    result: Array = np.fft.irfft(spectrum, points, axis=1) * (points / rows.shape[1])
+    return result
 
 
 @jit
