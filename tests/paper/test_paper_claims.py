@@ -11,10 +11,11 @@ from stiction.paper.claims import CLAIMS, Finding, Verdict, judged
 from stiction.paper.claims.claim import SUBJECTS, rounded
 from stiction.paper.claims.rules import agrees, below, falling, rising, worst
 from stiction.paper.data import Data
-from stiction.paper.derived import misplaced
+from stiction.paper.derived import misplaced, release_rate
 from stiction.paper.setting import Setting
 from stiction.paper.studies import STUDIES, compute
 from stiction.paper.studies.context import Context
+from stiction.paper.studies.growth import patches
 from stiction.statistics.estimates import Estimate
 
 FALLING = [Estimate(3.0, 0.1), Estimate(2.0, 0.1), Estimate(1.0, 0.1)]
@@ -138,6 +139,45 @@ def test_mirrored_strength_changes_verdicts(findings):
     assert mirror["runaway-length"].verdict is Verdict.FAILS  # a larger stress drop
     skewness = mirror["nucleation-skewness"].computed[0].estimate
     assert skewness.value < 0.0
+
+
+def test_the_formula_holds_in_the_plane_state_that_it_belongs_to():
+    """Printed for plane stress, G/(1-nu) is right in plane strain: the same rules then say so."""
+    setting = Setting(problem=st.paper.problem(nodes=256, plane="strain"))
+    context = Context(setting, 64, 0, ruptures=5)
+    data = Data(setting, 64, 0, compute(["ruptures"], context))
+    assert CLAIMS["simulations-predicted"].judge(data).verdict is Verdict.HOLDS
+    assert CLAIMS["simulations-interaction"].judge(data).verdict is Verdict.HOLDS
+
+
+def test_patches_of_a_periodic_interface():
+    slipping = np.array([1, 1, 0, 1, 0, 0, 1, 1], dtype=bool)
+    found = patches(slipping)
+    assert found.max() + 1 == 2  # the ends are neighbours
+    assert found[0] == found[1] == found[6] == found[7] != found[3]
+    np.testing.assert_array_equal(found < 0, ~slipping)
+    assert patches(np.zeros(4, dtype=bool)).max() == -1
+    assert patches(np.ones(4, dtype=bool)).max() == 0
+
+
+def test_release_rate_is_the_slope_of_the_energy():
+    """G = -dE/dh at constant load: E of a shear crack by its elliptic slip, central difference."""
+    setting = Setting()
+    data = Data(setting, 0, 0, {})
+    problem, stress = setting.problem, 0.7e6
+
+    def released(length):
+        # Slip 2 drop/G* sqrt(a^2 - x^2): the load does work drop times its integral, half stored.
+        half = 0.5 * length * problem.nucleation_length
+        x = half * np.cos(np.linspace(0.0, np.pi, 20001))
+        slip = 2.0 * stress / problem.effective_modulus * np.sqrt(np.maximum(half**2 - x**2, 0.0))
+        return 0.5 * stress * abs(np.trapezoid(slip, x))
+
+    step = 1e-3
+    slope = (released(2.0 + step) - released(2.0 - step)) / (2.0 * step * problem.nucleation_length)
+    # The difference of a parabola is exact, the integral good to 1e-8. As h grows by dh each tip
+    # advances by dh/2, so that both together release G dh.
+    assert float(release_rate(data, stress, 2.0)) == pytest.approx(slope, rel=1e-6)
 
 
 def test_misplaced_counts_the_shorter_way_round():

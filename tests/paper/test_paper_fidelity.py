@@ -6,7 +6,7 @@ import scipy.stats
 
 from stiction.paper.fidelity import combined_mean, combined_quantiles
 
-N, FEW, REPEATS = 4000, 100, 200
+N, FEW, REPEATS = 4000, 100, 150
 SCATTER = 0.1  # of what the cheap result misses, in units of its own spread
 
 
@@ -33,10 +33,10 @@ def test_mean(found):
     values = np.array([each.estimate.value for each in means])
     errors = np.array([each.estimate.error for each in means])
     exact = 0.3 + 1.2 * 2.0
-    # The mean of 200 repetitions is known to 1/sqrt(200) of their scatter: three of that.
+    # The mean of 150 repetitions is known to 1/sqrt(150) of their scatter: three of that.
     assert abs(values.mean() - exact) < 3.0 * values.std() / np.sqrt(REPEATS)
-    # A standard deviation from 200 values is known to 5 %; three of that.
-    assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=0.15)
+    # A standard deviation from 150 values is known to 6 %; three of that.
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=0.18)
     # Var Y/n over its parts: residual/n + b^2 Var X/N, Var X = 1.
     saving = (1.44 + SCATTER**2) / FEW / (SCATTER**2 / FEW + 1.44 / N)
     assert np.mean([each.saving for each in means]) == pytest.approx(saving, rel=0.1)

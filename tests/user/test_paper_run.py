@@ -154,7 +154,7 @@ def test_the_same_command_goes_on_where_it_was_interrupted(tmp_path, monkeypatch
 
 
 def test_what_is_kept_but_damaged_is_computed_again(tmp_path):
-    options = {**_options(), "full": False, "only": ["mapping", "growth"]}
+    options = {**_options(), "full": False, "only": ["growth"]}
     st.paper.run(tmp_path, **options)
     (path,) = (tmp_path / "studies").glob("growth-*.nc")
     whole = path.read_bytes()

@@ -30,6 +30,7 @@ RUNS = 20
 _FEW = 2
 _FEWEST_DYNAMIC = 16
 DYNAMIC = 1000
+_DRAWING = 10_000  # work of a figure, for progress
 
 
 def run(
@@ -104,14 +105,18 @@ def run(
     figures = [figure for figure in figures if there.issuperset(figure.needs)]
     claims = list(CLAIMS.values()) if only is None else _claims_of(figures)
     claims = [claim for claim in claims if there.issuperset(claim.needs)]
-    needed = {need for item in (*figures, *claims) for need in item.needs}
-    with progress_bar(studies.cost(needed, context), "paper", progress) as context.report:
+    needed = studies.with_needs(need for item in (*figures, *claims) for need in item.needs)
+    total = studies.cost(needed, context) + _DRAWING * len(figures)
+    with progress_bar(total, "paper", progress) as context.report:
         results = studies.compute(needed, context)
-    data = Data(context.setting, context.samples, seed, results)
-    findings = judged(data, claims)
-    (folder / "figures").mkdir(parents=True, exist_ok=True)
-    (folder / "tables").mkdir(exist_ok=True)
-    shown = [_draw(figure, data, folder) for figure in figures]
+        data = Data(context.setting, context.samples, seed, results)
+        findings = judged(data, claims)
+        (folder / "figures").mkdir(parents=True, exist_ok=True)
+        (folder / "tables").mkdir(exist_ok=True)
+        shown = []
+        for figure in figures:
+            shown.append(_draw(figure, data, folder))
+            context.report(_DRAWING)
     for table in (table for figure in shown for table in figure.tables):
         table.write_csv(folder / "tables")
     claims_table(findings).write_csv(folder / "tables")
@@ -162,6 +167,7 @@ def _draw(figure: Any, data: Data, folder: Path) -> ShownFigure:
     with paper_style():
         drawn = figure.draw(data)
         drawn.savefig(buffer, format="png")
+        drawn.set_layout_engine("none")  # panels stay where they are
         drawn.savefig(path.with_suffix(".pdf"))
     path.with_suffix(".png").write_bytes(buffer.getvalue())
     return ShownFigure(

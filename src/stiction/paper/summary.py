@@ -16,7 +16,8 @@ from stiction.paper.claims import SUBJECTS, Claim, Finding, Verdict
 from stiction.paper.claims.claim import rounded
 from stiction.paper.claims.rules import kilopascal, megapascal
 from stiction.paper.data import Data
-from stiction.paper.derived import displaced, misplaced, overprediction, shift_of
+from stiction.paper.derived import displaced, fidelity, misplaced, overprediction, shift_of
+from stiction.paper.fidelity import combined_mean
 from stiction.report.page import ShownClaim, ShownFigure, render
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean, standard_deviation
@@ -120,6 +121,8 @@ def _points(data: Data, findings: Judged) -> list[str]:
         )
     if "ruptures" in data.studies:
         points.append(_about_ruptures(data))
+    if {"dynamic", "interaction"} <= set(data.studies):
+        points.append(_about_dynamics(data))
     if "arrest" in data.studies and data["arrest"].sizes["event"]:
         stay = data["arrest"]["dynamic_arrests"].values > 0
         points.append(
@@ -146,6 +149,18 @@ def _about_ruptures(data: Data) -> str:
         f" {error('exact'):.2g} %, the local criterion to {error('local'):.2g} %, and the formula"
         f" with the printed modulus to {error('printed'):.2g} % (root mean square); in {wrong} of"
         f" {runs} the local criterion puts the onset in the wrong place."
+    )
+
+
+def _about_dynamics(data: Data) -> str:
+    pairs = [fidelity(data, ratio) for ratio in data.ratios]
+    gaps = [100.0 * float(np.median(dear / cheap[: dear.size] - 1.0)) for dear, cheap in pairs]
+    savings = [combined_mean(dear, cheap).saving for dear, cheap in pairs]
+    return (
+        f"In {data['dynamic'].sizes['sample']:,} ruptures at each correlation length inertia and"
+        f" the loading rate raise the critical stress by {min(gaps):.2g} to {max(gaps):.2g} % over"
+        " exact equilibrium (median); with that as control variate they fix the mean as well as"
+        f" {min(savings):.2g} to {max(savings):.2g} times as many would."
     )
 
 

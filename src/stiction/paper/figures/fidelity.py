@@ -31,7 +31,7 @@ def caption(data: Data) -> str:
         " of the same sample, quantiles 5, 25, 50, 75, 95 %. (c) How many times as many ruptures"
         " plain sampling would need for the same error, if exact equilibrium of"
         f" {data.samples:,} samples is the control variate: for the mean (filled) and quantiles"
-        " (open)."
+        f" (open); it cannot exceed the ratio of the numbers of samples, {data.samples / runs:.3g}."
     )
 
 

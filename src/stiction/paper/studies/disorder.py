@@ -63,7 +63,7 @@ def _cases(context: Context) -> dict[str, tuple[RandomField, dict[str, Any]]]:
 
 
 def _count(context: Context) -> int:
-    return min(MOST, context.fewer)
+    return min(MOST, max(context.samples // 8, 32))
 
 
 def cost(context: Context) -> int:

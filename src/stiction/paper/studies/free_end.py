@@ -20,7 +20,7 @@ _PART = 50
 
 
 def _count(context: Context) -> int:
-    return min(MOST, context.fewer)
+    return min(MOST, max(context.samples // 8, 32))
 
 
 def cost(context: Context) -> int:
