@@ -1,6 +1,7 @@
 """Probabilities that are exactly zero or one, intervals, and the error estimates themselves."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -9,13 +10,15 @@ from scipy.stats import binom
 import stiction as st
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.plain import Count
+from stiction.reliability.plain import Count, tally
+from stiction.reliability.pooled import Tail
 from stiction.reliability.tails import weakest_link
 from stiction.reliability.uncertainty import (
     ancestral_variance,
     binomial_interval,
     chain_correlation,
     effective_size,
+    generator,
     lognormal_interval,
 )
 
@@ -120,6 +123,41 @@ def test_chain_correlation_of_known_chains():
 def test_effective_size():
     assert effective_size(np.array([2.0, 2.0, 0.0, 2.0])) == pytest.approx(3.0)
     assert effective_size(np.zeros(4)) == 0.0
+
+
+def test_tally_numbers_the_failures_of_all_batches():
+    count = tally(np.array([3.0, 1.0, 2.0]), 1.5)
+    count = tally(np.array([1.0, 2.0, 0.5]), 1.5, count)
+    assert (count.failures, count.samples) == (3, 6)
+    np.testing.assert_array_equal(count.numbers, [1, 3, 5])
+
+
+def test_every_key_has_its_own_generator():
+    keys = [(0, 1), (0, 1, 0), (0, 1, 1), (0, 2, 1), (1, 1, 0)]
+    assert len({generator(*key).random() for key in keys}) == len(keys)
+
+
+@dataclass(frozen=True)
+class KnownRun:
+    """A run that estimates one probability everywhere."""
+
+    samples: int
+    chance: float
+    variance: float
+
+    def probability(self, value):
+        return self.chance
+
+    def relative_variance(self, value):
+        return self.variance
+
+
+def test_runs_are_pooled_by_their_size():
+    tail = Tail([KnownRun(1000, 1e-3, 0.04), KnownRun(3000, 2e-3, 0.01), KnownRun(1000, 0.0, 9.0)])
+    assert tail.probability(1.0) == pytest.approx(0.2 * 1e-3 + 0.6 * 2e-3)
+    # Standard errors of the parts: 0.2 * 1e-3 * 0.2 and 0.6 * 2e-3 * 0.1; nothing seen adds none.
+    error = math.hypot(0.4e-4, 1.2e-4)
+    assert tail.coefficient_of_variation(1.0) == pytest.approx(error / 1.4e-3)
 
 
 def test_weakest_link():

@@ -58,7 +58,11 @@ def test_crossings_are_those_of_the_profiles(problem, make_strength):
         level = found.stress[index]
         crossings = np.sum((before > level) & (tau_n <= level))
         assert found.crossing_rate[index] * 32 * 0.1 == pytest.approx(crossings, abs=1e-6)
-        assert found.point_survival[index] == pytest.approx(np.mean(tau_n > level), abs=1e-12)
+        above = np.mean(tau_n > level)
+        assert found.point_survival[index] == pytest.approx(above, abs=1e-12)
+        # The formula itself, with the crossings of one interface.
+        chance = 1.0 - above * np.exp(-crossings / 32 / above)
+        assert found.probability[index] == pytest.approx(chance, rel=1e-9)
 
 
 def test_same_seed_same_numbers(problem, make_strength):
