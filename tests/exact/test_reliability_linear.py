@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from stiction.reliability.design import stress_interval
 from stiction.reliability.pooled import Tail, run_until_precise
 from stiction.reliability.subset import descend
 from stiction.reliability.two_level import agreement, bridge
-from stiction.reliability.uncertainty import generator
+from stiction.reliability.uncertainty import generator, log_width
 
 DIMENSION = 600
 REPEATS = 50
@@ -96,6 +97,19 @@ def test_quantiles_of_pooled_runs():
         cov = tail.coefficient_of_variation(-beta)
         assert cov < 0.07
         assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cov / beta)
+
+
+def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
+    tail = Tail(descents()[:10])
+    chance, cov = norm.cdf(-4.0), 0.3
+    low, high = stress_interval(tail, chance, cov, 0.95, -9.0)
+    width = log_width(cov, 0.95)
+    # Ten pooled runs step by some 1e-4 of the probability.
+    assert tail.probability(low) == pytest.approx(chance * math.exp(-width), rel=0.01)
+    assert tail.probability(high) == pytest.approx(chance * math.exp(width), rel=0.01)
+    # Below what any run has seen there is only the bound.
+    assert stress_interval(tail, 1e-8, 2.0, 0.95, -9.0)[0] == -9.0
+    assert stress_interval(tail, chance, math.inf, 0.95, -9.0)[0] == -9.0
 
 
 @pytest.mark.slow
