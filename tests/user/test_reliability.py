@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.stats
 import typer
 import xarray as xr
 from typer.testing import CliRunner
@@ -183,6 +184,15 @@ def test_auto_leaves_a_first_stage_that_picks_others():
     )
     assert answer.algorithm == "subset"
     assert "only" in answer.reason
+
+
+def test_no_run_goes_deeper_than_forty_levels(system):
+    """A log-normal strength of 1 MPa is below 1 kPa with P of some 1e-160 at a point."""
+    field = st.RandomField(scipy.stats.lognorm(0.25, scale=1e6), system[1].spectrum)
+    with pytest.warns(st.AccuracyWarning, match="stops after 40 levels"):
+        result = failure_probability(system[0], field, 1e3, method=LOCAL, algorithm="subset")
+    assert result.interval[0] == 0.0
+    assert 0.0 < result.interval[1] < 1e-30
 
 
 def test_budget_too_small_for_any_failure(system):

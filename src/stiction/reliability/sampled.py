@@ -14,7 +14,7 @@ from stiction.reliability.limit_state import LimitState
 from stiction.reliability.plain import Count, count_failures
 from stiction.reliability.pooled import Tail, run_until_precise, weights
 from stiction.reliability.result import FailureProbability, distinct, profiles_of, say
-from stiction.reliability.subset import Descent, descend
+from stiction.reliability.subset import MOST_LEVELS, Descent, descend
 from stiction.reliability.two_level import Bridge, bridge
 from stiction.reliability.uncertainty import (
     binomial_interval,
@@ -192,14 +192,15 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
     doubts = _missed(request, cov)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
+        deep = len(runs[0].levels) >= MOST_LEVELS
+        advice = f"it stops after {MOST_LEVELS} levels" if deep else "raise max_evaluations"
         reached = tail.probability(np.nextafter(lowest, math.inf))
         error = tail.coefficient_of_variation(np.nextafter(lowest, math.inf))
         interval = (0.0, lognormal_interval(reached, error, request.confidence)[1])
         doubts = [
             f"after {runs[0].evaluations} evaluations subset simulation had come down to"
             f" {lowest:.7g} Pa (P = {reached:.2g}) and not to {stress:.7g} Pa: the probability is"
-            " below that of the last level, which is all that the interval says; raise"
-            " max_evaluations"
+            f" below that of the last level, which is all that the interval says; {advice}"
         ]
     else:
         doubts += subset_doubts(tail, diagnostics)
