@@ -24,7 +24,7 @@ def found():
     for seed in range(REPEATS):
         dear, cheap = _samples(seed)
         means.append(combined_mean(dear, cheap))
-        quantiles.append(combined_quantiles(dear, cheap, probabilities))
+        quantiles.append(combined_quantiles(dear, [cheap], probabilities))
     return means, quantiles
 
 
@@ -67,3 +67,27 @@ def test_without_correlation_nothing_is_gained():
     best = combined_mean(dear, cheap)
     assert best.saving == pytest.approx(1.0, abs=0.03)
     assert best.estimate.error == pytest.approx(best.plain_error, rel=0.02)
+
+
+def test_a_chain_of_ever_cheaper_methods():
+    """Three levels: unbiased, the stated error true, and better than any two of them."""
+    n, few, many = 60, 1200, 24_000
+    means, errors, halves = [], [], []
+    for seed in range(150):
+        generator = np.random.default_rng(seed)
+        cheapest = generator.standard_normal(many)
+        middle = cheapest[:few] + 0.3 * generator.standard_normal(few)
+        dear = 5.0 + middle[:n] + 0.02 * generator.standard_normal(n)
+        best = combined_mean(dear, middle, cheapest)
+        means.append(best.estimate.value)
+        errors.append(best.estimate.error)
+        halves.append(combined_mean(dear, middle).estimate.error)
+        if seed < 20:
+            (median,) = combined_quantiles(dear, [middle, cheapest], [0.5])
+            # Five stated errors: never by chance, and a forgotten level is off by far more.
+            assert abs(median.estimate.value - 5.0) < 5.0 * median.estimate.error
+    exact = np.sqrt(0.02**2 / n + 0.3**2 / few + 1.0 / many)
+    assert abs(np.mean(means) - 5.0) < 3.0 * exact / np.sqrt(150)
+    assert np.std(means) == pytest.approx(exact, rel=0.18)  # 150 values know it to 6 %
+    assert np.mean(errors) == pytest.approx(exact, rel=0.05)
+    assert np.mean(halves) > 2.0 * exact

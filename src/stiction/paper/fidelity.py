@@ -1,13 +1,15 @@
-"""Few dear runs and many cheap ones of the same samples: control variates for mean and quantiles.
+"""Few dear runs and ever more cheaper ones: control variates for means and quantiles.
 
-The dear result of sample i is Y_i for i < n, the cheap one X_i for i < N. What the cheap method
-gets right is averaged over all N samples, what it gets wrong over the n dear ones only
-(Peherstorfer, Willcox and Gunzburger, 2016, with two levels).
+Sample i is the same whatever the method. The dear result of samples 0 .. n - 1 is Y, those of ever
+cheaper methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2 - 1 and so on, n <= N_1 <= N_2 ... What a
+method gets right about the next dearer one is averaged over all of its own samples, what it gets
+wrong over those of the dearer one only (Peherstorfer, Willcox and Gunzburger, 2016).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +20,7 @@ from stiction.statistics.estimates import Estimate
 
 @dataclass(frozen=True)
 class Combined:
-    """An estimate from both, and what it is worth.
+    """An estimate from all methods, and what it is worth.
 
     Attributes
     ----------
@@ -43,71 +45,82 @@ def _weight(dear: Array, cheap: Array) -> float:
     return float(np.cov(dear, cheap)[0, 1]) / spread
 
 
-def combined_mean(dear: Array, cheap: Array) -> Combined:
+def _telescoped(dear: Array, chain: Sequence[Array], least: float = 0.0) -> tuple[float, float]:
+    """Mean of `dear` and its variance; `least` bounds the variance of what a method misses.
+
+    mean_n(Y - a X) + a E[X], a = Cov(X, Y)/Var(X), with E[X] from the rest of the chain in the same
+    way; variance Var(Y - a X)/n + a^2 Var(E[X]): for this a the two terms do not covary.
+    """
+    n = dear.size
+    if not chain:
+        return float(dear.mean()), float(dear.var(ddof=1)) / n
+    own = chain[0][:n]
+    weight = _weight(dear, own)
+    rest = dear - weight * own
+    value, variance = _telescoped(chain[0], chain[1:], least)
+    missed = max(float(rest.var(ddof=2)) / n, least / (n * (n + 2.0)))
+    return float(rest.mean()) + weight * value, missed + weight**2 * variance
+
+
+def combined_mean(dear: Array, *cheap: Array) -> Combined:
     """Mean of the dear result.
 
     Parameters
     ----------
     dear : (n,) array
         Of samples 0 .. n - 1, at least three.
-    cheap : (N,) array
-        Of the same samples first, then of N - n more.
+    *cheap : (N_1,), (N_2,), ... arrays
+        Of the same samples first and then of more, each longer than the one before.
 
     Returns
     -------
     Combined
-
-    Notes
-    -----
-    mean_n(Y - a X) + a mean_N(X) with a = Cov(X, Y)/Var(X); variance
-    Var(Y - a X)/n + a^2 Var(X)/N, the covariance of the two terms vanishing for this a.
     """
-    n, total = dear.size, cheap.size
-    own = cheap[:n]
-    weight = _weight(dear, own)
-    rest = dear - weight * own
-    value = float(rest.mean() + weight * cheap.mean())
-    variance = float(rest.var(ddof=2)) / n + weight**2 * float(cheap.var(ddof=1)) / total
-    return _combined(value, variance, float(dear.var(ddof=1)) / n)
+    value, variance = _telescoped(dear, cheap)
+    plain = float(dear.var(ddof=1)) / dear.size
+    return Combined(Estimate(value, math.sqrt(variance)), math.sqrt(plain))
 
 
-def combined_quantiles(dear: Array, cheap: Array, probabilities: Array) -> list[Combined]:
+def combined_quantiles(
+    dear: Array, cheap: Sequence[Array], probabilities: Sequence[float] | Array
+) -> list[Combined]:
     """Quantiles of the dear result; arguments as for `combined_mean`.
 
     Notes
     -----
-    The same estimator for the distribution function at each level t: indicators Y <= t and
-    a + b X <= t, a and b by regression; then inverted. The error of the quantile is that of the
-    distribution function over the density, taken from the calibrated cheap results.
+    The same estimator for the distribution function at each level t, of indicators that a result is
+    at most t, after each cheap result has been fitted to the next dearer one by regression; then
+    inverted. The error of a quantile is that of the distribution function over the density, which
+    comes from the cheapest results.
     """
-    n, total = dear.size, cheap.size
-    slope = _weight(dear, cheap[:n])
-    alike = float(dear.mean()) + slope * (cheap - float(cheap[:n].mean()))
-    levels = np.quantile(alike, np.linspace(0.0005, 0.9995, 301))
-    share = np.empty(levels.size)
-    variance = np.empty(levels.size)
-    for i, level in enumerate(levels):
-        y, x = (dear <= level).astype(float), (alike[:n] <= level).astype(float)
-        weight = _weight(y, x)
-        whole = float((alike <= level).mean())
-        rest = y - weight * x
-        share[i] = rest.mean() + weight * whole
-        # No difference between so few indicators does not mean that there is none: Laplace's rule.
-        least = (1.0 / (n + 2.0)) / n
-        own = max(float(rest.var(ddof=1)) / n, least * min(1.0, 4.0 * whole * (1.0 - whole)))
-        variance[i] = own + weight**2 * whole * (1.0 - whole) / total
-    share = np.maximum.accumulate(np.clip(share, 0.0, 1.0))
+    alike: list[Array] = []
+    above = dear
+    for results in cheap:
+        own = results[: above.size]
+        fitted = float(above.mean()) + _weight(above, own) * (results - float(own.mean()))
+        alike.append(fitted)
+        above = fitted
+    many = np.sort(above)
+    levels = np.quantile(many, np.linspace(0.0005, 0.9995, 301))
+    found = [_share_below(dear, alike, level) for level in levels]
+    share = np.maximum.accumulate(np.clip([value for value, _ in found], 0.0, 1.0))
     result = []
-    for p in np.asarray(probabilities, dtype=float):
+    for p in probabilities:
         at = min(int(np.searchsorted(share, p)), levels.size - 1)
         value = float(np.interp(p, share, levels))
         width = 0.05 * min(p, 1.0 - p) + 0.01
-        low, high = np.quantile(alike, (max(p - width, 0.0), min(p + width, 1.0)))
-        per_stress = (high - low) / (min(p + width, 1.0) - max(p - width, 0.0))
-        plain = p * (1.0 - p) / n
-        result.append(_combined(value, variance[at] * per_stress**2, plain * per_stress**2))
+        low, high = max(p - width, 0.0), min(p + width, 1.0)
+        between = float(np.subtract(*np.quantile(many, (high, low))))
+        per_share = between / (high - low)
+        error = math.sqrt(found[at][1]) * per_share
+        plain = math.sqrt(p * (1.0 - p) / dear.size) * per_share
+        result.append(Combined(Estimate(value, error), plain))
     return result
 
 
-def _combined(value: float, variance: float, plain: float) -> Combined:
-    return Combined(Estimate(value, math.sqrt(variance)), math.sqrt(plain))
+def _share_below(dear: Array, alike: Sequence[Array], level: float) -> tuple[float, float]:
+    whole = float((alike[-1] <= level).mean())
+    # That few indicators agree does not mean that all would (Laplace's rule of succession).
+    least = min(1.0, 4.0 * whole * (1.0 - whole))
+    chain = [(each <= level).astype(np.float64) for each in alike]
+    return _telescoped((dear <= level).astype(np.float64), chain, least)

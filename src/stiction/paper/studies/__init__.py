@@ -15,6 +15,7 @@ from typing import Any
 import xarray as xr
 
 from stiction.paper.studies import (
+    abundant,
     arrest,
     convergence,
     correction,
@@ -55,6 +56,7 @@ STUDIES: dict[str, Any] = {
         interface_length,
         disorder,
         free_end,
+        abundant,
         dynamic,
     )
 }
@@ -62,7 +64,8 @@ STUDIES: dict[str, Any] = {
 
 def offered(context: Context) -> set[str]:
     """Names of the studies that this context asks for: the costliest only on demand."""
-    return {name for name in STUDIES if name != dynamic.name or context.dynamic}
+    dear = {abundant.name, dynamic.name}
+    return {name for name in STUDIES if name not in dear or context.dynamic}
 
 
 def with_needs(names: Iterable[str]) -> set[str]:
