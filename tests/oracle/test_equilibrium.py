@@ -215,6 +215,17 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
         beyond = first + 0.5 * min(last - first, 1e-3 * first)
         assert by_relaxation(problem, tau_p[row], beyond) is not None
     events = equilibrium_events(problem, tau_p)
+    row = arrested[0]
+    first = onset.first_instability.values[row]
+    slip = equilibrium_path(problem, tau_p[row], first * np.array([1 - 1e-12, 1 + 1e-9])).slip
+    added = (slip[1] - slip[0]).values
+    moment = solid.shear_modulus * added.sum() * problem.interface.spacing
+    event = events.isel(event=int(np.argmax(events["sample"].values == row)))
+    # Slip is steep in the load just before the event: 1e-12 of the load counts.
+    assert event.moment.item() == pytest.approx(moment, rel=1e-2)
+    assert added.max() / 5 < event.mean_slip.item() < added.max()
+    share = event.mean_slip * event.length * solid.shear_modulus / event.moment
+    assert 0.9 < share.item() <= 1.0  # the patch has most of the moment
     assert events.sizes["event"] == onset.arrested_events.values.sum()
     assert set(events["sample"].values) == set(arrested)
     np.testing.assert_allclose(

@@ -22,7 +22,8 @@ def row_start(row: int) -> int:
 
 
 @jit_sums
-def _dot(first: Array, second: Array, count: int) -> float:
+def dot(first: Array, second: Array, count: int) -> float:
+    """Sum of products; numpy's own takes threads for long arrays, and then depends on how many."""
     total = 0.0
     for t in range(count):
         total += first[t] * second[t]
@@ -161,8 +162,8 @@ def append(
                 base = row_start(size + q)
                 known = factor[base : base + size + q + 1]
                 entry = coupling[abs(node - members[size + q])]
-                row[size + q] = (entry - _dot(known, row, size + q)) / known[size + q]
-            pivot = diagonal[node] - _dot(row, row, size + r)
+                row[size + q] = (entry - dot(known, row, size + q)) / known[size + q]
+            pivot = diagonal[node] - dot(row, row, size + r)
             members[size + r] = node
             if pivot <= tolerance * diagonal[node]:
                 return size + r
@@ -208,7 +209,7 @@ def extend_forward(
     for r in range(first, last):
         start = row_start(r)
         row = factor[start : start + r + 1]
-        forward[r] = (values[members[r]] - _dot(row, forward, r)) / row[r]
+        forward[r] = (values[members[r]] - dot(row, forward, r)) / row[r]
 
 
 @jit_sums

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.fft
 
 from stiction._typing import Array
+from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.frozen import OUT_OF_REACH, circle_of, padded
 from stiction.equilibrium.program import OVERSTRESS, PIVOT, SOLVED, STALLED, solve_program
 from stiction.equilibrium.segments import Segments
@@ -70,8 +71,8 @@ def window_solution(
     solve_program(strength, load_profile, small, bound, np.inf, local, slip, stiff, room)
     result = np.zeros(n)
     result[nodes] = local[:WINDOW]
-    result /= result @ profile
-    return float(excess @ result), result, nodes[slip[:WINDOW] > 0.0]
+    result /= dot(result, profile, n)
+    return float(dot(excess, result, n)), result, nodes[slip[:WINDOW] > 0.0]
 
 
 class LargeProgram:
@@ -130,16 +131,17 @@ class LargeProgram:
         residual = np.where(inside, right - self.stiffness(x) + self.rate * x, 0.0)
         direction = np.zeros_like(x)
         previous = 0.0
+        n = x.size
         for _ in range(ITERATIONS):
             if np.abs(residual).max() <= tolerance:
                 break
             self.iterations += 1
             z = self.nodes.solve(residual)
-            product = float(residual @ z)
+            product = float(dot(residual, z, n))
             direction = z if previous == 0.0 else z + (product / previous) * direction
             previous = product
             image = np.where(inside, self.stiffness(direction) - self.rate * direction, 0.0)
-            curvature = float(direction @ image)
+            curvature = float(dot(direction, image, n))
             if curvature <= 0.0:
                 return x, int(np.argmax(np.abs(direction)))
             step = product / curvature
@@ -154,8 +156,8 @@ class LargeProgram:
     def cut(self, node: int, y: Array) -> float:
         """Take the multiplier y if it lowers the bound; returns its value."""
         y = np.maximum(y, 0.0)
-        y = y / (y @ self.profile)
-        value = float(y @ self.excess)
+        y = y / dot(y, self.profile, y.size)
+        value = float(dot(y, self.excess, y.size))
         if value < self.bound:
             self.bound, self.multiplier = value, y
         return value

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stiction._typing import Array
 from stiction.equilibrium import batch
 from stiction.equilibrium.batch import solve_batch
+from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.follow import (
     OVERSHOOT,
     Event,
@@ -181,7 +182,9 @@ class Solver:
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""
         residual = residual_nodes(sample, state.slip)
-        multiplier[:] = state.direction / max(state.direction @ sample.profile, 1e-300)
+        multiplier[:] = state.direction / max(
+            dot(state.direction, sample.profile, sample.profile.size), 1e-300
+        )
         line[batch.GAP] = self.setting.gap(
             np.where(residual, sample.floor, sample.excess),
             np.where(residual, 0.0, sample.rate),
