@@ -85,7 +85,7 @@ def test_a_first_instability_at_a_negative_mean_stress_is_kept():
     watch = np.zeros(track.FIELDS)
     watch[[track.FIRST_STRESS, track.KINETIC]] = -np.inf
     watch[[track.PEAK_STRESS, track.LOCAL_STRESS]] = -9.0
-    watch[track.EVENT_DROP] = 1.0
+    watch[track.EVENT_DROP], watch[track.PEAK_WIDTH] = 1.0, 0.1
     events = [(-8.0, 0.0), (-9.5, 1.6), (-9.4, 0.0), (-6.0, 0.0), (-7.5, 2.0), (-7.4, 0.0)]
     for step, (mean, radiated) in enumerate(events):
         track.observe(watch, float(step), 0.0, mean, radiated, step)

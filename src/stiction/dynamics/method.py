@@ -88,7 +88,11 @@ class Rupture:
     -----
     `critical_stress` is the largest mean shear stress on the interface, `critical_load` the load
     factor that carries it statically, `applied_load` the one applied at that moment, somewhat
-    higher; the difference is radiated. Slip never reverses: a node whose slip rate would become
+    higher; the difference is radiated. An instability begins when the mean stress has fallen by
+    `event_drop` below its last maximum, not counting what the load itself goes down.
+    `kinetic_stress` and the energies are those of the first step after which every node is at its
+    residual strength; the interface slides fast then, and radiated energy and moment grow by some
+    2 % in that step. Slip never reverses: a node whose slip rate would become
     negative sticks, keeps its weakened strength, and slips again only when the stress reaches it.
     Boundary integral in Fourier space: Breitenfeld and Geubelle (1998).
     """
@@ -236,6 +240,7 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     control[track.RESIDUAL] = 1e-9 * drop
     control[track.LARGEST_STEP], control[track.END_TIME] = _SLOWEST, np.inf
     control[track.EVENT_DROP_SIZE] = method.event_drop * drop
+    control[track.PEAK_WIDTH_SIZE] = 1e-5 * drop
     control[track.NOTICED] = 1e-7 * drop
     control[track.GROWTH] = _GROWTH
     control[track.NEGLIGIBLE] = 5e-7 * drop

@@ -127,6 +127,7 @@ class Run:
         watch[track.FIRST_STRESS] = watch[track.KINETIC] = -np.inf  # not yet
         watch[track.BAD_NODE] = -1.0
         watch[track.EVENT_DROP] = self.control[track.EVENT_DROP_SIZE]
+        watch[track.PEAK_WIDTH] = self.control[track.PEAK_WIDTH_SIZE]
         watch[track.TOP_RATE] = rate.max()
         watch[track.SLID] = np.count_nonzero(delta >= self.rows[3])
         arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)

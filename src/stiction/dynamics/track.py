@@ -14,7 +14,8 @@ EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
 EXPLICIT_STEPS, IMPLICIT_STEPS, REJECTED_STEPS, CALM_STEPS = 16, 17, 18, 19
 STEP, LOCAL_RADIATED, RADIATED, PAST_STEP = 20, 21, 22, 23
 KINETIC = 24  # Pa, mean stress when every node first was at its residual; -inf before
-FIELDS = 25
+PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
+FIELDS = 26
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED = range(6)
@@ -40,12 +41,10 @@ COLUMNS = 7
     EXPLICIT_ONLY,  # 1 to take no implicit steps
     NOTICED,  # radiated stress Z <V> from which the growth of one implicit step is limited, Pa
     GROWTH,  # by this factor
+    PEAK_WIDTH_SIZE,  # Pa, initial value of PEAK_WIDTH
     NEGLIGIBLE,  # rise of the load in a step for which that does not matter, Pa
-) = range(15)
-CONTROLS = 15
-
-
-_AT_PEAK = 0.1  # of EVENT_DROP: so close below its maximum, the mean stress still is at it
+) = range(16)
+CONTROLS = 16
 
 
 @jit
@@ -69,7 +68,7 @@ def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-
             node,
         )
     fall = min(watch[LOCAL_STRESS] - mean_stress, radiated - watch[LOCAL_RADIATED])
-    if watch[PEAK_STRESS] - mean_stress < _AT_PEAK * watch[EVENT_DROP] and fall > 0.0:
+    if watch[PEAK_STRESS] - mean_stress < watch[PEAK_WIDTH] and fall > 0.0:
         watch[PEAK_NODE] = node
     if watch[IN_EVENT] > 0.0:
         if mean_stress > watch[LOCAL_STRESS] or radiated < 0.1 * watch[EVENT_DROP]:
