@@ -178,3 +178,48 @@ def test_patches_on_the_circle():
     first, length, centre = main_patch(y)
     assert (first, length) == (7, 3)
     assert centre == pytest.approx(0.0)
+
+
+@pytest.fixture
+def wide(problem, solid):
+    """Ten profiles of so wide a range that nodes reach the residual before the first instability."""
+    slow = st.Problem(solid, problem.interface, st.SlipWeakening(weakening_rate=0.2e12))
+    strength = st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.1e6, high=3.1e6),
+        spectrum=st.PowerLawSpectrum(correlation_length=3e-3),
+    )
+    return slow, strength.sample(slow.interface, samples=10, seed=4)
+
+
+def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide, solid):
+    """A uniform initial stress is a load that is there already."""
+    problem, tau_p = wide
+    plain = st.equilibrium_events(problem, tau_p)
+    shifted = st.equilibrium_events(problem, tau_p, initial_stress=5e4)
+    assert plain.sizes["event"] > 5
+    np.testing.assert_allclose(shifted["stress"], plain["stress"], rtol=1e-9)
+    np.testing.assert_allclose(shifted["load"], plain["load"] - 5e4, rtol=1e-9)
+    np.testing.assert_allclose(shifted["moment"], plain["moment"], rtol=1e-6)
+
+
+def test_sensitivity_where_nodes_are_at_the_residual(wide):
+    """Against finite differences: a node at its residual strength does not feel its peak."""
+    problem, tau_p = wide
+    found = st.onset(problem, tau_p, method=st.Equilibrium(sensitivity=True))
+    followed = np.nonzero(found.residual_reached.values)[0]
+    checked = 0
+    for sample in followed[:4]:
+        gradient = found.sensitivity.values[sample]
+        # The first instability only: where it comes before an event, a shift keeps the order.
+        for node in (int(gradient.argmax()), int(tau_p[sample].argmin())):
+            step = 1.0  # Pa: small against the kinks, large against round-off of 1e5 Pa
+            moved = np.repeat(tau_p[sample][None], 2, axis=0)
+            moved[0, node] -= step
+            moved[1, node] += step
+            below, above = st.onset(
+                problem, moved, method=st.Equilibrium()
+            ).first_instability.values
+            slope = (above - below) / (2.0 * step)
+            assert slope == pytest.approx(gradient[node], abs=1e-5)
+            checked += 1
+    assert checked >= 4
