@@ -1,4 +1,4 @@
-"""Shared by all tests: a compile cache that notices every edit, and the paper's system."""
+"""Shared by all tests: a cache that notices every edit, and the paper's system."""
 
 from __future__ import annotations
 
@@ -19,12 +19,10 @@ def _digest_of_sources() -> str:
     return digest.hexdigest()[:16]
 
 
-# numba does not notice an edited kernel that is called from another file: a new folder for every
-# state of the sources. Must be set before numba is imported.
-os.environ.setdefault(
-    "NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"stiction-numba-{_digest_of_sources()}")
+# Nothing computed by an earlier state of the sources may serve the tests.
+os.environ["STICTION_CACHE_DIR"] = str(
+    Path(tempfile.gettempdir()) / f"stiction-tests-{_digest_of_sources()}"
 )
-os.environ.setdefault("STICTION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "stiction-tests"))
 
 
 @pytest.fixture

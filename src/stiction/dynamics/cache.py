@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 import threading
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 
+from stiction._cache import cache_folder
 from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.exponentials import ExponentialSum, fit_exponentials
 
@@ -20,12 +19,6 @@ _FORMAT = 2  # raise when the fit or the file layout changes, so that old files 
 _memory: dict[tuple[str, float, float, float], ExponentialSum] = {}
 _lock = threading.Lock()
 _said = False
-
-
-def cache_folder() -> Path:
-    """`STICTION_CACHE_DIR` if set, else the user's cache folder of the platform."""
-    given = os.environ.get("STICTION_CACHE_DIR")
-    return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
 
 
 def _path(key: tuple[str, float, float, float]) -> Path:

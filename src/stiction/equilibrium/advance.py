@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
 from stiction.equilibrium.jump import AT_FLOOR
 from stiction.equilibrium.program import PIVOT, singular_direction, solve_forward

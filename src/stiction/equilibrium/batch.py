@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.bound import Windows, window_bound
 from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run
 from stiction.equilibrium.patches import count_patches, main_patch

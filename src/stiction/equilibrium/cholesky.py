@@ -6,9 +6,8 @@ numbers: half the memory of a square, and no two rows compete for the same cache
 
 from __future__ import annotations
 
-from stiction._jit import jit
+from stiction._jit import jit, jit_sums
 from stiction._typing import Array
-from stiction.equilibrium._compile import jit_sums
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
 from stiction.equilibrium.program import (
     PIVOT,

@@ -9,9 +9,8 @@ there. A load that is an upper bound and has an equilibrium is the critical one.
 
 from __future__ import annotations
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
 from stiction.equilibrium.spaces import MOST_MEMBERS, Grid, Room
 from stiction.equilibrium.stiffness import apply_stiffness

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit, jit_sums
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO, jit_sums
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
 from stiction.equilibrium.jump import (
     AT_FLOOR,

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
+from stiction._jit import ZERO, jit, jit_sums
 from stiction._typing import Array
-from stiction.equilibrium._compile import ZERO, jit_sums
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
