@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._typing import Array
 from stiction.paper.data import Data
@@ -33,7 +32,7 @@ def overprediction(data: Data, ratio: float) -> Array:
     return result
 
 
-def misplaced(data: Data, ratio: float, *, printed: bool = False) -> NDArray[np.bool_]:
+def misplaced(data: Data, ratio: float, *, printed: bool = False) -> Array:
     """Whether the local criterion puts the onset more than h_n/2 from where it is, each sample.
 
     With the modulus of the plane state, or with the printed one.
@@ -43,7 +42,7 @@ def misplaced(data: Data, ratio: float, *, printed: bool = False) -> NDArray[np.
     local = study["printed_critical_position"] if printed else data.at(ratio)["critical_position"]
     gap = np.abs(local.values - study["critical_position"].values)
     gap = np.minimum(gap, problem.interface.length - gap)
-    result: NDArray[np.bool_] = gap > 0.5 * problem.nucleation_length
+    result: Array = gap > 0.5 * problem.nucleation_length
     return result
 
 
@@ -59,13 +58,13 @@ def shift_of(data: Data, ratio: float, prediction: str) -> Array:
     return result
 
 
-def displaced(data: Data, ratio: float, prediction: str) -> NDArray[np.bool_]:
+def displaced(data: Data, ratio: float, prediction: str) -> Array:
     """Whether a prediction puts the onset of a rupture more than h_n/2 from where it began."""
     problem = data.setting.problem
     runs = data["ruptures"].sel(correlation_ratio=ratio)
     gap = np.abs(runs[f"{prediction}_critical_position"].values - runs["critical_position"].values)
     gap = np.minimum(gap, problem.interface.length - gap)
-    result: NDArray[np.bool_] = gap > 0.5 * problem.nucleation_length
+    result: Array = gap > 0.5 * problem.nucleation_length
     return result
 
 

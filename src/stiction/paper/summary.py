@@ -159,8 +159,8 @@ def _about_dynamics(data: Data) -> str:
     return (
         f"In {data['dynamic'].sizes['sample']:,} ruptures at each correlation length inertia and"
         f" the loading rate raise the critical stress by {min(gaps):.2g} to {max(gaps):.2g} % over"
-        " exact equilibrium (median); with the cheap methods as control variates they fix the"
-        f" mean as well as {min(savings):.0f} to {max(savings):.0f} times as many would."
+        " exact equilibrium (median); with the cheap methods as control variates they"
+        f" fix the mean as well as {min(savings):,.0f} to {max(savings):,.0f} times as many would."
     )
 
 
