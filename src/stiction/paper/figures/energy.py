@@ -1,4 +1,4 @@
-"""Beyond the paper: the balance of energy that lets a rupture run away, and what is arrested."""
+"""Beyond the paper: the energy that lets a rupture run away, what is arrested, and how fast."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stiction.report.tables import Table
 name = "energy"
 number = "9"
 title = "Run-away propagation"
-needs = ("monte_carlo", "interaction", "arrest")
+needs = ("monte_carlo", "interaction", "arrest", "ruptures")
 
 LENGTHS = np.linspace(0.0, 4.5, 91)
 
@@ -22,6 +22,8 @@ LENGTHS = np.linspace(0.0, 4.5, 91)
 def caption(data: Data) -> str:
     """What is seen."""
     events = data["arrest"]
+    typical = float(data["ruptures"]["median_rupture_speed"].median())
+    fast = typical > data.setting.problem.solid.shear_wave_speed
     count = int(np.unique(events["number"].values).size)
     return (
         "Not in the paper: (a) static energy release rate of a crack under the stress drop"
@@ -29,7 +31,11 @@ def caption(data: Data) -> str:
         " spans 5 to 95 % of samples, dots mark the length from which nothing arrests the crack."
         " (b) Longest arrested patch by equilibrium in samples whose first instability comes to"
         f" rest ({count} of them run again): filled where the rupture comes to rest with inertia,"
-        " too, open where inertia carries it through."
+        " too, open where inertia carries it through. (c) Speed of the front in each rupture of"
+        " Figure 4, its median over the interface (filled) and its largest over two nucleation"
+        " lengths (open; patches that grow ahead of the front add to it), against the Rayleigh,"
+        " shear and dilatational wave speeds."
+        f"{' The ruptures are supershear.' if fast else ''}"
     )
 
 
@@ -62,13 +68,47 @@ def tables(data: Data) -> list[Table]:
 
 def draw(data: Data) -> Figure:
     """Release rate on the left, arrested patches on the right."""
-    figure = new_figure(PAGE * 0.9, 2.7)
-    rate, lengths = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
+    figure = new_figure(PAGE, 2.6)
+    rate, lengths, speed = figure.subplots(1, 3, width_ratios=(1.2, 0.9, 0.9))
     _rate(rate, data)
     _lengths(lengths, data)
-    panel(rate, "a")
-    panel(lengths, "b")
+    _speeds(speed, data)
+    for axes, letter in zip((rate, lengths, speed), "abc", strict=True):
+        panel(axes, letter)
     return figure
+
+
+def _speeds(axes: Axes, data: Data) -> None:
+    solid, runs = data.setting.problem.solid, data["ruptures"]
+    unit = solid.shear_wave_speed
+    waves = {
+        r"$c_\mathrm{R}$": (solid.rayleigh_wave_speed / unit, "top"),
+        r"$c_\mathrm{s}$": (1.0, "bottom"),
+        r"$c_\mathrm{d}$": (solid.dilatational_wave_speed / unit, "center"),
+    }
+    ratios = data.setting.simulated_ratios
+    for name, (value, side) in waves.items():
+        axes.axhline(value, color=PALE, linewidth=0.8, zorder=0)
+        axes.text(len(ratios) - 0.45, value, name, ha="left", va=side)
+    for place, ratio in enumerate(ratios):
+        # The same colour as in the other panels.
+        i = data.ratios.index(ratio) if ratio in data.ratios else place
+        at = runs.sel(correlation_ratio=ratio)
+        for key, face, aside in (
+            ("median_rupture_speed", color(i), -0.14),
+            ("rupture_speed", "white", 0.14),
+        ):
+            speed = at[key].values / unit
+            spread = place + aside + np.linspace(-0.09, 0.09, speed.size)
+            axes.plot(
+                spread, speed, marker(i), color=color(i), markerfacecolor=face, markersize=2.8,
+                markeredgewidth=0.6,
+            )  # fmt: skip
+    axes.set_xticks(range(len(ratios)), [f"{ratio:g}" for ratio in ratios])
+    axes.set_xlim(-0.5, len(ratios) - 0.5)
+    axes.set_ylim(0, 1.1 * float(np.nanmax(runs["rupture_speed"].values)) / unit)
+    axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$")
+    axes.set_ylabel(r"front speed$\,/c_\mathrm{s}$")
 
 
 def _rate(axes: Axes, data: Data) -> None:
