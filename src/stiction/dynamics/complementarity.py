@@ -8,13 +8,16 @@ conjugate gradients preconditioned with the inverse circulant.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
 
 
 @jit
-def _apply(symbol, vector):  # type: ignore[no-untyped-def]
+def _apply(symbol: Array, vector: Array) -> Any:
     spectrum = np.fft.rfft(vector)
     for j in range(spectrum.size):
         spectrum[j] *= symbol[j]
@@ -22,7 +25,15 @@ def _apply(symbol, vector):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _solve(symbol, inverse, weakening, state, driving, u, accuracy):  # type: ignore[no-untyped-def]
+def _solve(
+    symbol: Array,
+    inverse: Array,
+    weakening: Array,
+    state: Any,
+    driving: Array,
+    u: Array,
+    accuracy: float,
+) -> Any:
     """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
     n = u.size
     product = _apply(symbol, u)
@@ -71,7 +82,16 @@ def _solve(symbol, inverse, weakening, state, driving, u, accuracy):  # type: ig
 
 
 @jit
-def solve_increment(symbol, inverse, rows, slip, pushed, u, state, accuracy):  # type: ignore[no-untyped-def]
+def solve_increment(
+    symbol: Array,
+    inverse: Array,
+    rows: Array,
+    slip: Array,
+    pushed: Array,
+    u: Array,
+    state: Any,
+    accuracy: float,
+) -> Any:
     """Slip increments of one implicit step; returns whether they were found.
 
     Parameters

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.dynamics.layout import advance_memory, pack
 from stiction.dynamics.track import (
     ALL_SLID,
@@ -38,7 +41,7 @@ from stiction.dynamics.track import (
 
 
 @jit
-def load_at(times, values, t):  # type: ignore[no-untyped-def]
+def load_at(times: Array, values: Array, t: float) -> Any:
     """Piecewise linear load history, continued beyond its last point with its last slope."""
     low, high = 0, times.size - 1
     while high - low > 1:
@@ -52,7 +55,16 @@ def load_at(times, values, t):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out):  # type: ignore[no-untyped-def]
+def _transfer(
+    slip_hat: Array,
+    rate_hat: Array,
+    step: float,
+    carried: Array,
+    fresh: Array,
+    stiffness: Array,
+    packed: Array,
+    out: Array,
+) -> None:
     """Stress transferred along the interface, in Fourier space, if the rate acts for a step."""
     pack(rate_hat, packed)
     out[0] = 0.0
@@ -66,27 +78,27 @@ def _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out):
 
 
 @jit
-def explicit_steps(  # type: ignore[no-untyped-def]
-    count,
-    step,
-    slip,
-    rate,
-    stress,
-    slip_hat,
-    memory,
-    carried,
-    arrival,
-    watch,
-    table,
-    fresh,
-    stiffness,
-    medium,
-    rows,
-    load_times,
-    load_values,
-    control,
-    record,
-):
+def explicit_steps(
+    count: int,
+    step: float,
+    slip: Array,
+    rate: Array,
+    stress: Array,
+    slip_hat: Array,
+    memory: Array,
+    carried: Array,
+    arrival: Array,
+    watch: Array,
+    table: Array,
+    fresh: Array,
+    stiffness: Array,
+    medium: Any,
+    rows: Array,
+    load_times: Array,
+    load_values: Array,
+    control: Array,
+    record: Array,
+) -> Any:
     """Take up to `count` explicit steps in place; return (steps taken, reason).
 
     Parameters

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.dynamics.complementarity import solve_increment
 from stiction.dynamics.explicit import load_at
 from stiction.dynamics.track import (
@@ -48,18 +51,27 @@ from stiction.dynamics.track import (
 
 
 @jit
-def _phi(z):  # type: ignore[no-untyped-def]
+def _phi(z: Any) -> Any:
     return 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0 * (1.0 + z / 6.0))))
 
 
 @jit
-def _tilt(z):  # type: ignore[no-untyped-def]
+def _tilt(z: Any) -> Any:
     """int_0^1 exp(z (1 - t)) (t - 1/2) dt near z = 0."""
     return -z / 12.0 * (1.0 + z / 2.0 * (1.0 + z * 0.3 * (1.0 + z * (2.0 / 9.0))))
 
 
 @jit
-def tabulate(poles, weights, pace, step, table, tilt, fresh, turn):  # type: ignore[no-untyped-def]
+def tabulate(
+    poles: Array,
+    weights: Array,
+    pace: Array,
+    step: float,
+    table: Array,
+    tilt: Array,
+    fresh: Array,
+    turn: Any,
+) -> None:
     """Tables of a step of any size, packed as in `layout`.
 
     E and B = int_0^h exp(s k c_s t') dt' into `table`, its counterpart for a slip rate that rises
@@ -91,7 +103,7 @@ def tabulate(poles, weights, pace, step, table, tilt, fresh, turn):  # type: ign
 
 
 @jit
-def _carry(memory, table, weights, out):  # type: ignore[no-untyped-def]
+def _carry(memory: Array, table: Array, weights: Array, out: Array) -> None:
     """Re sum w E psi for the modes j = 1.., complex: what the past leaves after the step."""
     pairs = weights.size
     for j in range(out.size):
@@ -105,7 +117,9 @@ def _carry(memory, table, weights, out):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _remember(memory, table, tilt, rate_hat, slope_hat, pairs):  # type: ignore[no-untyped-def]
+def _remember(
+    memory: Array, table: Array, tilt: Array, rate_hat: Array, slope_hat: Array, pairs: int
+) -> None:
     """psi <- E psi + B V, with a slip rate that changes linearly in the step."""
     for j in range(rate_hat.size - 1):
         v, a = rate_hat[j + 1], slope_hat[j + 1]
@@ -121,29 +135,29 @@ def _remember(memory, table, tilt, rate_hat, slope_hat, pairs):  # type: ignore[
 
 
 @jit
-def implicit_steps(  # type: ignore[no-untyped-def]
-    count,
-    step,
-    slip,
-    rate,
-    stress,
-    slip_hat,
-    past,
-    memory,
-    arrival,
-    watch,
-    poles,
-    weights,
-    pace,
-    stiffness,
-    medium,
-    rows,
-    load_times,
-    load_values,
-    turns,
-    control,
-    record,
-):
+def implicit_steps(
+    count: int,
+    step: float,
+    slip: Array,
+    rate: Array,
+    stress: Array,
+    slip_hat: Array,
+    past: Any,
+    memory: Array,
+    arrival: Array,
+    watch: Array,
+    poles: Array,
+    weights: Array,
+    pace: Array,
+    stiffness: Array,
+    medium: Any,
+    rows: Array,
+    load_times: Array,
+    load_values: Array,
+    turns: Any,
+    control: Array,
+    record: Array,
+) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
     Parameters as in `explicit_steps`; `memory` holds psi itself, `step` is the size to try first.

@@ -8,10 +8,13 @@ length lets the compiler vectorise without run-time checks of overlap.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction._jit import jit
+from stiction._typing import Array
 from stiction.dynamics.exponentials import ExponentialSum
 from stiction.dynamics.stability import phi
 
@@ -66,7 +69,7 @@ def step_table(kernel: ExponentialSum, pace: Floats, step: float) -> tuple[Float
 
 
 @jit
-def pack(spectrum, packed):  # type: ignore[no-untyped-def]
+def pack(spectrum: Array, packed: Array) -> None:
     """Modes 1.. of a real transform into packed order."""
     modes = spectrum.size - 1
     for j in range(modes):
@@ -76,7 +79,7 @@ def pack(spectrum, packed):  # type: ignore[no-untyped-def]
 
 
 @jit
-def advance_memory(memory, table, rate, carried, pairs):  # type: ignore[no-untyped-def]
+def advance_memory(memory: Array, table: Array, rate: Array, carried: Array, pairs: int) -> None:
     """y <- E y + V and carried = Re sum w E B y, for all modes and pairs: the one pass."""
     for block in range(rate.size // 128):
         so = block * 128
@@ -102,7 +105,7 @@ def advance_memory(memory, table, rate, carried, pairs):  # type: ignore[no-unty
 
 
 @jit
-def carry_memory(memory, table, carried, pairs):  # type: ignore[no-untyped-def]
+def carry_memory(memory: Array, table: Array, carried: Array, pairs: int) -> Any:
     """carried = Re sum w E B y without advancing: where an explicit phase begins."""
     for block in range(carried.size // 128):
         so = block * 128

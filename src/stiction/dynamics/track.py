@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiction._jit import jit
+from stiction._typing import Array
 
 # Fields of the `watch` array: plain float64, so that compiled steps and checkpoints share it.
 TIME, LOAD, WORK, MEAN_STRESS = 0, 1, 2, 3  # s, Pa, J/m, Pa
@@ -48,7 +51,9 @@ CONTROLS = 16
 
 
 @jit
-def observe(watch, time, load, mean_stress, radiated, node):  # type: ignore[no-untyped-def]
+def observe(
+    watch: Array, time: float, load: float, mean_stress: float, radiated: float, node: int
+) -> Any:
     """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
 
     The fall counts from the last local maximum, and only as far as waves carry it away: where the
