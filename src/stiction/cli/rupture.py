@@ -72,7 +72,7 @@ def rupture(
     result.to_netcdf(out / "rupture.nc")
     typer.echo(
         f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
-        f" kinetic stress {float(result.kinetic_stress) * 1e-6:.6f} MPa\n"
+        f" kinetic stress {round(float(result.kinetic_stress) * 1e-6, 6) + 0.0:.6f} MPa\n"
         f"onset at x = {float(result.critical_position) * 1e3:.3f} mm after"
         f" {float(result.onset_time):.5g} s; fastest front {float(result.rupture_speed):.0f} m/s"
         f" (c_R {problem.solid.rayleigh_wave_speed:.0f}, c_s {problem.solid.shear_wave_speed:.0f},"
