@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._model import describe
-from stiction.errors import AccuracyWarning, InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 
 Array = NDArray[np.float64]
@@ -86,11 +85,9 @@ def _on_nodes(path: Path, x: Array, strength: Array, interface: Interface) -> Ar
     if x.size == nodes.size and np.allclose(x, nodes, rtol=0.0, atol=1e-6 * interface.spacing):
         return strength
     gap = float(np.max(np.diff(np.append(x, x[0] + length))))
-    warnings.warn(
+    warn_accuracy(
         f"{path}: {x.size} points are interpolated linearly to {nodes.size} nodes; the widest gap"
-        f" between them is {gap:.3g} m, {gap / interface.spacing:.3g} times the spacing of nodes",
-        AccuracyWarning,
-        stacklevel=3,
+        f" between them is {gap:.3g} m, {gap / interface.spacing:.3g} times the spacing of nodes"
     )
     return np.interp(nodes, x, strength, period=length)
 

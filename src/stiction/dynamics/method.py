@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
@@ -16,7 +15,7 @@ from stiction.dynamics.loading import History, first_reach, uniform_rate
 from stiction.dynamics.measures import fracture_energy, radiated_energy, rupture_speed
 from stiction.dynamics.medium import Medium, prepare_medium
 from stiction.dynamics.run import Run, State
-from stiction.errors import AccuracyWarning, InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
 from stiction.rows import Rows
@@ -167,12 +166,10 @@ def warn_if_coarse(problem: Problem, rows: Rows) -> None:
         # at 8, 16 and 32 nodes.
         percent = 3.0 * (16.0 / resolution) ** 2.4
         expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-        warnings.warn(
+        warn_accuracy(
             f"the nucleation length spans {resolution:.1f} nodes: expect {expected} error in slip "
             "just after onset (3 % at 16 nodes, 0.6 % at 32; the critical load is far less "
-            "sensitive)",
-            AccuracyWarning,
-            stacklevel=3,
+            "sensitive)"
         )
 
 
@@ -200,12 +197,10 @@ def check_pace(run: Run, time: float) -> None:
             " load faster (the onset no longer depends on the rate)"
         )
     if not _resolves_steps(run, time):
-        warnings.warn(
+        warn_accuracy(
             f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
             f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
-            "and energies are not affected",
-            AccuracyWarning,
-            stacklevel=3,
+            "and energies are not affected"
         )
     drop = float(np.mean(run.rows[0] - run.rows[1]))
     rise = run.slope(time) * run.medium.step / drop
@@ -218,7 +213,7 @@ def check_pace(run: Run, time: float) -> None:
         )
         if rise > _COARSEST:
             raise InputError(text)
-        warnings.warn(f"{text} (the onset is sampled coarsely)", AccuracyWarning, stacklevel=3)
+        warn_accuracy(f"{text} (the onset is sampled coarsely)")
 
 
 def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: History) -> Run:

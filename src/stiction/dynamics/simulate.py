@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -32,7 +31,7 @@ from stiction.dynamics.method import (
 )
 from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
-from stiction.errors import AccuracyWarning, InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.results import Variable
 
@@ -313,7 +312,7 @@ def simulate_rupture(
                 next_checkpoint = state.steps + checkpoint_every
     except FloatingPointError as error:
         reason = f"not finite: {error}"
-        warnings.warn(str(error), AccuracyWarning, stacklevel=2)
+        warn_accuracy(str(error))
     except BaseException:
         # Interrupted or out of disk: what was computed is worth keeping.
         _quietly(flush)

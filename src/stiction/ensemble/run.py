@@ -17,7 +17,7 @@ from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
-from stiction.errors import AccuracyWarning, InputError, unknown_name
+from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.methods import Method, check_method, variables_of
 from stiction.problem import Problem
@@ -143,10 +143,10 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
         for field, interface in pairs:
             warn_if_inaccurate(field, interface)
     for warning in caught[:FEW]:
-        warnings.warn(str(warning.message), AccuracyWarning, stacklevel=3)
+        warn_accuracy(str(warning.message))
     if len(caught) > FEW:
         more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
-        warnings.warn(more, AccuracyWarning, stacklevel=3)
+        warn_accuracy(more)
 
 
 def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,7 +21,7 @@ from stiction.equilibrium.jump import (
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.setting import Setting
 from stiction.equilibrium.spaces import Sample, make_room
-from stiction.errors import AccuracyWarning
+from stiction.errors import warn_accuracy
 
 JUMP_STEPS = 4000
 MARGIN = 1.5
@@ -94,10 +93,8 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
             make_room(n),
         )  # fmt: skip
     if fate == UNDECIDED:
-        warnings.warn(
-            "the jump of an unstable patch did not settle; it is counted as global sliding",
-            AccuracyWarning,
-            stacklevel=2,
+        warn_accuracy(
+            "the jump of an unstable patch did not settle; it is counted as global sliding"
         )
     if fate != ARRESTED:
         state.sliding = True
@@ -152,11 +149,9 @@ def follow(setting: Setting, sample: Sample, state: State, target: float = np.in
                 state.direction, make_room(n),
             )  # fmt: skip
             if status == CROWDED:
-                warnings.warn(
+                warn_accuracy(
                     "too many slipping nodes to follow event by event; the last load that was"
-                    " reached is returned as the critical one, a lower bound",
-                    AccuracyWarning,
-                    stacklevel=2,
+                    " reached is returned as the critical one, a lower bound"
                 )
                 state.sliding = True
             if status == REACHED or state.sliding:

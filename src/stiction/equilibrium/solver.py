@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import runs_away
 from stiction.equilibrium.setting import LARGE_GRID, Setting
 from stiction.equilibrium.spaces import Sample
-from stiction.errors import AccuracyWarning
+from stiction.errors import warn_accuracy
 from stiction.problem import Problem
 from stiction.rows import Rows
 
@@ -202,9 +201,7 @@ class Solver:
         """Warn where the bounds did not close."""
         open_ = ~(gap <= WORST_GAP * load)  # also where there is none
         if open_.any():
-            warnings.warn(
+            warn_accuracy(
                 f"the bounds of the first instability did not close in {int(open_.sum())} of"
-                f" {gap.size} samples; the largest gap is {gap[open_].max():.3g} Pa",
-                AccuracyWarning,
-                stacklevel=3,
+                f" {gap.size} samples; the largest gap is {gap[open_].max():.3g} Pa"
             )

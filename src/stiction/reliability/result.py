@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction._typing import Array
 from stiction.ensemble.plan import PROFILES
-from stiction.errors import AccuracyWarning
+from stiction.errors import warn_accuracy
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, POSITION, SAMPLE, to_dataset
@@ -90,7 +89,7 @@ class FailureProbability:
 def say(texts: list[str]) -> tuple[str, ...]:
     """Issue texts as warnings and return them."""
     for text in texts:
-        warnings.warn(text, AccuracyWarning, stacklevel=4)
+        warn_accuracy(text)
     return tuple(texts)
 
 
