@@ -19,7 +19,11 @@ def _digest_of_sources() -> str:
     return digest.hexdigest()[:16]
 
 
-# Nothing computed by an earlier state of the sources may serve the tests.
+# Nothing computed by an earlier state of the sources may serve the tests; compiled kernels keep
+# apart the states that they depend on themselves.
+os.environ.setdefault(
+    "NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / "stiction-tests-compiled")
+)
 os.environ["STICTION_CACHE_DIR"] = str(
     Path(tempfile.gettempdir()) / f"stiction-tests-{_digest_of_sources()}"
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -44,15 +45,30 @@ event.register("numba:compile", _FirstCompilation())
 
 
 def _digest_of_sources() -> str:
+    """Digest of every file with a kernel and of all that such files import, directly or not."""
+    package = Path(__file__).parent
+    texts = {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes()
+        for path in sorted(package.rglob("*.py"))
+    }
+    texts = {name.removesuffix(".__init__"): text for name, text in texts.items()}
+    imported = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
+    reached = {name for name, text in texts.items() if b"stiction._jit import" in text}
+    waiting = list(reached)
+    while waiting:
+        for module, member in imported.findall(texts[waiting.pop()]):
+            names = {module.decode(), f"{module.decode()}.{member.decode()}"}
+            waiting += (new := names & texts.keys() - reached)
+            reached |= new
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
+    for name in sorted(reached):
+        digest.update(texts[name])
     return digest.hexdigest()[:16]
 
 
 # numba takes a compiled kernel for current as long as the kernel's own file is: it does not notice
-# that a function or a constant of another file has changed. So every state of the package's
-# sources has a folder of its own.
+# that a function or a constant of another file has changed. So every state of the sources that
+# kernels can reach has a folder of its own.
 _FOLDER = Path(numba.config.CACHE_DIR or cache_folder() / "compiled") / _digest_of_sources()
 
 
