@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 from timing import median_time, row
 
 import stiction as st
+from stiction.elasticity.line_stiffness import stiffness_column
 from stiction.equilibrium.method import Equilibrium
-from stiction.equilibrium.stiffness import stiffness_column
 
 NODES, BATCH = 1024, 512
 TARGETS = {0.25: 2e-3, 0.5: 0.7e-3, 1.0: 0.35e-3, 2.0: 0.3e-3}

@@ -13,8 +13,8 @@ import scipy.linalg
 from timing import row
 
 import stiction as st
+from stiction.elasticity.line_stiffness import stiffness_column
 from stiction.equilibrium.method import Equilibrium
-from stiction.equilibrium.stiffness import stiffness_column
 
 NODES, SAMPLES = 32_768, 5
 ALLOWED = 0.2

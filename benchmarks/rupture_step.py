@@ -17,11 +17,11 @@ import time
 import numpy as np
 
 import stiction as st
-from stiction.dynamics import track
-from stiction.dynamics.kernels import arc_quadrature
+from stiction.dynamics import monitor
+from stiction.dynamics.courant_limit import phi
 from stiction.dynamics.loading import uniform_rate
 from stiction.dynamics.method import Rupture, first_slip, make_run
-from stiction.dynamics.stability import phi
+from stiction.elasticity.memory_kernels import arc_quadrature
 
 TARGETS = {512: 16.0, 1024: 32.0, 2048: 65.0, 4096: 130.0}  # microseconds
 REPEATS = 7
@@ -43,7 +43,7 @@ def prepared(nodes: int, tolerance: float = 1e-6):
 def step_time(nodes: int, before: int = 100, count: int = 1000) -> float:
     """Median time of a step, us, after some steps were taken."""
     run, state = prepared(nodes)
-    run.control[track.SLID_STOP] = np.inf
+    run.control[monitor.SLID_STOP] = np.inf
     run.advance(state, before)
     times = []
     for _ in range(REPEATS):
@@ -76,7 +76,7 @@ def fft_time(nodes: int) -> float:
 
 def pass_time(nodes: int) -> float:
     """One pass over the memory variables, us."""
-    from stiction.dynamics.layout import advance_memory
+    from stiction.dynamics.memory_layout import advance_memory
 
     run, state = prepared(nodes)
     pairs = run.medium.kernel.poles.size

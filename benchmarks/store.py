@@ -100,7 +100,7 @@ def peak(samples):
 
 
 def fill(samples):
-    from stiction.runs import run_into
+    from stiction.stored_run import run_into
 
     with tempfile.TemporaryDirectory() as folder:
         run_into(study(samples, {"type": "local_criterion"}), Path(folder) / "run", workers=2)

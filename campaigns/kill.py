@@ -54,7 +54,7 @@ keep_samples = [0, 12345, 119999]
 # The command itself, with chunks that follow each other fifty times faster.
 COMMAND = """
 import sys
-import stiction.ensemble.stored as stored
+import stiction.ensemble.resume as stored
 from stiction.cli.app import main
 stored.FLUSH_SECONDS = 0.02
 sys.argv = ["stiction", "run", *sys.argv[1:]]
@@ -111,7 +111,7 @@ def chunks_in(out: Path) -> int:
 
 def result_of(out: Path) -> xr.Dataset:
     """The finished result."""
-    from stiction.runs import StoredRun
+    from stiction.stored_run import StoredRun
 
     return StoredRun(out).dataset()
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
-from stiction.dynamics.kernels import arc_quadrature
+from stiction.elasticity.memory_kernels import arc_quadrature
 from stiction.report.style import COLUMN, new_figure, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
-from stiction.dynamics.measures import rupture_speed
+from stiction.dynamics.energies import rupture_speed
 from stiction.report.style import COLUMN, new_figure, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")

@@ -14,12 +14,12 @@ _HOMES = {
     "SlipWeakening": "friction",
     "Load": "load",
     "Problem": "problem",
-    "RandomField": "fields.random_field",
-    "Beta": "fields.marginals",
-    "PowerLawSpectrum": "fields.spectra",
-    "SquaredExponentialSpectrum": "fields.spectra",
-    "ExponentialSpectrum": "fields.spectra",
-    "CustomSpectrum": "fields.spectra",
+    "RandomField": "random.random_field",
+    "Beta": "random.marginals",
+    "PowerLawSpectrum": "random.spectra",
+    "SquaredExponentialSpectrum": "random.spectra",
+    "ExponentialSpectrum": "random.spectra",
+    "CustomSpectrum": "random.spectra",
     "LocalCriterion": "criterion.method",
     "nucleation_stress": "criterion.nucleation",
     "Equilibrium": "equilibrium.method",
@@ -28,8 +28,8 @@ _HOMES = {
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",
     "open_rupture": "dynamics.stream",
-    "onset": "methods",
-    "monte_carlo": "ensemble.run",
+    "onset": "evaluation",
+    "monte_carlo": "ensemble.monte_carlo",
     "nucleation_statistics": "statistics.moments",
     "nucleation_limits": "statistics.moments",
     "density": "statistics.densities",
@@ -40,16 +40,16 @@ _HOMES = {
     "DesignStress": "reliability.design",
     "design_stress": "reliability.design",
     "failure_curve": "reliability.curve",
-    "Ensemble": "study",
-    "Study": "study",
+    "Ensemble": "study.study",
+    "Study": "study.study",
     "Cluster": "ensemble.distributed",
-    "open_run": "runs",
-    "StoredRun": "runs",
+    "open_run": "stored_run",
+    "StoredRun": "stored_run",
     "RunError": "ensemble.trouble",
     "InputError": "errors",
     "AccuracyWarning": "errors",
 }
-_MODULES = ("paper",)
+_MODULES = {"paper": "papers.albertini2020"}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 
@@ -60,7 +60,7 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     if name in _MODULES:
-        return import_module(f"stiction.{name}")
+        return import_module(f"stiction.{_MODULES[name]}")
     raise AttributeError(f"module 'stiction' has no attribute {name!r}")
 
 

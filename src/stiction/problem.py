@@ -12,7 +12,7 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.friction import SlipWeakening
 from stiction.interface import Interface
 from stiction.load import Load
-from stiction.rows import Rows, as_rows
+from stiction.sample import Rows, as_rows
 from stiction.solid import Solid
 
 # lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics import track
+from stiction.dynamics import monitor
+from stiction.dynamics.energies import radiated_energy
 from stiction.dynamics.loading import load_history
-from stiction.dynamics.measures import radiated_energy
 from stiction.dynamics.method import Rupture, make_run
 
 END = 40e-6
@@ -22,11 +22,11 @@ def rupture(nodes, steps):
     method = Rupture(loading_rate=1.0, implicit=False, time_step=END / steps)
     history = load_history(([0.0, 1.0], [7.5e5, 7.5e5]), None)
     run = make_run(method, method.medium(problem), problem.rows(strength), 0, history)
-    run.control[track.SLID_STOP] = np.inf
+    run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0)
     run.advance(state, steps)
     energy = radiated_energy(
-        float(state.watch[track.WORK]), state.slip, state.slip_hat, run.rows,
+        float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
         run.medium.stiffness[0], run.medium.spacing,
     )  # fmt: skip
     return state, energy
@@ -34,7 +34,7 @@ def rupture(nodes, steps):
 
 def test_slip_and_radiated_energy_converge_with_second_order_in_time():
     reference, energy = rupture(256, 8000)
-    assert reference.watch[track.SLID] == 256
+    assert reference.watch[monitor.SLID] == 256
     slips, energies = [], []
     for steps in (500, 1000, 2000):
         state, radiated = rupture(256, steps)

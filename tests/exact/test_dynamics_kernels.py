@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from stiction import InputError
-from stiction.dynamics.cache import kernel_sum
-from stiction.dynamics.exponentials import fit_exponentials
-from stiction.dynamics.kernels import memory_kernel, static_stiffness, symbol
+from stiction.elasticity.exponential_sum import fit_exponentials
+from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
 
 ETAS = {
     "stress, nu = 0.33": np.sqrt(2.0 / 0.67),

@@ -6,11 +6,11 @@ import pytest
 from scipy.special import j0, j1
 
 import stiction as st
-from stiction.dynamics import track
-from stiction.dynamics.cache import kernel_sum
-from stiction.dynamics.kernels import memory_kernel, static_stiffness, symbol
+from stiction.dynamics import monitor
 from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import Rupture, make_run
+from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
 
 ETA = np.sqrt(2.0 / 0.67)
 
@@ -64,7 +64,7 @@ def released(steps, end, mode="II"):
     history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
     rows = problem.rows(np.full(32, 1.001e6))
     run = make_run(method, method.medium(problem), rows, 0, history)
-    run.control[track.SLID_STOP] = np.inf
+    run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0, 1e-3 + 1e-6 * np.cos(k * interface.x))
     run.advance(state, steps)
     return state.slip_hat[2].real / 16.0 / 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.equilibrium.bound import smallest_window, window_mode
+from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
 from stiction.equilibrium.cholesky import (
     append,
     back_substitute,
@@ -14,11 +14,11 @@ from stiction.equilibrium.cholesky import (
     row_start,
     substitute,
 )
-from stiction.equilibrium.large import Solution
+from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.setting import Setting
-from stiction.equilibrium.stiffness import apply_stiffness, coupling_strip, stiffness_column
+from stiction.equilibrium.prepared import Setting
+from stiction.equilibrium.window_bound import smallest_window, window_mode
 
 
 def stiffness_times(problem, field):

@@ -5,8 +5,8 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.fields.marginals import quantile_of_normal
-from stiction.fields.quantile_table import from_normal, quantile_table
+from stiction.random.marginals import quantile_of_normal
+from stiction.random.quantile_table import from_normal, quantile_table
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from scipy.stats import binom
 import stiction as st
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.plain import Count, tally
-from stiction.reliability.pooled import Tail
+from stiction.reliability.plain_monte_carlo import Count, tally
+from stiction.reliability.pooling import Tail
 from stiction.reliability.tails import weakest_link
 from stiction.reliability.uncertainty import (
     ancestral_variance,

@@ -3,10 +3,10 @@
 import numpy as np
 
 import stiction as st
-from stiction.dynamics import track
-from stiction.dynamics.kernels import arc_quadrature
+from stiction.dynamics import monitor
 from stiction.dynamics.loading import uniform_rate
 from stiction.dynamics.method import Rupture, first_slip, make_run
+from stiction.elasticity.memory_kernels import arc_quadrature
 
 
 def direct_convolution(run, start, steps):
@@ -52,11 +52,11 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
     method = Rupture(loading_rate=3e9, implicit=False)
     run = make_run(method, method.medium(problem), problem.rows(strength), 0, uniform_rate(3e9))
-    run.control[track.SLID_STOP] = np.inf
+    run.control[monitor.SLID_STOP] = np.inf
     state = run.start(first_slip(run))
     slip, rate = direct_convolution(run, state, 900)
     run.advance(state, 900)
-    assert state.watch[track.SLID] > 100  # through the rupture
+    assert state.watch[monitor.SLID] > 100  # through the rupture
     # 1e-6 is asked for; errors of the kernel, up to 1e-6, have both signs and cancel.
     assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()
     # Behind a steep front the slip rate shows ten times that.

@@ -10,18 +10,18 @@ from scipy.linalg import circulant
 from scipy.optimize import linprog
 
 import stiction as st
-from stiction.equilibrium.advance import UNSTABLE, advance
+from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.equilibrium.continuation import at_rest
 from stiction.equilibrium.events import equilibrium_events
-from stiction.equilibrium.follow import at_rest
-from stiction.equilibrium.frozen import runs_away_frozen
-from stiction.equilibrium.jump import SLIDING, escape_run, jump, step_to_floor
-from stiction.equilibrium.large import LargeProgram
+from stiction.equilibrium.instability_jump import SLIDING, escape_run, jump, step_to_floor
+from stiction.equilibrium.linear_program_cg import LargeProgram
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
-from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
-from stiction.equilibrium.spaces import make_room
-from stiction.equilibrium.stiffness import stiffness_column
+from stiction.equilibrium.stable_path import UNSTABLE, advance
+from stiction.equilibrium.window_test import runs_away_frozen
+from stiction.equilibrium.workspace import make_room
 
 
 def by_linear_programme(problem, strength, rate=None):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics.measures import rupture_speed
+from stiction.dynamics.energies import rupture_speed
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
 

@@ -7,15 +7,15 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.paper.claims import CLAIMS, Finding, Verdict, judged
-from stiction.paper.claims.claim import SUBJECTS, rounded
-from stiction.paper.claims.rules import agrees, below, falling, rising, worst
-from stiction.paper.data import Data
-from stiction.paper.derived import misplaced, release_rate
-from stiction.paper.setting import Setting
-from stiction.paper.studies import STUDIES, compute
-from stiction.paper.studies.context import Context
-from stiction.paper.studies.growth import patches
+from stiction.papers.albertini2020.claims import CLAIMS, Finding, Verdict, judged
+from stiction.papers.albertini2020.claims.claim import SUBJECTS, rounded
+from stiction.papers.albertini2020.claims.rules import agrees, below, falling, rising, worst
+from stiction.papers.albertini2020.data import Data
+from stiction.papers.albertini2020.derived import misplaced, release_rate
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies import STUDIES, compute
+from stiction.papers.albertini2020.studies.context import Context
+from stiction.papers.albertini2020.studies.growth import patches
 from stiction.statistics.estimates import Estimate
 
 FALLING = [Estimate(3.0, 0.1), Estimate(2.0, 0.1), Estimate(1.0, 0.1)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from stiction.paper.fidelity import combined_mean, combined_quantiles
+from stiction.statistics.control_variates import combined_mean, combined_quantiles
 
 N, FEW, REPEATS = 4000, 100, 150
 SCATTER = 0.1  # of what the cheap result misses, in units of its own spread

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.paper.data import Data
-from stiction.paper.derived import nucleation_moments, variance_ratio
-from stiction.paper.setting import Setting
-from stiction.paper.studies import compute
-from stiction.paper.studies.context import Context
+from stiction.papers.albertini2020.data import Data
+from stiction.papers.albertini2020.derived import nucleation_moments, variance_ratio
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies import compute
+from stiction.papers.albertini2020.studies.context import Context
 from stiction.statistics.moments import nucleation_statistics
 
 EXPECTED = {0.25: 0.264, 0.5: 0.475, 1.0: 0.726, 2.0: 0.898}

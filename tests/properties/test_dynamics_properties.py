@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import stiction as st
-from stiction.dynamics import track
+from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.loading import uniform_rate
 from stiction.dynamics.method import Rupture, first_slip, make_run
@@ -99,8 +99,8 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
     profile = strength(5)
     run, straight = fresh_run(profile)
     total, reason = run.advance(straight, 100_000)
-    assert reason == track.ALL_SLID
-    implicit = int(straight.watch[track.IMPLICIT_STEPS])
+    assert reason == monitor.ALL_SLID
+    implicit = int(straight.watch[monitor.IMPLICIT_STEPS])
     assert implicit > 10
     path = tmp_path / "state.npz"
     # In the implicit phase, just before, at and after the switch, in the rupture.
@@ -119,7 +119,7 @@ def test_restart_across_a_return_to_implicit_steps(tmp_path):
     profile[40:60] = 0.8e6
     run, straight = fresh_run(profile)
     count = 0
-    while straight.watch[track.ARRESTED] == 0 or straight.explicit:
+    while straight.watch[monitor.ARRESTED] == 0 or straight.explicit:
         run.advance(straight, 5)
         count += 5
         assert count < 20_000
@@ -139,19 +139,19 @@ def test_radiated_energy_is_steady_after_arrest():
     profile = np.full(NODES, 3e6)
     profile[40:60] = 0.8e6
     run, state = fresh_run(profile)
-    while state.watch[track.ARRESTED] == 0:
+    while state.watch[monitor.ARRESTED] == 0:
         run.advance(state, 20)
     # Hold the load: from here on nothing slips, and what was radiated stays radiated.
     held = state.load
     run.history[0][:] = [0.0, 1e9]
     run.history[1][:] = [held, held * (1.0 + 1e-15)]
-    run.control[track.EXPLICIT_ONLY] = 1.0
-    run.control[track.CALM_COUNT] = np.inf
-    from stiction.dynamics.measures import radiated_energy
+    run.control[monitor.EXPLICIT_ONLY] = 1.0
+    run.control[monitor.CALM_COUNT] = np.inf
+    from stiction.dynamics.energies import radiated_energy
 
     def radiated():
         return radiated_energy(
-            float(state.watch[track.WORK]), state.slip, state.slip_hat, run.rows,
+            float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
             run.medium.stiffness[0], run.medium.spacing,
         )  # fmt: skip
 

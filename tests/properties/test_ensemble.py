@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import stiction as st
+from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.plan import chunks, compute
-from stiction.ensemble.run import make_plan
 
 SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as hs
 import stiction as st
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
-from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.prepared import Setting
 
 NODES = 96
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)

@@ -12,12 +12,12 @@ import xarray as xr
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
-from stiction.dynamics import cache
 from stiction.dynamics import method as method_module
 from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
+from stiction.elasticity import kernel_cache
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES = 128
@@ -236,7 +236,7 @@ def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
 
 def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
     problem = make_problem()
-    monkeypatch.setattr("stiction.dynamics.medium.courant_limit", lambda *_: 40.0)
+    monkeypatch.setattr("stiction.dynamics.discretization.courant_limit", lambda *_: 40.0)
     with pytest.warns(AccuracyWarning, match=r"non-finite at t = .* s, x = .* m \(node \d+\)"):
         run = simulate_rupture(
             problem, profile(), method=Rupture(loading_rate=1e8, implicit=False), stop="time",
@@ -274,7 +274,8 @@ def test_stop_conditions_and_progress():
 
 def test_two_processes_build_one_kernel_at_once(tmp_path):
     code = (
-        "from stiction.dynamics.cache import kernel_sum; k = kernel_sum('III', 1.0, 1e-4, 1e3);"
+        "from stiction.elasticity.kernel_cache import kernel_sum;"
+        "k = kernel_sum('III', 1.0, 1e-4, 1e3);"
         "print(k.poles.size, repr(k.error))"
     )
     import os
@@ -296,22 +297,22 @@ def test_cache_that_cannot_be_written_is_kept_in_memory(tmp_path, monkeypatch, c
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("STICTION_CACHE_DIR", str(blocked))
-    monkeypatch.setattr(cache, "_memory", {})
-    monkeypatch.setattr(cache, "_said", False)
+    monkeypatch.setattr(kernel_cache, "_memory", {})
+    monkeypatch.setattr(kernel_cache, "_said", False)
     with caplog.at_level(logging.INFO, logger="stiction"):
-        first = cache.kernel_sum("III", 1.0, 1e-3, 1e3)
-        cache.kernel_sum("III", 1.0, 1e-4, 1e3)
-    assert cache.kernel_sum("III", 1.0, 1e-3, 1e3) is first
+        first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+        kernel_cache.kernel_sum("III", 1.0, 1e-4, 1e3)
+    assert kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3) is first
     assert caplog.text.count("cannot write the kernel cache") == 1
 
 
 def test_damaged_cache_file_is_built_again(tmp_path, monkeypatch):
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(cache, "_memory", {})
-    first = cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    monkeypatch.setattr(kernel_cache, "_memory", {})
+    first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
     (path,) = tmp_path.iterdir()
     path.write_bytes(path.read_bytes()[:50])
-    cache._memory.clear()
-    second = cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    kernel_cache._memory.clear()
+    second = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
     assert np.array_equal(first.poles, second.poles)
     assert path.stat().st_size > 500

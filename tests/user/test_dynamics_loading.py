@@ -7,10 +7,11 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
-from stiction.dynamics import cache, track
+from stiction.dynamics import monitor
 from stiction.dynamics.archive import UNREADABLE, read_arrays
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
+from stiction.elasticity import kernel_cache
 
 NODES = 128
 PROBLEM = st.Problem(
@@ -82,16 +83,16 @@ def test_kinetic_stress_is_that_of_the_first_global_sliding():
 
 def test_a_first_instability_at_a_negative_mean_stress_is_kept():
     """Where the initial stress pushes back elsewhere, the mean may be negative."""
-    watch = np.zeros(track.FIELDS)
-    watch[[track.FIRST_STRESS, track.KINETIC]] = -np.inf
-    watch[[track.PEAK_STRESS, track.LOCAL_STRESS]] = -9.0
-    watch[track.EVENT_DROP], watch[track.PEAK_WIDTH] = 1.0, 0.1
+    watch = np.zeros(monitor.FIELDS)
+    watch[[monitor.FIRST_STRESS, monitor.KINETIC]] = -np.inf
+    watch[[monitor.PEAK_STRESS, monitor.LOCAL_STRESS]] = -9.0
+    watch[monitor.EVENT_DROP], watch[monitor.PEAK_WIDTH] = 1.0, 0.1
     events = [(-8.0, 0.0), (-9.5, 1.6), (-9.4, 0.0), (-6.0, 0.0), (-7.5, 2.0), (-7.4, 0.0)]
     for step, (mean, radiated) in enumerate(events):
-        track.observe(watch, float(step), 0.0, mean, radiated, step)
-    assert watch[track.FIRST_STRESS] == -8.0
-    assert watch[track.ARRESTED] == 2
-    assert (watch[track.PEAK_STRESS], watch[track.PEAK_NODE]) == (-6.0, 3)
+        monitor.observe(watch, float(step), 0.0, mean, radiated, step)
+    assert watch[monitor.FIRST_STRESS] == -8.0
+    assert watch[monitor.ARRESTED] == 2
+    assert (watch[monitor.PEAK_STRESS], watch[monitor.PEAK_NODE]) == (-6.0, 3)
 
 
 def test_the_place_of_a_slow_onset_is_that_of_equilibrium():
@@ -186,8 +187,8 @@ def test_damaged_checkpoints_are_refused(tmp_path):
 
 def test_a_cache_file_with_other_content_is_built_again(tmp_path, monkeypatch):
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(cache, "_memory", {})
-    first = cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    monkeypatch.setattr(kernel_cache, "_memory", {})
+    first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
     (path,) = tmp_path.iterdir()
     contents = [
         {"poles": first.poles, "weights": first.weights[1:], "error": 0.0, "t_max": 1.0},
@@ -196,12 +197,12 @@ def test_a_cache_file_with_other_content_is_built_again(tmp_path, monkeypatch):
     ]
     for content in contents:
         np.savez(path, **content)
-        cache._memory.clear()
-        assert np.array_equal(cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
+        kernel_cache._memory.clear()
+        assert np.array_equal(kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
     with path.open("wb") as stream:
         np.save(stream, np.zeros(3))
-    cache._memory.clear()
-    assert np.array_equal(cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
+    kernel_cache._memory.clear()
+    assert np.array_equal(kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
 
 
 def test_a_restart_has_every_step_and_frame_with_an_interval(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 import stiction as st
 from stiction import InputError
-from stiction.dynamics.measures import rupture_speed, strain_energy
+from stiction.dynamics.energies import rupture_speed, strain_energy
 from stiction.dynamics.simulate import simulate_rupture
 
 NODES, LENGTH = 128, 0.05

@@ -11,9 +11,9 @@ import pytest
 
 import stiction as st
 from stiction.cli import app as room
-from stiction.ensemble import stored
+from stiction.ensemble import resume
 from stiction.ensemble.distributed import Cluster, dask_executor, slurm_cluster
-from stiction.runs import StoredRun, run_into
+from stiction.stored_run import StoredRun, run_into
 
 STUDY = {
     "problem": {
@@ -71,7 +71,7 @@ def test_a_running_scheduler_gives_the_same_bits(cluster, tmp_path, reference):
 def test_a_worker_killed_in_mid_run_loses_and_repeats_nothing(
     cluster, tmp_path, reference, monkeypatch
 ):
-    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.05)
+    monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.05)
     victims, done = [], []
 
     def kill_one(count, total):
@@ -93,7 +93,7 @@ def test_a_worker_killed_in_mid_run_loses_and_repeats_nothing(
 @pytest.mark.slow
 def test_all_workers_gone_and_back(cluster, tmp_path, reference, monkeypatch):
     """While nobody works the run waits; what comes back goes on."""
-    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.05)
+    monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.05)
     seen = []
 
     def lose_all(count, total):

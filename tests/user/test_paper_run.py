@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.paper.claims import CLAIMS
-from stiction.paper.figures import FIGURES
-from stiction.paper.setting import Setting
-from stiction.paper.studies import STUDIES
+from stiction.papers.albertini2020.claims import CLAIMS
+from stiction.papers.albertini2020.figures import FIGURES
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies import STUDIES
 
 
 def _options() -> dict:
@@ -124,7 +124,7 @@ def test_only_some_figures(tmp_path):
 
 def test_the_same_command_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
     """What is done is kept: nothing of it is computed again, and the results are the same."""
-    from stiction.paper import studies
+    from stiction.papers.albertini2020 import studies
 
     class Interrupted(BaseException):
         pass

@@ -16,10 +16,10 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.ensemble import share, store, stored, work
+from stiction.ensemble import resume, scheduler, store, work
 from stiction.ensemble.files import Lock
 from stiction.ensemble.trouble import StoreError, WorkerError
-from stiction.runs import StoredRun, folder_beside, run_into
+from stiction.stored_run import StoredRun, folder_beside, run_into
 
 STUDY = {
     "problem": {
@@ -49,9 +49,9 @@ def make_study(samples=900, **changes):
 @pytest.fixture
 def often(monkeypatch):
     """Many chunks of a hundred samples instead of one a second."""
-    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.0)
+    monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.0)
     monkeypatch.setattr(
-        share.Sizer, "next", lambda sizer, plan, span, *rest: min(100, span.samples)
+        scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(100, span.samples)
     )
 
 
@@ -367,7 +367,7 @@ def test_a_full_disk(small_disk, often, reference, monkeypatch):
         make_study().run(out=small_disk / "run", workers=1)
     ballast.unlink()
     # What is left goes into larger chunks: each takes at least 10 kB.
-    monkeypatch.setattr(stored, "FLUSH_SECONDS", 10.0)
+    monkeypatch.setattr(resume, "FLUSH_SECONDS", 10.0)
     assert make_study().run(out=small_disk / "run").identical(reference)
 
 
@@ -392,7 +392,7 @@ def test_a_version_that_differs_is_said(tmp_path, often, monkeypatch):
 
 def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     """Only so many pieces are handed out, and each is only so big, whatever the study."""
-    monkeypatch.setattr(share, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(scheduler, "MOST_BYTES", 2**20)
     alive, most = set(), 0
 
     class Counting:
@@ -415,9 +415,9 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     plan = make_study(
         sweep=[], ensemble={"samples": 20000, "keep": ["strength"], "keep_limit": 1e9}
     ).plans[0]
-    spans = [share.Span(0, 0, 20000)]
+    spans = [scheduler.Span(0, 0, 20000)]
     largest = 0
-    for outcome in share.share_out([plan], spans, executor=Counting(), workers=3, seconds=1e6):
+    for outcome in scheduler.share_out([plan], spans, executor=Counting(), workers=3, seconds=1e6):
         largest = max(largest, outcome.nbytes if outcome else 0)
     assert most <= 6  # two a worker
     # 128 nodes and four more numbers a sample make 1056 bytes: a fair share would be 3.5 MB.
@@ -442,7 +442,7 @@ def test_killed_at_random_moments(tmp_path, monkeypatch):
 
 
 def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
-    """A sample that takes long does not keep finished ones from being stored."""
+    """A sample that takes long does not keep finished ones from being resume."""
     original = work.compute
 
     def slow(plan, first, count):

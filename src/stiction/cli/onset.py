@@ -41,7 +41,7 @@ def onset(
     let go. The method of the study keeps its options, the others take their defaults.
     """
     from stiction.profile_file import read_profile
-    from stiction.study import Study
+    from stiction.study.study import Study
 
     if out is not None:
         if out.suffix not in (".png", ".pdf", ".svg"):
@@ -74,7 +74,7 @@ def onset(
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
     """The methods to ask: the study's own as it is, the others with their defaults."""
     from stiction.errors import unknown_name
-    from stiction.study import METHODS
+    from stiction.study.study import METHODS
 
     classes = {cls.__dataclass_fields__["type"].default: cls for cls in METHODS}
     unknown = [
@@ -96,7 +96,7 @@ def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any
 
 
 def _ask(problem: Any, profile: Any, method: Any) -> tuple[Any, float]:
-    from stiction.methods import onset as ask
+    from stiction.evaluation import onset as ask
 
     begin = time.perf_counter()
     result = ask(problem, profile, method=method)

@@ -69,7 +69,7 @@ def reliability(
     from stiction.reliability.estimate import check_stress, failure_probability
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
-    from stiction.study import Study
+    from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
     problem, field, method = loaded.problem, loaded.strength, loaded.method

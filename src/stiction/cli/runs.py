@@ -17,8 +17,8 @@ def status(run: RunPath) -> None:
 
     Every chunk is read and compared with its checksum.
     """
-    from stiction.runs import StoredRun
-    from stiction.sweep import name_point
+    from stiction.stored_run import StoredRun
+    from stiction.study.sweep import name_point
 
     stored = StoredRun(run)
     state, study = stored.status(), stored.study
@@ -52,7 +52,7 @@ def export(
     out: Annotated[Path, typer.Argument(metavar="RESULT.nc", help="NetCDF file to write.")],
 ) -> None:
     """Write a run as one NetCDF file over the sweep and the samples; missing samples are NaN."""
-    from stiction.runs import StoredRun
+    from stiction.stored_run import StoredRun
 
     writable(out, "the result")
     stored = StoredRun(run)
@@ -72,7 +72,7 @@ def plot(
 ) -> None:
     """Draw densities of the onset, and its quantiles against what is swept (PNG and PDF)."""
     from stiction.report.run_figures import write_figures
-    from stiction.runs import StoredRun
+    from stiction.stored_run import StoredRun
 
     stored = StoredRun(run)
     folder = writable_folder(out or _beside(run, "figures"))
@@ -88,7 +88,7 @@ def report(
 ) -> None:
     """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
     from stiction.report.run_report import write_report
-    from stiction.runs import StoredRun
+    from stiction.stored_run import StoredRun
 
     stored = StoredRun(run)
     path = writable(out or _beside(run, "report.html"), "the report")

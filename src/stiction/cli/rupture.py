@@ -42,7 +42,7 @@ def rupture(
     from stiction.dynamics.simulate import simulate_rupture
     from stiction.profile_file import read_profile
     from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
-    from stiction.study import Study
+    from stiction.study.study import Study
 
     writable_folder(out)
     loaded = Study.from_toml(study)

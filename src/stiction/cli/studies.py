@@ -67,8 +67,8 @@ def run(
     Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
     or the command; 130: interrupted.
     """
-    from stiction.runs import StoredRun, check_target, run_into
-    from stiction.study import Study
+    from stiction.stored_run import StoredRun, check_target, run_into
+    from stiction.study.study import Study
 
     if sum((workers is not None, scheduler is not None, slurm)) > 1:
         raise InputError("--workers, --scheduler, --slurm: give one of them")
@@ -115,7 +115,7 @@ def _show_failures(failures: Any, command: str) -> None:
 
 
 def _show_results(study: Any, result: Any) -> None:
-    from stiction.sweep import name_point
+    from stiction.study.sweep import name_point
 
     if not study.sweep:
         typer.echo(summary(result))
@@ -135,7 +135,7 @@ def check(
     ] = True,
 ) -> None:
     """Say what a study file would do, how long and how big, or everything that is wrong with it."""
-    from stiction.study import Study
+    from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
     typer.echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
@@ -194,8 +194,8 @@ def _resolution(problems: Any) -> list[tuple[str, str]]:
 
 
 def _cost(study: Any) -> list[tuple[str, str]]:
-    from stiction.ensemble.probe import probe_time, stored_bytes
-    from stiction.ensemble.share import usable_cores
+    from stiction.ensemble.cost_estimate import probe_time, stored_bytes
+    from stiction.ensemble.scheduler import usable_cores
 
     ensemble, plans = study.ensemble, study.plans
     cost = probe_time(plans, ensemble.samples, ensemble.first)
@@ -216,6 +216,6 @@ def _cost(study: Any) -> list[tuple[str, str]]:
 
 def schema() -> None:
     """Print the JSON schema of a study file, for editors that complete and check TOML."""
-    from stiction.study import study_schema
+    from stiction.study.study import study_schema
 
     typer.echo(json.dumps(study_schema(), indent=2))

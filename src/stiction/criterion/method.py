@@ -20,7 +20,7 @@ from stiction.criterion.nucleation import (
 )
 from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
-from stiction.rows import Rows
+from stiction.sample import Rows
 
 ENOUGH_POINTS = 16
 

@@ -11,7 +11,7 @@ from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.moving_average import average_rows
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.rows import Rows
+from stiction.sample import Rows
 
 Weights = Literal["exact", "rounded"]
 

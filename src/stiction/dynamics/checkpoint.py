@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics import track
+from stiction.dynamics import monitor
 from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
-from stiction.dynamics.run import Run, State
+from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 
 FORMAT = 2
@@ -40,7 +40,7 @@ def identity(run: Run) -> dict[str, NDArray[Any]]:
     medium, rows = run.medium, run.rows
     # When to stop may differ between the parts of one run; how to step may not.
     control = run.control.copy()
-    control[[track.SLID_STOP, track.DROP_STOP, track.END_TIME]] = 0.0
+    control[[monitor.SLID_STOP, monitor.DROP_STOP, monitor.END_TIME]] = 0.0
     values: dict[str, Any] = {
         "nodes": medium.nodes,
         "spacing": medium.spacing,

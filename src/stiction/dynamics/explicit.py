@@ -8,8 +8,8 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.dynamics.layout import advance_memory, pack
-from stiction.dynamics.track import (
+from stiction.dynamics.memory_layout import advance_memory, pack
+from stiction.dynamics.monitor import (
     ALL_SLID,
     BAD_NODE,
     CALM_COUNT,

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics import track
-from stiction.dynamics.measures import fracture_energy, strain_energy
-from stiction.dynamics.run import Run, State
+from stiction.dynamics import monitor
+from stiction.dynamics.energies import fracture_energy, strain_energy
+from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError, unknown_name
 from stiction.results import Variable
 
@@ -90,20 +90,20 @@ class Frames:
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
         friction = fracture + float((rows[1] * state.slip).sum()) * spacing
-        work = float(watch[track.WORK])
+        work = float(watch[monitor.WORK])
         frame: dict[str, Any] = {
             "time": state.time,
             "load": state.load,
             "mean_stress": state.mean_stress,
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
-            "weakened_fraction": float(watch[track.SLID]) / medium.nodes,
+            "weakened_fraction": float(watch[monitor.SLID]) / medium.nodes,
             "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * spacing,
             "work": work,
             "strain_energy": strain,
             "fracture_energy": fracture,
             "radiated_energy": work - friction - strain,
-            "time_step": float(watch[track.STEP]),
+            "time_step": float(watch[monitor.STEP]),
             "step_number": state.steps,
         }
         fields = {
@@ -125,7 +125,7 @@ class Frames:
             n = self.run.medium.nodes
             values |= {name: np.empty((0, n)) for name in self.variables}
         if self.keep_steps:
-            record = np.concatenate([np.empty((0, track.COLUMNS)), *self._records])
+            record = np.concatenate([np.empty((0, monitor.COLUMNS)), *self._records])
             values |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
         self._frames, self._records = [], []
         return values

@@ -10,7 +10,7 @@ from stiction._jit import jit
 from stiction._typing import Array
 from stiction.dynamics.complementarity import solve_increment
 from stiction.dynamics.explicit import load_at
-from stiction.dynamics.track import (
+from stiction.dynamics.monitor import (
     ALL_SLID,
     BAD_NODE,
     DONE,

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from stiction._model import Count, Positive, _number, model
-from stiction.dynamics import track
+from stiction.dynamics import monitor
+from stiction.dynamics.discretization import Medium, prepare_medium
+from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
+from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, uniform_rate
-from stiction.dynamics.measures import fracture_energy, radiated_energy, rupture_speed
-from stiction.dynamics.medium import Medium, prepare_medium
-from stiction.dynamics.run import Run, State
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
-from stiction.rows import Rows
+from stiction.sample import Rows
 
 Floats = NDArray[np.float64]
 Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
@@ -149,7 +149,7 @@ class Rupture:
         state = run.start(time)
         _, reason = run.advance(state, self.max_steps)
         check_finite(run, state, reason)
-        if reason != track.ALL_SLID:
+        if reason != monitor.ALL_SLID:
             raise InputError(
                 f"max_steps: {self.max_steps} steps were taken before every node had reached its "
                 f"residual strength (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa); "
@@ -223,23 +223,23 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     critical = (strength - residual) / weakening
     table = np.stack([strength, residual, weakening, critical, rows.load_profile, initial])
     drop = float(np.mean(strength - residual))
-    control = np.zeros(track.CONTROLS)
+    control = np.zeros(monitor.CONTROLS)
     smallest = _SWITCH * medium.step
-    control[track.SLID_STOP] = medium.nodes
-    control[track.DROP_STOP] = np.inf
-    control[track.CALM_RATE] = 0.25 * method.slip_step * critical.min() / smallest
-    control[track.CALM_COUNT] = _CALM_STEPS if method.implicit else np.inf
-    control[track.SLIP_STEP] = method.slip_step
-    control[track.LOAD_STEP] = method.load_step * drop
-    control[track.SMALLEST_STEP] = smallest
-    control[track.RESIDUAL] = 1e-9 * drop
-    control[track.LARGEST_STEP], control[track.END_TIME] = _SLOWEST, np.inf
-    control[track.EVENT_DROP_SIZE] = method.event_drop * drop
-    control[track.PEAK_WIDTH_SIZE] = 1e-5 * drop
-    control[track.NOTICED] = 1e-7 * drop
-    control[track.GROWTH] = _GROWTH
-    control[track.NEGLIGIBLE] = 5e-7 * drop
-    control[track.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
+    control[monitor.SLID_STOP] = medium.nodes
+    control[monitor.DROP_STOP] = np.inf
+    control[monitor.CALM_RATE] = 0.25 * method.slip_step * critical.min() / smallest
+    control[monitor.CALM_COUNT] = _CALM_STEPS if method.implicit else np.inf
+    control[monitor.SLIP_STEP] = method.slip_step
+    control[monitor.LOAD_STEP] = method.load_step * drop
+    control[monitor.SMALLEST_STEP] = smallest
+    control[monitor.RESIDUAL] = 1e-9 * drop
+    control[monitor.LARGEST_STEP], control[monitor.END_TIME] = _SLOWEST, np.inf
+    control[monitor.EVENT_DROP_SIZE] = method.event_drop * drop
+    control[monitor.PEAK_WIDTH_SIZE] = 1e-5 * drop
+    control[monitor.NOTICED] = 1e-7 * drop
+    control[monitor.GROWTH] = _GROWTH
+    control[monitor.NEGLIGIBLE] = 5e-7 * drop
+    control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     constants = np.array(
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
     )
@@ -254,8 +254,8 @@ def first_slip(run: Run) -> float:
 
 def check_finite(run: Run, state: State, reason: int) -> None:
     """Raise `FloatingPointError` that says when and where a run became non-finite."""
-    if reason == track.NOT_FINITE:
-        node = int(state.watch[track.BAD_NODE])
+    if reason == monitor.NOT_FINITE:
+        node = int(state.watch[monitor.BAD_NODE])
         raise FloatingPointError(
             f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
             f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
@@ -280,30 +280,30 @@ def _of_finite(statistic: Callable[[Floats], Any], values: Floats) -> float:
 def summary(problem: Problem, run: Run, state: State) -> dict[str, float]:
     """The scalars of a finished run."""
     medium, watch, rows = run.medium, state.watch, run.rows
-    peak = float(watch[track.PEAK_STRESS])
-    first = float(watch[track.FIRST_STRESS])
+    peak = float(watch[monitor.PEAK_STRESS])
+    first = float(watch[monitor.FIRST_STRESS])
     far, near = (front_speed(problem, run, state, lengths) for lengths in (2.0, 0.5))
-    kinetic = float(watch[track.KINETIC])
+    kinetic = float(watch[monitor.KINETIC])
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
     dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
     return {
         "critical_load": (peak - run.constants[3]) / run.constants[2],
         "critical_stress": peak,
         "first_instability": first if np.isfinite(first) else peak,
-        "critical_position": float(watch[track.PEAK_NODE]) * medium.spacing,
-        "applied_load": float(watch[track.PEAK_LOAD]),
-        "onset_time": float(watch[track.PEAK_TIME]),
+        "critical_position": float(watch[monitor.PEAK_NODE]) * medium.spacing,
+        "applied_load": float(watch[monitor.PEAK_LOAD]),
+        "onset_time": float(watch[monitor.PEAK_TIME]),
         "kinetic_stress": kinetic,
         "stress_drop": peak - kinetic,
         "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.spacing,
         "radiated_energy": radiated_energy(
-            float(watch[track.WORK]), state.slip, state.slip_hat, rows,
+            float(watch[monitor.WORK]), state.slip, state.slip_hat, rows,
             medium.stiffness[0], medium.spacing,
         ),
         "fracture_energy": float(dissipated.sum()) * medium.spacing,
-        "arrested_events": int(watch[track.ARRESTED]),
+        "arrested_events": int(watch[monitor.ARRESTED]),
         "rupture_speed": _of_finite(np.max, far),
         "median_rupture_speed": _of_finite(np.median, near),
-        "implicit_steps": int(watch[track.IMPLICIT_STEPS]),
-        "explicit_steps": int(watch[track.EXPLICIT_STEPS]),
+        "implicit_steps": int(watch[monitor.IMPLICIT_STEPS]),
+        "explicit_steps": int(watch[monitor.EXPLICIT_STEPS]),
     }  # fmt: skip

@@ -15,9 +15,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe, real_array, to_plain
-from stiction.dynamics import track
+from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.frames import Frames, check_variables
+from stiction.dynamics.integrator import NOTHING, Run, State
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
@@ -29,7 +30,6 @@ from stiction.dynamics.method import (
     summary,
     warn_if_coarse,
 )
-from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
@@ -76,7 +76,7 @@ def _progress(state: State) -> Progress:
         state.load,
         state.mean_stress,
         state.steps,
-        float(state.watch[track.SLID]) / state.slip.size,
+        float(state.watch[monitor.SLID]) / state.slip.size,
     )
 
 
@@ -246,11 +246,11 @@ def simulate_rupture(
     run = make_run(method, method.medium(problem), rows, 0, history)
     drop = float(np.mean(run.rows[0] - run.rows[1]))
     if stop == "time":
-        run.control[track.SLID_STOP] = np.inf
+        run.control[monitor.SLID_STOP] = np.inf
     if stop == "onset":
-        run.control[track.DROP_STOP] = method.event_drop * drop
+        run.control[monitor.DROP_STOP] = method.event_drop * drop
     if end_time is not None:
-        run.control[track.END_TIME] = end_time
+        run.control[monitor.END_TIME] = end_time
     if restart is None:
         state = _initial(run, initial_slip, initial_load)
     else:
@@ -282,18 +282,18 @@ def simulate_rupture(
     next_checkpoint = state.steps + checkpoint_every
     reason = "max_steps"
     near = _NEAR_ONSET * drop
-    record = np.empty((max(every, every_implicit, every_near_onset or 1), track.COLUMNS))
+    record = np.empty((max(every, every_implicit, every_near_onset or 1), monitor.COLUMNS))
     try:
         while state.steps < method.max_steps:
             count = every if state.explicit else every_implicit
-            falling = state.watch[track.LOCAL_STRESS] - state.mean_stress
+            falling = state.watch[monitor.LOCAL_STRESS] - state.mean_stress
             if every_near_onset is not None and state.explicit and falling < near:
                 count = every_near_onset
             count = min(count, method.max_steps - state.steps)
             part = record[:count] if steps else NOTHING
             taken, code = run.advance(state, count, part)
             frames.add_steps(part[:taken])
-            if code == track.NOT_FINITE:
+            if code == monitor.NOT_FINITE:
                 check_finite(run, state, code)
             ended = _reason(code, run, state, stop)
             if ended or interval is None or state.time // interval > before // interval:
@@ -339,11 +339,11 @@ def _quietly(action: Callable[[], None]) -> None:
 
 def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
     """Why the run ends here, or None."""
-    if code == track.ALL_SLID:
+    if code == monitor.ALL_SLID:
         return "sliding"
-    if code == track.DROPPED:
+    if code == monitor.DROPPED:
         return "onset"
-    if stop == "arrest" and state.watch[track.ARRESTED] > 0.0:
+    if stop == "arrest" and state.watch[monitor.ARRESTED] > 0.0:
         return "arrest"
     if run.ended(state):
         return "time"

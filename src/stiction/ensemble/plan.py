@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.fields.draws import BLOCK
-from stiction.fields.random_field import RandomField
-from stiction.methods import Method, Values, solve, variables_of
+from stiction.evaluation import Method, Values, solve, variables_of
 from stiction.problem import Problem
+from stiction.random.draws import BLOCK
+from stiction.random.random_field import RandomField
 from stiction.results import Variable
 
 STREAMS = {"residual_strength": 1, "initial_stress": 2, "weakening_rate": 3}

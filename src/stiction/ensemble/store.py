@@ -30,7 +30,7 @@ from stiction.ensemble.files import (
     write_whole,
 )
 from stiction.ensemble.same import refuse_another
-from stiction.ensemble.share import Span
+from stiction.ensemble.scheduler import Span
 from stiction.ensemble.trouble import StoreError
 from stiction.ensemble.work import Failure, Outcome
 from stiction.results import Variable

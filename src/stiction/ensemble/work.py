@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan, chunks, compute
 from stiction.errors import InputError
-from stiction.methods import Values
+from stiction.evaluation import Values
 
 
 class Failure(NamedTuple):

@@ -6,13 +6,13 @@ import numpy as np
 
 from stiction._jit import ZERO, jit
 from stiction._typing import Array
-from stiction.equilibrium.bound import Windows, window_bound
-from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run
+from stiction.elasticity.line_stiffness import apply_stiffness
+from stiction.equilibrium.instability_jump import AT_FLOOR, UNDECIDED, escape_run
+from stiction.equilibrium.linear_program import solve_program
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.program import solve_program
-from stiction.equilibrium.runaway import runs_away
-from stiction.equilibrium.spaces import Grid, Room, Sample, make_room
-from stiction.equilibrium.stiffness import apply_stiffness
+from stiction.equilibrium.single_patch_test import runs_away
+from stiction.equilibrium.window_bound import Windows, window_bound
+from stiction.equilibrium.workspace import Grid, Room, Sample, make_room
 
 LOAD, GAP, PATCHES, POSITION, LENGTH, FATE = range(6)
 COLUMNS = 6

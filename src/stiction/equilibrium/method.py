@@ -11,7 +11,7 @@ from stiction._model import model
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
 from stiction.results import ONSET_VARIABLES, Variable
-from stiction.rows import Rows
+from stiction.sample import Rows
 
 OWN_VARIABLES: dict[str, Variable] = {
     "certificate_gap": Variable("Pa", "distance between the bounds of the first instability"),

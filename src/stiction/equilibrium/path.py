@@ -9,10 +9,10 @@ import xarray as xr
 
 from stiction._model import real_array, to_plain
 from stiction._typing import Array
-from stiction.equilibrium.follow import State, at_rest, follow, residual_nodes
-from stiction.equilibrium.setting import Setting
+from stiction.equilibrium.continuation import State, at_rest, follow, residual_nodes
+from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
-from stiction.equilibrium.spaces import Sample
+from stiction.equilibrium.workspace import Sample
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.results import POSITION, Variable, to_dataset

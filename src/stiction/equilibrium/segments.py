@@ -7,7 +7,7 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
-from stiction.equilibrium.program import PIVOT
+from stiction.equilibrium.linear_program import PIVOT
 
 
 @jit

@@ -11,7 +11,7 @@ from stiction._typing import Array
 from stiction.equilibrium import batch
 from stiction.equilibrium.batch import solve_batch
 from stiction.equilibrium.cholesky import dot
-from stiction.equilibrium.follow import (
+from stiction.equilibrium.continuation import (
     OVERSHOOT,
     Event,
     State,
@@ -20,15 +20,15 @@ from stiction.equilibrium.follow import (
     follow,
     residual_nodes,
 )
-from stiction.equilibrium.jump import SLIDING, UNDECIDED, escape_run
-from stiction.equilibrium.large import Solution
+from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED, escape_run
+from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.runaway import runs_away
-from stiction.equilibrium.setting import LARGE_GRID, Setting
-from stiction.equilibrium.spaces import Sample
+from stiction.equilibrium.prepared import LARGE_GRID, Setting
+from stiction.equilibrium.single_patch_test import runs_away
+from stiction.equilibrium.workspace import Sample
 from stiction.errors import warn_accuracy
 from stiction.problem import Problem
-from stiction.rows import Rows
+from stiction.sample import Rows
 
 WORST_GAP = 1e-9
 """Certificate gap, as a share of the load, from which on there is a warning."""

@@ -10,9 +10,9 @@ import xarray as xr
 from stiction._model import describe, to_plain
 from stiction._typing import Array
 from stiction.errors import InputError
-from stiction.fields.random_field import RandomField
-from stiction.methods import Method
+from stiction.evaluation import Method
 from stiction.problem import Problem
+from stiction.random.random_field import RandomField
 from stiction.reliability.design import (
     TailRequest,
     check_probability,
@@ -27,7 +27,7 @@ from stiction.reliability.limit_state import (
     make_limit_state,
     whole_number,
 )
-from stiction.reliability.plain import BATCH
+from stiction.reliability.plain_monte_carlo import BATCH
 from stiction.reliability.result import say
 from stiction.reliability.uncertainty import binomial_interval, lognormal_interval
 from stiction.results import Variable, to_dataset

@@ -11,9 +11,10 @@ import numpy as np
 
 from stiction._model import describe
 from stiction.criterion.method import LocalCriterion
-from stiction.fields.random_field import RandomField
-from stiction.methods import Method
+from stiction.evaluation import Method
 from stiction.problem import Problem
+from stiction.random.random_field import RandomField
+from stiction.reliability.algorithms import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
 from stiction.reliability.estimate import (
     ALIKE,
     FREQUENT,
@@ -23,9 +24,8 @@ from stiction.reliability.estimate import (
     usable_first_stage,
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state, real_number
-from stiction.reliability.pooled import AnyTailRun, Tail, run_until_precise
+from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
 from stiction.reliability.result import say
-from stiction.reliability.sampled import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width

@@ -8,9 +8,16 @@ from typing import Any, Literal
 from stiction._model import describe
 from stiction.criterion.method import LocalCriterion
 from stiction.errors import unknown_name
-from stiction.fields.random_field import RandomField
-from stiction.methods import Method
+from stiction.evaluation import Method
 from stiction.problem import Problem
+from stiction.random.random_field import RandomField
+from stiction.reliability.algorithms import (
+    Request,
+    by_counting,
+    by_importance,
+    by_subset,
+    by_two_levels,
+)
 from stiction.reliability.limit_state import (
     Event,
     LimitState,
@@ -18,15 +25,8 @@ from stiction.reliability.limit_state import (
     real_number,
     whole_number,
 )
-from stiction.reliability.plain import Count, tally
+from stiction.reliability.plain_monte_carlo import Count, tally
 from stiction.reliability.result import FailureProbability
-from stiction.reliability.sampled import (
-    Request,
-    by_counting,
-    by_importance,
-    by_subset,
-    by_two_levels,
-)
 from stiction.reliability.two_level import agreement
 
 Algorithm = Literal["auto", "plain", "subset", "importance", "two_level"]

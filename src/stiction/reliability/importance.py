@@ -15,9 +15,9 @@ from scipy.special import logsumexp
 
 from stiction._typing import Array
 from stiction.criterion.nucleation import multiplier_of
-from stiction.fields.quantile_table import from_normal
-from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
+from stiction.random.quantile_table import from_normal
+from stiction.random.random_field import RandomField
 
 SIZES = (1.0, 1.15)
 """Shifts in units of the design point: the failures lie a little beyond it."""

@@ -12,12 +12,12 @@ import numpy as np
 
 from stiction._model import describe
 from stiction._typing import Array
+from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.plan import STREAMS
-from stiction.ensemble.run import make_plan
-from stiction.ensemble.share import usable_cores
+from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
-from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.problem import Problem
+from stiction.random.random_field import RandomField, warn_if_inaccurate
 
 Event = Literal["critical_stress", "first_instability"]
 

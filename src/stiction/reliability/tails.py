@@ -12,12 +12,12 @@ import xarray as xr
 
 from stiction._typing import Array
 from stiction.errors import InputError
-from stiction.fields.marginals import Beta
-from stiction.fields.random_field import RandomField
-from stiction.fields.spectra import CustomSpectrum
+from stiction.evaluation import Method
 from stiction.interface import Interface
-from stiction.methods import Method
 from stiction.problem import Problem
+from stiction.random.marginals import Beta
+from stiction.random.random_field import RandomField
+from stiction.random.spectra import CustomSpectrum
 from stiction.reliability.curve import failure_curve
 
 CORRELATION_RATIOS = (0.25, 0.5, 1.0, 2.0)

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from stiction.report.style import PAGE, color, new_figure, panel, paper_style, series
-from stiction.runs import StoredRun
 from stiction.statistics.densities import density
 from stiction.statistics.quantiles import quantiles
+from stiction.stored_run import StoredRun
 
 CURVES = 6
 MOST_FIGURES = 12

@@ -18,9 +18,9 @@ from stiction.errors import InputError
 from stiction.report.run_figures import run_figures
 from stiction.report.style import paper_style
 from stiction.report.tables import Table
-from stiction.runs import Status, StoredRun
 from stiction.statistics.estimates import mean, standard_deviation
 from stiction.statistics.quantiles import quantiles
+from stiction.stored_run import Status, StoredRun
 
 MOST_ROWS = 200
 LEVELS = (0.05, 0.5, 0.95)

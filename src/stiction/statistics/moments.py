@@ -13,9 +13,9 @@ from scipy.integrate import simpson
 from stiction.criterion.eigenproblem import Weight
 from stiction.criterion.nucleation import Weights, multiplier_of, weight_of
 from stiction.errors import InputError
-from stiction.fields.hermite import correlation_of_mapped, hermite_coefficients
-from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
+from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.random_field import RandomField
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from stiction._jit import jit
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
-from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
+from stiction.random.random_field import RandomField
 from stiction.statistics.moments import _uniform_load
 
 Array = NDArray[np.float64]

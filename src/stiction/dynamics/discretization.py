@@ -1,0 +1,105 @@
+"""What all runs of one problem share: stiffness, kernel, tables of the explicit step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics.courant_limit import courant_limit
+from stiction.dynamics.memory_layout import step_table
+from stiction.elasticity.exponential_sum import ExponentialSum
+from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.errors import InputError
+from stiction.problem import Problem
+
+Floats = NDArray[np.float64]
+
+LARGEST_POISSON_RATIO = 0.49
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Medium:
+    """Elastic half-spaces on a grid, with a fixed explicit time step. Read-only, shared by threads.
+
+    Attributes
+    ----------
+    nodes : int
+    spacing : float
+        dx, m.
+    impedance : float
+        Z = G/(2 c_s), Pa s/m.
+    step : float
+        Explicit time step, s.
+    largest_step : float
+        Limit of stability of the explicit step, s.
+    pace : (nodes//2,) array
+        k c_s, rad/s, of the modes j = 1..nodes//2.
+    stiffness : (2, nodes//2) array
+        G*|k|/2 and G|k|/2, Pa/m.
+    table, gain, fresh : arrays
+        Of the explicit step, see `layout.step_table`.
+    """
+
+    nodes: int
+    spacing: float
+    impedance: float
+    step: float
+    largest_step: float
+    kernel: ExponentialSum
+    pace: Floats
+    stiffness: Floats
+    table: Floats
+    gain: Floats
+    fresh: Floats
+    shear_modulus: float
+
+
+def prepare_medium(
+    problem: Problem,
+    *,
+    tolerance: float,
+    memory_range: float,
+    courant: float,
+    time_step: float | None,
+) -> Medium:
+    """Tables for a problem; raises `InputError` if the step is above the stability limit."""
+    solid, interface, mode = problem.solid, problem.interface, problem.mode
+    if mode == "II" and not 0.0 <= solid.poisson_ratio <= LARGEST_POISSON_RATIO:
+        raise InputError(
+            f"solid.poisson_ratio: elastodynamics in mode II needs 0 <= nu <= "
+            f"{LARGEST_POISSON_RATIO} (the dilatational wave becomes infinitely fast at 0.5), "
+            f"got {solid.poisson_ratio}"
+        )
+    eta = solid.wave_speed_ratio
+    kernel = kernel_sum(mode, eta, tolerance, memory_range)
+    speed = solid.shear_wave_speed
+    limit = courant_limit(mode, eta, kernel) * interface.spacing / speed
+    step = courant * limit if time_step is None else time_step
+    if step > limit:
+        raise InputError(
+            f"time_step: {step:.6g} s is above the stability limit {limit:.6g} s of this grid "
+            f"and solid (c_s dt/dx = {limit * speed / interface.spacing:.3f}); use at most "
+            f"{0.9 * limit:.6g} s"
+        )
+    wavenumbers = interface.wavenumbers[1:]
+    pace = wavenumbers * speed
+    table, gain, fresh = step_table(kernel, pace, step)
+    stiffness = 0.5 * np.stack(
+        [problem.effective_modulus * wavenumbers, solid.shear_modulus * wavenumbers]
+    )
+    return Medium(
+        nodes=interface.nodes,
+        spacing=interface.spacing,
+        impedance=solid.shear_modulus / (2.0 * speed),
+        step=step,
+        largest_step=limit,
+        kernel=kernel,
+        pace=pace,
+        stiffness=stiffness,
+        table=table,
+        gain=gain,
+        fresh=fresh,
+        shear_modulus=solid.shear_modulus,
+    )

@@ -1,0 +1,239 @@
+"""One run: explicit steps and implicit steps, and the switch between them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import monitor
+from stiction.dynamics.discretization import Medium
+from stiction.dynamics.explicit import explicit_steps, load_at
+from stiction.dynamics.implicit import implicit_steps
+from stiction.dynamics.loading import History
+from stiction.dynamics.memory_layout import LANES, blocks, carry_memory, scale_memory
+
+Floats = NDArray[np.float64]
+
+NOTHING = np.empty((0, monitor.COLUMNS))
+
+
+@dataclasses.dataclass(eq=False)
+class State:
+    """Everything that changes in a run; two runs from equal states are the same run, bit by bit.
+
+    Attributes
+    ----------
+    slip, rate, stress : (nodes,) arrays
+        m, m/s, Pa.
+    slip_hat : (nodes//2 + 1,) complex array
+        Real transform of the slip.
+    past : (nodes,) array
+        Mean slip rate in the last implicit step, m/s.
+    memory : flat array
+        Memory variables as in `layout`: psi/B while explicit, psi while implicit.
+    carried : flat array
+        The memory's part of the next explicit step.
+    arrival : (nodes,) array
+        When half of d_c was reached, s; nan before.
+    watch : (monitor.FIELDS,) array
+        Time, load, work of the load, peaks, events, counts.
+    explicit : bool
+        Which kind of step comes next.
+    step : float
+        Size that the next implicit step tries, s.
+    """
+
+    slip: Floats
+    rate: Floats
+    stress: Floats
+    slip_hat: NDArray[np.complex128]
+    past: Floats
+    memory: Floats
+    carried: Floats
+    arrival: Floats
+    watch: Floats
+    explicit: bool
+    step: float
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return float(self.watch[monitor.TIME])
+
+    @property
+    def load(self) -> float:
+        """tau_0, Pa."""
+        return float(self.watch[monitor.LOAD])
+
+    @property
+    def mean_stress(self) -> float:
+        """Mean shear stress on the interface, Pa."""
+        return float(self.watch[monitor.MEAN_STRESS])
+
+    @property
+    def steps(self) -> int:
+        """Steps taken so far, of both kinds."""
+        return int(self.watch[monitor.EXPLICIT_STEPS] + self.watch[monitor.IMPLICIT_STEPS])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Run:
+    """One interface under one load history: what does not change in a run.
+
+    Attributes
+    ----------
+    rows : (6, nodes) array
+        tau_p, tau_r, W, d_c, p, tau_i.
+    constants : (4,) array
+        Z, dx, <p>, <tau_i>.
+    """
+
+    medium: Medium
+    rows: Floats
+    constants: Floats
+    history: History
+    control: Floats
+
+    def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
+        """Static stress of a slip at a load, Pa: what an interface at rest carries."""
+        stress_hat = np.zeros_like(slip_hat)
+        stress_hat[1:] = -self.medium.stiffness[0] * slip_hat[1:]
+        shared: Floats = np.fft.irfft(stress_hat, self.medium.nodes)
+        return shared + load * self.rows[4] + self.rows[5]
+
+    def start(self, time: float, slip: Floats | None = None) -> State:
+        """State of rest (or of an equilibrium with this slip) at a time, with an empty memory."""
+        n, pairs = self.medium.nodes, self.medium.kernel.poles.size
+        count = blocks(n)
+        delta = np.zeros(n) if slip is None else np.array(slip, dtype=np.float64)
+        watch = np.zeros(monitor.FIELDS)
+        load = float(load_at(*self.history, time))
+        slip_hat = np.fft.rfft(delta)
+        stress = self.elastic_stress(slip_hat, load)
+        limit = np.maximum(self.rows[0] - self.rows[2] * delta, self.rows[1])
+        rate = np.maximum(stress - limit, 0.0) / self.medium.impedance
+        # A node that has just reached its strength has not begun to slip: drop round-off.
+        rate[rate * self.medium.impedance < 1e-12 * self.rows[0]] = 0.0
+        stress = stress - self.medium.impedance * rate
+        watch[monitor.TIME], watch[monitor.LOAD] = time, load
+        watch[monitor.MEAN_STRESS] = watch[monitor.PEAK_STRESS] = stress.mean()
+        watch[monitor.LOCAL_STRESS] = stress.mean()
+        watch[monitor.LOCAL_RADIATED] = self.medium.impedance * rate.mean()
+        watch[monitor.PEAK_TIME], watch[monitor.PEAK_LOAD] = time, load
+        watch[monitor.PEAK_NODE] = int(np.argmax(stress - limit))
+        watch[monitor.FIRST_STRESS] = watch[monitor.KINETIC] = -np.inf  # not yet
+        watch[monitor.BAD_NODE] = -1.0
+        watch[monitor.EVENT_DROP] = self.control[monitor.EVENT_DROP_SIZE]
+        watch[monitor.PEAK_WIDTH] = self.control[monitor.PEAK_WIDTH_SIZE]
+        watch[monitor.TOP_RATE] = rate.max()
+        watch[monitor.SLID] = np.count_nonzero(delta >= self.rows[3])
+        arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
+        size = self.control[monitor.SMALLEST_STEP]
+        slope = self.slope(time)
+        first = 0.1 * self.control[monitor.LOAD_STEP] / slope if slope > 0.0 else size
+        return State(
+            slip=delta,
+            rate=rate,
+            stress=stress,
+            slip_hat=slip_hat,
+            past=rate.copy(),
+            memory=np.zeros(count * pairs * 4 * LANES),
+            carried=np.zeros(count * 2 * LANES),
+            arrival=arrival,
+            watch=watch,
+            explicit=bool(self.control[monitor.EXPLICIT_ONLY] > 0.0),
+            step=min(max(size, first), self.control[monitor.LARGEST_STEP]),
+        )
+
+    def slope(self, time: float) -> float:
+        """Size of the loading rate just after a time, Pa/s."""
+        times, values = self.history
+        i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
+        return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
+
+    @functools.cached_property
+    def turns(self) -> Floats:
+        """Times at which the load begins to fall or to rise again, s."""
+        times, values = self.history
+        rising = np.sign(np.diff(values))
+        turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
+        return turned
+
+    def ended(self, state: State) -> bool:
+        """Whether the end time is reached, up to the rounding of a sum of many steps."""
+        return bool(self.control[monitor.END_TIME] - state.time <= 1e-6 * self.medium.step)
+
+    def resting(self, state: State) -> bool:
+        """Whether nothing slips and the load, beyond its last piece, never rises again."""
+        times, values = self.history
+        return bool(
+            not state.explicit
+            and state.time >= times[-1]
+            and values[-1] <= values[-2]
+            and self.medium.impedance * state.rate.max() <= self.control[monitor.RESIDUAL]
+        )
+
+    def _to_explicit(self, state: State) -> None:
+        pairs = self.medium.kernel.poles.size
+        scale_memory(state.memory, self.medium.gain, pairs, divide=True)
+        carry_memory(state.memory, self.medium.table, state.carried, pairs)
+        state.explicit = True
+        state.watch[monitor.CALM_STEPS] = 0.0
+
+    def _to_implicit(self, state: State) -> None:
+        scale_memory(state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False)
+        state.explicit = False
+        state.past = state.rate.copy()
+        state.watch[monitor.PAST_STEP] = 0.0  # the first implicit step is one of first order
+        state.watch[monitor.RADIATED] = self.medium.impedance * state.rate.mean()
+        state.step = 2.0 * float(self.control[monitor.SMALLEST_STEP])
+
+    def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
+        """Take up to `count` steps in place; return (steps taken, why it returned).
+
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED or
+        NOT_FINITE of `track`. Rows of `record` are filled, one a step.
+        """
+        taken = 0
+        while taken < count:
+            part = record[taken:] if record.shape[0] else NOTHING
+            if state.explicit:
+                fresh, reason = self._explicit(state, count - taken, part)
+            else:
+                fresh, reason = self._implicit(state, count - taken, part)
+            taken += fresh
+            if reason == monitor.TO_EXPLICIT:
+                self._to_explicit(state)
+            elif reason == monitor.TO_IMPLICIT:
+                self._to_implicit(state)
+            elif reason != monitor.DONE or taken >= count:
+                return taken, reason
+            elif self.ended(state):
+                return taken, monitor.DONE
+        return taken, monitor.DONE
+
+    def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        medium = self.medium
+        left = self.control[monitor.END_TIME] - state.time
+        if left < count * medium.step:
+            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
+        taken, reason = explicit_steps(
+            count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
+            state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,
+            medium.stiffness, self.constants, self.rows, *self.history, self.control, record,
+        )  # fmt: skip
+        return int(taken), int(reason)
+
+    def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        medium = self.medium
+        taken, size, reason = implicit_steps(
+            count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
+            state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
+            medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
+            *self.history, self.turns, self.control, record,
+        )  # fmt: skip
+        state.step = float(size)
+        return int(taken), int(reason)

@@ -1,0 +1,1 @@
+"""Linear elasticity of the half-spaces: static stiffness and memory kernels."""

@@ -1,0 +1,287 @@
+"""Running an ensemble in memory: the same numbers whoever computes them."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction._model import describe, to_plain
+from stiction._progress import progress_bar
+from stiction.ensemble.assemble import Gathered, GridAxis
+from stiction.ensemble.plan import PROFILES, STREAMS, Plan
+from stiction.ensemble.scheduler import Span, share_out, usable_cores
+from stiction.ensemble.work import raise_failure
+from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.evaluation import Method, check_method, variables_of
+from stiction.problem import Problem
+from stiction.random.random_field import RandomField, warn_if_inaccurate
+
+KEEP_LIMIT = 2.0**30
+FEW = 4
+
+
+def make_plan(
+    problem: Problem,
+    strength: RandomField,
+    method: Method,
+    seed: int,
+    fields: Mapping[str, RandomField | None],
+    keep: tuple[str, ...] = (),
+    keep_samples: tuple[int, ...] | None = None,
+) -> Plan:
+    """The plan of these arguments, or one `InputError` with all that is wrong with them."""
+    check_method(method)
+    problems = []
+    if not isinstance(problem, Problem):
+        problems.append(f"problem: must be a Problem, got {describe(problem)}")
+    for name, field in {"strength": strength, **fields}.items():
+        if field is None and name != "strength":
+            continue
+        if not isinstance(field, RandomField):
+            problems.append(f"{name}: must be a RandomField, got {describe(field)}")
+        elif isinstance(problem, Problem):
+            try:
+                field.modes(problem.interface)
+            except InputError as error:
+                problems += [f"{name}: {text}" for text in error.problems]
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
+    random = tuple((name, field) for name, field in fields.items() if field is not None)
+    if isinstance(problem, Problem):
+        method, mistakes = _keep_of_method(problem, method, keep, {name for name, _ in random})
+        problems += mistakes
+    if problems:
+        raise InputError(problems)
+    return Plan(problem, strength, method, int(seed), random, keep, keep_samples)
+
+
+def _keep_of_method(
+    problem: Problem, method: Any, keep: tuple[str, ...], random: set[str]
+) -> tuple[Any, list[str]]:
+    """The method with the options switched on that `keep` names, and what cannot be kept."""
+    switches = {
+        field.name
+        for field in dataclasses.fields(method)
+        if isinstance(getattr(method, field.name), bool)
+    }
+    problems = []
+    for name in keep:
+        if name == "strength" or name in random:
+            continue
+        if name not in variables_of(problem, method) and name in switches:
+            wider = dataclasses.replace(method, **{name: True})
+            if name in variables_of(problem, wider):
+                method = wider
+                continue
+        if name in PROFILES:
+            valid = ", ".join(sorted({"strength", *random}))
+            problems.append(f"keep: {name!r} is not random here (valid: {valid})")
+        elif name not in variables_of(problem, method):
+            wide = {n for n in switches | set(variables_of(problem, method)) if _wide(method, n)}
+            problems.append(unknown_name("keep", name, sorted({"strength"} | random | wide)))
+    return method, problems
+
+
+def _wide(method: Any, name: str) -> bool:
+    if isinstance(getattr(method, name, None), bool):
+        method = dataclasses.replace(method, **{name: True})
+    return name in method.variables and len(method.variables[name].dims) > 1
+
+
+def check_count(name: str, value: Any, smallest: int) -> None:
+    """Refuse what is not a whole number of at least `smallest`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
+        raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
+
+
+def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> None:
+    """Refuse arguments of a run that make no sense, before any work is done."""
+    check_count("samples", samples, 1)
+    check_count("first", first, 0)
+    if workers is not None:
+        check_count("workers", workers, 1)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise InputError(
+            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
+        )
+
+
+def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
+    """Bytes of what is kept along the interface."""
+    kept = samples
+    if plan.keep_samples is not None:
+        kept = sum(first <= sample < first + samples for sample in plan.keep_samples)
+    return 8.0 * plan.problem.interface.nodes * len(plan.wide) * kept
+
+
+def check_size(needed: float, limit: float) -> None:
+    """Refuse to keep more than the stated size."""
+    if needed > limit:
+        raise InputError(
+            f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
+            f" keep_limit = {limit / 2**20:,.0f} MiB; keep fewer variables, choose samples with"
+            " keep_samples, or raise keep_limit (bytes)"
+        )
+
+
+def warn_of_fields(plans: Sequence[Plan]) -> None:
+    """Warn of fields that the grid or the interface cannot do justice to, once each."""
+    found = [
+        (field, plan.problem.interface)
+        for plan in plans
+        for _, field in (("strength", plan.strength), *plan.fields)
+    ]
+    pairs = list(dict.fromkeys(found))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for field, interface in pairs:
+            warn_if_inaccurate(field, interface)
+    for warning in caught[:FEW]:
+        warn_accuracy(str(warning.message))
+    if len(caught) > FEW:
+        more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
+        warn_accuracy(more)
+
+
+def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
+    """All it takes to run the plan again, as a study in plain form."""
+    ensemble: dict[str, Any] = {"samples": samples, "seed": plan.seed, "first": first}
+    ensemble["keep"] = list(plan.keep)
+    if plan.keep_samples is not None:
+        ensemble["keep_samples"] = list(plan.keep_samples)
+    try:
+        study: dict[str, Any] = {
+            "problem": to_plain(plan.problem),
+            "strength": to_plain(plan.strength),
+            "method": to_plain(plan.method),
+            "ensemble": ensemble,
+        }
+        study |= {name: to_plain(field) for name, field in plan.fields}
+    except InputError as error:  # a function of the user's: the result says so and is still one
+        return {"study_incomplete": str(error), "seed": plan.seed}
+    return {"study": study, "seed": plan.seed}
+
+
+def run_plans(
+    plans: Sequence[Plan],
+    samples: int,
+    *,
+    first: int = 0,
+    axes: Sequence[GridAxis] = (),
+    attributes: Mapping[str, Any],
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+) -> xr.Dataset:
+    """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
+    check_run(samples, first, workers, executor)
+    warn_of_fields(plans)
+    workers = usable_cores() if workers is None else workers
+    gathered = Gathered(plans, samples, first)
+    total = len(plans) * samples
+    with progress_bar(total, method_name(plans), progress) as report:
+        spans = [Span(point, first, samples) for point in range(len(plans))]
+        for outcome in share_out(plans, spans, executor=executor, workers=workers):
+            if outcome is None:
+                continue
+            if outcome.failures:
+                raise_failure(outcome.failures[0])
+            gathered.add(outcome)
+            report(outcome.count)
+    return gathered.dataset(attributes, axes)
+
+
+def method_name(plans: Sequence[Plan]) -> str:
+    """For the progress bar."""
+    names = {plan.method.type for plan in plans}
+    return str(names.pop()) if len(names) == 1 else "samples"
+
+
+def monte_carlo(
+    problem: Problem,
+    strength: RandomField,
+    *,
+    method: Method,
+    samples: int,
+    seed: int = 0,
+    first: int = 0,
+    residual_strength: RandomField | None = None,
+    initial_stress: RandomField | None = None,
+    weakening_rate: RandomField | None = None,
+    keep: tuple[str, ...] = (),
+    keep_samples: Sequence[int] | None = None,
+    keep_limit: float = KEEP_LIMIT,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+) -> xr.Dataset:
+    """Onset of many random interfaces.
+
+    Sample i depends on (seed, i) only: not on the number of samples, the workers or the executor.
+
+    Parameters
+    ----------
+    problem : Problem
+    strength : RandomField
+        Peak strength, Pa.
+    method : LocalCriterion, Equilibrium or Rupture
+    samples : int
+        Number of samples.
+    seed : int
+        Not negative.
+    first : int
+        Number of the first sample, to continue an ensemble.
+    residual_strength, initial_stress, weakening_rate : RandomField, optional
+        What is random besides the strength, Pa or Pa/m, independent of it.
+    keep : tuple of str
+        What is kept along the interface: random fields, such as ``"strength"``, and what the
+        method can add, such as ``"sensitivity"``.
+    keep_samples : sequence of int, optional
+        Numbers of the samples for which it is kept; all if left out.
+    keep_limit : float
+        Bytes that this may take.
+    workers : int, optional
+        Threads; all cores by default. The compiled kernels release the interpreter lock.
+    executor : concurrent.futures.Executor, optional
+        Anything that has `submit`: processes, a Dask client's executor, ... instead of threads.
+    progress : bool or callable
+        True shows a bar on a terminal; a callable gets (done, total).
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'sample', as from `onset`. The attributes hold the version, the study as JSON and the
+        seed: enough to run it again.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit; a sample that does not fit is named with its seed.
+    RuntimeError
+        Naming the sample and the seed, if a solver fails.
+    """
+    fields = {
+        "residual_strength": residual_strength,
+        "initial_stress": initial_stress,
+        "weakening_rate": weakening_rate,
+    }
+    assert fields.keys() == STREAMS.keys()
+    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
+    plan = make_plan(problem, strength, method, seed, fields, tuple(keep), chosen)
+    check_run(samples, first, workers, executor)
+    check_size(wide_bytes(plan, samples, first), keep_limit)
+    return run_plans(
+        [plan],
+        samples,
+        first=first,
+        attributes=plan_attributes(plan, samples, first),
+        workers=workers,
+        executor=executor,
+        progress=progress,
+    )

@@ -1,0 +1,160 @@
+"""From the first instability to global sliding: stable path, jump, stable path, and so on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.equilibrium.instability_jump import (
+    ARRESTED,
+    AT_FLOOR,
+    SLIDING,
+    UNDECIDED,
+    escape_run,
+    jump,
+    step_to_floor,
+)
+from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.prepared import Setting
+from stiction.equilibrium.stable_path import CROWDED, REACHED, advance
+from stiction.equilibrium.window_test import runs_away_frozen
+from stiction.equilibrium.workspace import Sample, make_room
+from stiction.errors import warn_accuracy
+
+JUMP_STEPS = 4000
+MARGIN = 1.5
+"""Safety on the length at which a rupture counts as unstoppable."""
+MOVED = 1e-3
+"""Share of the largest added slip from which a node belongs to the patch of an event."""
+OVERSHOOT = 2.0 - AT_FLOOR
+
+
+@dataclass
+class Event:
+    """An instability that came to rest.
+
+    `load` is tau_0 (Pa); `position` and `length` (in nodes) belong to the patch that slipped, and
+    `mean_slip` (m) is the slip added to it; `total_slip` is the slip added, summed over all nodes.
+    """
+
+    load: float
+    position: float
+    length: float
+    mean_slip: float
+    total_slip: float
+
+
+@dataclass
+class State:
+    """Where the path is: load, slip, K d, and whether it has ended in global sliding.
+
+    `direction` is that of the last instability, and `first` the state at the first one.
+    """
+
+    load: float
+    slip: Array
+    stiff: Array
+    direction: Array
+    sliding: bool = False
+    events: list[Event] = field(default_factory=list)
+    first: State | None = None
+
+
+def residual_nodes(sample: Sample, slip: Array) -> Array:
+    """Which nodes have reached their floor, (n,) bool."""
+    reached: Array = slip >= AT_FLOOR * sample.critical
+    return reached
+
+
+def at_rest(sample: Sample) -> State:
+    """The state in which the first node is about to slip."""
+    n = sample.excess.shape[0]
+    load = float((sample.excess / sample.profile).min())
+    return State(load, np.zeros(n), np.zeros(n), np.zeros(n))
+
+
+def fall(setting: Setting, sample: Sample, state: State) -> None:
+    """Let the unstable state jump: to another equilibrium, recorded as an event, or to sliding."""
+    n = sample.excess.shape[0]
+    before, stiff_before = state.slip.copy(), state.stiff.copy()
+    if state.first is None:
+        state.first = State(state.load, before, stiff_before, state.direction.copy())
+    escape = MARGIN * escape_run(sample, state.load, setting.spacing, setting.modulus)
+    unbounded = not np.isfinite(step_to_floor(sample, state.slip, state.direction, np.inf))
+    if unbounded or runs_away_frozen(
+        setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
+    ):
+        fate = SLIDING
+    else:
+        fate = jump(
+            sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
+            make_room(n),
+        )  # fmt: skip
+    if fate == UNDECIDED:
+        warn_accuracy(
+            "the jump of an unstable patch did not settle; it is counted as global sliding"
+        )
+    if fate != ARRESTED:
+        state.sliding = True
+        state.slip, state.stiff = before, stiff_before
+        return
+    added = state.slip - before
+    # The whole interface yields a little; the patch is where slip grew by a fair share of the most.
+    moved = np.where(added > MOVED * added.max(), added, 0.0)
+    first, length, centre = main_patch(moved)
+    nodes = (first + np.arange(length)) % n
+    state.events.append(
+        Event(state.load, centre, length, float(added[nodes].mean()), float(added.sum()))
+    )
+
+
+def leap(setting: Setting, sample: Sample, state: State) -> bool:
+    """Go straight to the next instability if no other node reaches its floor before it."""
+    residual = residual_nodes(sample, state.slip)
+    strength = np.where(residual, sample.floor, sample.excess)
+    rate = np.where(residual, 0.0, sample.rate)
+    found = setting.programme(strength, rate)
+    if found is None or found.load < state.load:
+        return False
+    weak = ~residual
+    if np.any(found.slip[weak] > OVERSHOOT * sample.critical[weak]):
+        return False
+    state.load, state.slip, state.stiff = found.load, found.slip, found.stiff
+    state.direction = found.multiplier
+    return True
+
+
+def follow(setting: Setting, sample: Sample, state: State, target: float = np.inf) -> State:
+    """Carry a state on to a load, or to global sliding.
+
+    Parameters
+    ----------
+    setting : Setting
+    sample : Sample
+    state : State
+        A stable equilibrium, changed.
+    target : float
+        Load to stop at, Pa.
+    """
+    n = sample.excess.shape[0]
+    leaping = target == np.inf
+    while not state.sliding and state.load < target:
+        # Where one leap failed most others would.
+        leaping = leaping and (not state.events or leap(setting, sample, state))
+        if not (leaping and state.events):
+            state.load, status = advance(
+                sample, setting.grid, state.load, target, state.slip, state.stiff,
+                state.direction, make_room(n),
+            )  # fmt: skip
+            if status == CROWDED:
+                warn_accuracy(
+                    "too many slipping nodes to follow event by event; the last load that was"
+                    " reached is returned as the critical one, a lower bound"
+                )
+                state.sliding = True
+            if status == REACHED or state.sliding:
+                break
+        fall(setting, sample, state)
+    return state

@@ -1,0 +1,292 @@
+"""Beyond an instability: does the patch come to rest in another equilibrium at the same load?
+
+Slip beyond the instability can only grow, and strength only falls with slip. So every field from
+which all slipping nodes are still driven forward lies below the next equilibrium, and two kinds of
+step keep that property: with frozen strengths, solve the elastic problem (K on the slipping nodes);
+or move along a field z >= 0 with A z <= 0, or towards the solution of the linear problem of the
+present states, as far as the first node that reaches its floor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import ZERO, jit
+from stiction._typing import Array
+from stiction.elasticity.line_stiffness import apply_stiffness
+from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
+from stiction.equilibrium.linear_program import (
+    PIVOT,
+    overstressed,
+    singular_direction,
+    stress_tolerance,
+)
+from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample, make_room
+
+SLIDING = 0
+ARRESTED = 1
+UNDECIDED = 2
+
+ALL = -1
+CROWDED = -2
+
+PATIENCE = 16
+"""Elastic steps after which the true states are tried even if more nodes keep joining."""
+AT_FLOOR = 1.0 - 1e-12
+"""Share of d_c from which a node counts as residual."""
+
+
+@jit
+def strength_at(sample: Sample, slip: Array, i: int) -> float:
+    """Strength less initial stress of node i after some slip."""
+    if slip[i] >= AT_FLOOR * sample.critical[i]:
+        return sample.floor[i]
+    return sample.excess[i] - sample.rate[i] * slip[i]
+
+
+@jit
+def step_to_floor(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
+    """Move along a direction until the first node reaches its floor, at most `longest` of it."""
+    step = longest
+    for i in range(slip.shape[0]):
+        if direction[i] > 0.0 and slip[i] < AT_FLOOR * sample.critical[i]:
+            step = min(step, (sample.critical[i] - slip[i]) / direction[i])
+    if not np.isfinite(step):
+        return step
+    for i in range(slip.shape[0]):
+        slip[i] += step * direction[i]
+    return step
+
+
+@jit
+def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> float:
+    """Nodes of residual strength in a row that no fracture energy of the interface can stop.
+
+    A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith);
+    the largest fracture energy is max (tau_p - tau_r)^2/(2 W).
+    """
+    drop = np.inf
+    energy = 0.0
+    for i in range(sample.excess.shape[0]):
+        drop = min(drop, load * sample.profile[i] - sample.floor[i])
+        fall = sample.excess[i] - sample.floor[i]
+        energy = max(energy, 0.5 * fall * sample.critical[i])
+    if drop <= 0.0:
+        return np.inf
+    return 4.0 * modulus * energy / (np.pi * drop * drop * spacing)
+
+
+@jit
+def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
+    """Longest run of residual nodes on the circle, and how many there are in all."""
+    n = slip.shape[0]
+    longest = 0
+    run = 0
+    count = 0
+    for q in range(2 * n):
+        i = q if q < n else q - n
+        if slip[i] >= AT_FLOOR * sample.critical[i]:
+            run += 1
+            count += 1
+        else:
+            run = 0
+        longest = max(longest, run)
+    return min(longest, n), count // 2
+
+
+@jit
+def unsupported(sample: Sample, load: float, slip: Array) -> bool:
+    """Whether the whole interface, at its present strengths, cannot carry the load."""
+    balance = 0.0
+    for i in range(slip.shape[0]):
+        balance += load * sample.profile[i] - strength_at(sample, slip, i)
+    return balance > 0.0
+
+
+@jit
+def relax(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    room: Room,
+    size: int,
+    tolerance: float,
+) -> int:
+    """One elastic step with frozen strengths, then the nodes it overstresses join.
+
+    Returns as `join` does.
+    """
+    right = room.vectors[0]
+    solution = room.vectors[1]
+    drive = room.vectors[3]
+    for t in range(size):
+        i = room.members[t]
+        drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
+    extend_forward(room.factor, ZERO, size, room.members, drive, room.forward[0])
+    for t in range(size):
+        right[t] = room.forward[0, t]
+    back_substitute(room.factor, size, right, solution)
+    for t in range(size):
+        i = room.members[t]
+        slip[i] = max(slip[i], solution[t])
+        solution[t] = slip[i]
+    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
+    return join(sample, grid, load, stiff, room, size, tolerance)
+
+
+@jit
+def join(
+    sample: Sample, grid: Grid, load: float, stiff: Array, room: Room, size: int, tolerance: float
+) -> int:
+    """Append the overstressed nodes to the elastic factor.
+
+    Returns the members now, ALL if nothing remains at rest, CROWDED if there is no room for them.
+    """
+    count = overstressed(load, sample.excess, sample.profile, stiff, room, tolerance)
+    if count == 0:
+        return size
+    if size + count > MOST_MEMBERS:
+        return CROWDED
+    now = append(
+        room.factor, size, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+    )
+    if now < size + count:
+        return ALL
+    for t in range(size, now):
+        room.inside[room.members[t]] = True
+    return now
+
+
+@jit
+def settle(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    room: Room,
+    other: Room,
+    size: int,
+) -> int:
+    """One step with the true states: along the unstable direction, or towards equilibrium.
+
+    Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
+    it, else UNDECIDED.
+    """
+    n = slip.shape[0]
+    for t in range(size):
+        i = room.members[t]
+        other.order[t] = i
+        residual = slip[i] >= AT_FLOOR * sample.critical[i]
+        other.diagonal[i] = grid.column[0] - (0.0 if residual else sample.rate[i])
+    now = append(
+        other.factor, ZERO, other.members, other.order, size, grid.column, other.diagonal, PIVOT
+    )
+    direction = other.vectors[3]
+    longest = 1.0
+    if now < size:
+        singular_direction(other, now, direction)
+        longest = np.inf
+    else:
+        drive = other.vectors[2]
+        for i in range(n):
+            drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
+        extend_forward(other.factor, ZERO, size, other.members, drive, other.forward[0])
+        right = other.vectors[0]
+        solution = other.vectors[1]
+        for t in range(size):
+            right[t] = other.forward[0, t]
+        back_substitute(other.factor, size, right, solution)
+        direction[:] = 0.0
+        for t in range(size):
+            direction[other.members[t]] = max(solution[t], 0.0)
+    step = step_to_floor(sample, slip, direction, longest)
+    if not np.isfinite(step):
+        return SLIDING
+    solution = room.vectors[1]
+    for t in range(size):
+        solution[t] = slip[room.members[t]]
+    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
+    return ARRESTED if step == 1.0 and longest == 1.0 else UNDECIDED
+
+
+@jit
+def jump(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    escape: float,
+    steps: int,
+    room: Room,
+) -> int:
+    """Follow an instability at a fixed load to the next least equilibrium, or to none.
+
+    Parameters
+    ----------
+    sample, grid : Sample, Grid
+    load : float
+        tau_0, Pa.
+    slip, stiff : (n,) arrays, changed
+        d of the state that became unstable, moved along the unstable direction as far as
+        `step_to_floor` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
+    escape : float
+        Residual nodes in a row that count as global sliding.
+    steps : int
+        Elastic steps to try at most; UNDECIDED if they are not enough.
+    room : Room
+
+    Returns
+    -------
+    int
+        SLIDING, ARRESTED or UNDECIDED.
+    """
+    n = slip.shape[0]
+    tolerance = stress_tolerance(sample.excess, sample.profile, load)
+    room.diagonal[:] = grid.column[0]
+    count = ZERO
+    for i in range(n):
+        room.inside[i] = slip[i] > 0.0
+        if room.inside[i]:
+            room.order[count] = i
+            count += 1
+    if count > MOST_MEMBERS:
+        return UNDECIDED
+    size = append(
+        room.factor, ZERO, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+    )
+    if size < count:
+        return SLIDING
+    other = make_room(n)
+    waited = 0
+    at_floor = 0
+    for _ in range(steps):
+        before = size
+        size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
+        if size == CROWDED:
+            return UNDECIDED
+        if size == ALL or unsupported(sample, load, slip):
+            return SLIDING
+        run, residual = floor_runs(sample, slip)
+        if run >= escape:
+            return SLIDING
+        waited += 1
+        # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.
+        if waited < PATIENCE and (size > before or residual > at_floor):
+            at_floor = residual
+            continue
+        waited = 0
+        at_floor = residual
+        before = size
+        status = settle(sample, grid, load, slip, stiff, room, other, size)
+        if status == SLIDING:
+            return SLIDING
+        size = join(sample, grid, load, stiff, room, size, tolerance)
+        if size < 0:
+            return UNDECIDED if size == CROWDED else SLIDING
+        if status == ARRESTED and size == before:
+            return ARRESTED
+    return UNDECIDED

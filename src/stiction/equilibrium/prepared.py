@@ -1,0 +1,137 @@
+"""What is the same for all samples of a problem, and the programme for one of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.elasticity.line_stiffness import coupling_strip, stiffness_column
+from stiction.equilibrium.batch import certificate, start_from_bound
+from stiction.equilibrium.linear_program import OVERFULL, SOLVED, solve_program
+from stiction.equilibrium.linear_program_cg import LargeProgram, Solution
+from stiction.equilibrium.single_patch_test import block_factor
+from stiction.equilibrium.window_bound import Windows, exact_window, window_bound, windows_between
+from stiction.equilibrium.workspace import Grid, Sample, make_room
+from stiction.problem import Problem
+
+LONGEST_RUN = 512
+"""Nodes up to which the quick test for arrest follows a run."""
+LARGE_GRID = 4096
+"""Nodes from which on the large path may be faster."""
+MANY_NODES = 600
+"""Nodes weaker than the upper bound of the load from which on it is."""
+PATIENCE = 1000
+"""Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
+
+
+@dataclass
+class Bound:
+    """An upper bound of the critical load (Pa) and its multiplier."""
+
+    load: float
+    multiplier: Array
+
+
+class Setting:
+    """Stiffness, windows and tables of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.nodes = problem.interface.nodes
+        self.spacing = problem.interface.spacing
+        self.modulus = problem.effective_modulus
+        self.unit = np.pi * self.modulus / problem.interface.length
+        column = stiffness_column(self.nodes, problem.interface.length, self.modulus)
+        self.grid = Grid(column, coupling_strip(column))
+        self.wide_column = np.tile(column, 3)
+        self.profile = np.array(
+            np.broadcast_to(problem.load.profile, (self.nodes,)), dtype=np.float64
+        )
+        rate = problem.friction.weakening_rate
+        uniform = rate is not None and np.ptp(rate) == 0.0
+        self.usual_rate = float(np.max(rate)) if uniform else np.nan
+        none = Windows(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((1, 1)))
+        self.usual = exact_window(self.nodes, self.usual_rate, self.unit) if uniform else none
+        self._none = none
+        self.reach = min(LONGEST_RUN, self.nodes - 1)
+        self.block = block_factor(column, self.reach)
+
+    def windows(self, rates: Array) -> Windows:
+        """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""
+        moving = rates[rates > 0.0]
+        if moving.size == 0:
+            return self._none
+        return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
+
+    def bound(self, excess: Array, rate: Array) -> Bound:
+        """The discrete local bound of one sample."""
+        usual = bool(np.all((rate == self.usual_rate) | (rate == 0.0)))
+        windows = self.usual if usual else self.windows(rate)
+        load, start, choice = window_bound(
+            excess, self.profile, rate, windows, np.empty((2, self.nodes))
+        )
+        multiplier = np.empty(self.nodes)
+        width = 0 if choice < 0 else int(windows.widths[choice])
+        start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, self.profile)
+        return Bound(load, multiplier)
+
+    def is_large(self, excess: Array, bound: Bound) -> bool:
+        """Whether a sample is for conjugate gradients rather than for a dense factor."""
+        if self.nodes < LARGE_GRID:
+            return False
+        return bool(np.count_nonzero(excess < bound.load * self.profile) > MANY_NODES)
+
+    def programme(self, excess: Array, rate: Array, cap: float = np.inf) -> Solution | None:
+        """Critical load, slip and multiplier of one sample (below `cap`), or None if it stalled.
+
+        Parameters
+        ----------
+        excess, rate : (n,) arrays
+            Strength less initial stress (Pa), weakening rate (Pa/m), 0 where the floor is reached.
+        cap : float
+            Load (Pa) not to go beyond.
+        """
+        bound = self.bound(excess, rate)
+        if self.is_large(excess, bound):
+            found = self._by_segments(excess, rate, bound, cap, PATIENCE)
+            if found is not None:
+                return found
+        # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
+        room = make_room(self.nodes)
+        room.diagonal[:] = self.grid.column[0] - rate
+        slip, stiff, multiplier = (
+            np.empty(self.nodes),
+            np.empty(self.nodes),
+            bound.multiplier.copy(),
+        )
+        load, status = solve_program(
+            excess, self.profile, self.grid, bound.load, cap, multiplier, slip, stiff, room
+        )
+        if status == SOLVED:
+            return Solution(load, slip, stiff, multiplier)
+        return self._by_segments(excess, rate, bound, cap) if status == OVERFULL else None
+
+    def _by_segments(
+        self, excess: Array, rate: Array, bound: Bound, cap: float, patience: float = np.inf
+    ) -> Solution | None:
+        found = LargeProgram(
+            excess, self.profile, rate, self.grid, bound.load, bound.multiplier, cap
+        ).run(patience)
+        return found if found.status == SOLVED else None
+
+    def gap(self, excess: Array, rate: Array, solution: Solution, stiff_multiplier: Array) -> float:
+        """Distance of the bounds by slip and multiplier, Pa; K y is left in the last argument."""
+        sample = Sample(excess, excess, self.profile, rate, excess)
+        return float(
+            certificate(
+                sample, self.grid, solution.slip, solution.stiff, solution.multiplier,
+                stiff_multiplier, make_room(self.nodes),
+            )
+        )  # fmt: skip

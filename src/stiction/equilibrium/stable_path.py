@@ -1,0 +1,152 @@
+"""The path of equilibria, event by event: the load rises until a node slips or reaches its floor.
+
+Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q the strength less
+the initial stress, W = 0 where the floor is reached. An event is a node at rest that reaches its
+strength (a row of the factor more), a slipping node that reaches its floor (a diagonal entry that
+rises by W), or a node whose slipping makes A singular: the path has an end there, at this load.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction._jit import ZERO, jit
+from stiction._typing import Array
+from stiction.elasticity.line_stiffness import apply_stiffness
+from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
+from stiction.equilibrium.instability_jump import AT_FLOOR
+from stiction.equilibrium.linear_program import PIVOT, singular_direction, solve_forward
+from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample
+
+REACHED = 0
+UNSTABLE = 1
+CROWDED = 2
+
+REFRESH = 16
+"""Events after which slip is solved for anew, lest round-off adds up."""
+
+
+@jit
+def build(
+    sample: Sample, grid: Grid, slip: Array, residual: Array, strength: Array, room: Room
+) -> int:
+    """Factor of A on the slipping nodes for their present states; returns how many there are."""
+    count = ZERO
+    for i in range(slip.shape[0]):
+        room.inside[i] = slip[i] > 0.0
+        residual[i] = room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i]
+        strength[i] = sample.floor[i] if residual[i] else sample.excess[i]
+        room.diagonal[i] = grid.column[0] - (0.0 if residual[i] else sample.rate[i])
+        if room.inside[i]:
+            room.order[count] = i
+            count += 1
+    return count
+
+
+@jit
+def advance(
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    target: float,
+    slip: Array,
+    stiff: Array,
+    direction: Array,
+    room: Room,
+) -> tuple[float, int]:
+    """Follow the stable path from one load towards another.
+
+    Parameters
+    ----------
+    sample, grid : Sample, Grid
+    load : float
+        tau_0 (Pa) at which `slip` is a stable equilibrium.
+    target : float
+        Load at which to stop.
+    slip, stiff : (n,) arrays, changed
+        d and K d.
+    direction : (n,) array, output
+        If the path ends: in which it is unstable, z >= 0 and A z <= 0.
+    room : Room
+
+    Returns
+    -------
+    load, status : float, int
+        REACHED, UNSTABLE, or CROWDED: more members than there is room for.
+    """
+    n = slip.shape[0]
+    right = room.vectors[0]
+    solution = room.vectors[1]
+    stiff_rate = room.vectors[2]
+    rate = room.vectors[3]
+    residual = np.zeros(n, np.bool_)
+    strength = np.empty(n)
+    own = grid.column[0]
+    members, order, diagonal = room.members, room.order, room.diagonal
+    count = build(sample, grid, slip, residual, strength, room)
+    if count > MOST_MEMBERS:
+        return load, CROWDED
+    size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
+    if size < count:
+        # Stability was lost exactly as the floor was reached.
+        singular_direction(room, size, direction)
+        return load, UNSTABLE
+    extend_forward(room.factor, ZERO, size, members, sample.profile, room.forward[0])
+    extend_forward(room.factor, ZERO, size, members, strength, room.forward[1])
+    for event in range(2 * n + 1):  # each node begins to slip once, and reaches its floor once
+        for t in range(size):
+            right[t] = room.forward[0, t]
+        back_substitute(room.factor, size, right, rate)
+        apply_stiffness(grid.strip, own, members, size, rate, room.halves, stiff_rate)
+        if event % REFRESH == 0:
+            solve_forward(room, size, load, solution)
+            apply_stiffness(grid.strip, own, members, size, solution, room.halves, stiff)
+            for t in range(size):
+                slip[members[t]] = max(solution[t], 0.0)
+        step = target - load
+        starts = -1
+        ends = -1
+        for i in range(n):
+            if not room.inside[i]:
+                margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
+                closing = sample.profile[i] - stiff_rate[i]
+                if closing > 0.0 and margin < step * closing:
+                    step = margin / closing
+                    starts = i
+        for t in range(size):
+            i = members[t]
+            if not residual[i] and rate[t] > 0.0:
+                left = max(sample.critical[i] - slip[i], 0.0)
+                if left < step * rate[t]:
+                    step = left / rate[t]
+                    starts = -1
+                    ends = t
+        load = target if starts < 0 and ends < 0 else load + step
+        for t in range(size):
+            slip[members[t]] += step * rate[t]
+        for i in range(n):
+            stiff[i] += step * stiff_rate[i]
+        if ends >= 0:
+            i = members[ends]
+            slip[i] = sample.critical[i]
+            residual[i] = True
+            strength[i] = sample.floor[i]
+            diagonal[i] = own
+            raise_diagonal(room.factor, size, ends, sample.rate[i], room.vectors)
+            extend_forward(room.factor, ends, size, members, sample.profile, room.forward[0])
+            extend_forward(room.factor, ends, size, members, strength, room.forward[1])
+        elif starts >= 0:
+            if size == MOST_MEMBERS:
+                return load, CROWDED
+            order[0] = starts
+            now = append(room.factor, size, members, order, 1, grid.column, diagonal, PIVOT)
+            if now == size:
+                singular_direction(room, size, direction)
+                return load, UNSTABLE
+            extend_forward(room.factor, size, now, members, sample.profile, room.forward[0])
+            extend_forward(room.factor, size, now, members, strength, room.forward[1])
+            room.inside[starts] = True
+            size = now
+        else:
+            return load, REACHED
+    return load, CROWDED

@@ -1,0 +1,238 @@
+"""The discrete local criterion: the lowest window that is unstable by itself bounds the onset.
+
+A window of w nodes is unstable if the smallest eigenvalue of its block of K is at most the
+weakening rate in it. The eigenvector y is positive, A y <= 0, so <s, y>/<p, y> bounds the critical
+load from above: the criterion of Uenishi and Rice (2003) in the form that is strict on the grid.
+"""
+
+from __future__ import annotations
+
+import bisect
+import functools
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from stiction._jit import jit
+from stiction._typing import Array
+from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.problem import SMALLEST_EIGENVALUE
+
+GROWTH = 1.04
+"""Ratio of successive widths tried where the weakening rate varies."""
+DENSE = 300
+"""Widest window whose eigenvector is found with a dense matrix."""
+WIDEST = 4096
+"""Widest window tried."""
+
+
+@functools.lru_cache(maxsize=512)
+def window_mode(nodes: int, width: int) -> tuple[float, Array]:
+    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector.
+
+    Parameters
+    ----------
+    nodes, width : int
+        Nodes of the interface and of the window.
+    """
+    first = stiffness_column(nodes, np.pi, 1.0)[:width]
+    if width <= DENSE:
+        values, vectors = scipy.linalg.eigh(scipy.linalg.toeplitz(first), subset_by_index=[0, 0])
+        value, mode = float(values[0]), np.abs(vectors[:, 0])
+        mode /= mode.sum()
+    else:
+        # Inverse iteration; the next eigenvalue is more than twice as large.
+        mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
+        mode /= mode.sum()
+        for _ in range(60):
+            new = scipy.linalg.solve_toeplitz(first, mode)
+            value = 1.0 / float(new.sum())
+            new *= value
+            change = float(np.abs(new - mode).max())
+            mode = new
+            if change < 1e-14 * float(mode.max()):
+                break
+    mode.flags.writeable = False
+    return value, mode
+
+
+def estimated_width(nodes: int, rate: float) -> int:
+    """Width of an unstable window by h_n = 2 lambda_0 G*/W of the continuum.
+
+    Parameters
+    ----------
+    nodes : int
+    rate : float
+        W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
+    """
+    return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
+
+
+def smallest_window(nodes: int, rate: float) -> int | None:
+    """Fewest nodes that are unstable by themselves at a weakening rate, or None.
+
+    None also if the window would be wider than `WIDEST`: the uniform field then starts the
+    programme, whose result is the same.
+
+    Parameters
+    ----------
+    nodes : int
+    rate : float
+        W in units of (G*/2)(2 pi/L).
+    """
+    widest = min(nodes - 1, WIDEST)
+    width = estimated_width(nodes, rate)
+    if width > 1.2 * widest:
+        return None
+    width = min(width, widest)
+    low, high = 0, widest + 1  # `low` is stable; `high` is unstable, or too wide
+    # The estimate is a node or so off, more where the window is a fair part of the circle.
+    for probe in (width - 3, width + 3):
+        if low < probe < high:
+            if window_mode(nodes, probe)[0] <= rate:
+                high = probe
+            else:
+                low = probe
+    while high - low > 1:
+        middle = (low + high) // 2
+        if window_mode(nodes, middle)[0] <= rate:
+            high = middle
+        else:
+            low = middle
+    return high if high <= widest else None
+
+
+def ladder(nodes: int) -> list[int]:
+    """Widths tried where the weakening rate varies: the same for all samples."""
+    widths = [1]
+    while widths[-1] < min(nodes // 2, WIDEST):
+        widths.append(max(widths[-1] + 1, int(widths[-1] * GROWTH)))
+    return widths[:-1]
+
+
+class Windows(NamedTuple):
+    """Unstable windows, the narrowest first.
+
+    Attributes
+    ----------
+    thresholds : (count,) array
+        Weakening rate from which on each is unstable, Pa/m, falling.
+    widths : (count,) int array
+    modes : (count or 1, largest width) array
+        Eigenvectors of unit sum, zero beyond their width.
+    """
+
+    thresholds: Array
+    widths: NDArray[np.int64]
+    modes: Array
+
+
+def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
+    modes = np.zeros((max(len(widths), 1), max(widths, default=1)))
+    for i, width in enumerate(widths):
+        modes[i, :width] = window_mode(nodes, width)[1]
+    thresholds = np.array([window_mode(nodes, width)[0] * unit for width in widths])
+    return Windows(thresholds, np.array(widths, dtype=np.int64), modes)
+
+
+def exact_window(nodes: int, rate: float, unit: float) -> Windows:
+    """The narrowest window that is unstable at one weakening rate, if there is any.
+
+    Parameters
+    ----------
+    nodes : int
+    rate, unit : float
+        W and (G*/2)(2 pi/L), Pa/m.
+    """
+    width = smallest_window(nodes, rate / unit)
+    return _windows(nodes, () if width is None else (width,), unit)
+
+
+def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> Windows:
+    """Rungs of the ladder for weakening rates from `lowest` to `highest`, Pa/m."""
+    rungs = ladder(nodes)
+
+    def rung(rate: float) -> int:
+        """The first rung that is unstable; the last one if none is."""
+        width = estimated_width(nodes, rate / unit)
+        i = min(bisect.bisect_left(rungs, width), len(rungs) - 1)
+        while i < len(rungs) - 1 and window_mode(nodes, rungs[i])[0] * unit > rate:
+            i += 1
+        while i > 0 and window_mode(nodes, rungs[i - 1])[0] * unit <= rate:
+            i -= 1
+        return i
+
+    return _windows(nodes, tuple(rungs[rung(highest) : rung(lowest) + 1]), unit)
+
+
+@jit
+def window_bound(
+    excess: Array, profile: Array, rate: Array, windows: Windows, work: Array
+) -> tuple[float, int, int]:
+    """Lowest bound over all windows and the uniform field.
+
+    Parameters
+    ----------
+    excess, profile, rate : (n,) arrays
+        tau_p - tau_i (Pa), load profile, weakening rate (Pa/m).
+    windows : Windows
+    work : (2, n) array
+
+    Returns
+    -------
+    bound, start, choice : float, int, int
+        Load (Pa), first node of the window, and its number; -1 is the uniform field.
+    """
+    n = excess.shape[0]
+    start = 0
+    choice = -1
+    above_all = 0.0
+    below_all = 0.0
+    lowest = rate[0]
+    highest = rate[0]
+    for i in range(n):
+        above_all += excess[i]
+        below_all += profile[i]
+        lowest = min(lowest, rate[i])
+        highest = max(highest, rate[i])
+    best = above_all / below_all
+    thresholds = windows.thresholds
+    modes = windows.modes
+    for c in range(thresholds.shape[0]):
+        if thresholds[c] > highest:
+            continue
+        width = windows.widths[c]
+        above = work[0]
+        below = work[1]
+        above[:] = 0.0
+        below[:] = 0.0
+        for q in range(width):
+            z = modes[c, q]
+            shift = q % n
+            for a in range(n - shift):
+                above[a] += z * excess[a + shift]
+                below[a] += z * profile[a + shift]
+            for a in range(n - shift, n):
+                above[a] += z * excess[a + shift - n]
+                below[a] += z * profile[a + shift - n]
+        if thresholds[c] <= lowest:
+            for a in range(n):
+                if above[a] < best * below[a]:
+                    best = above[a] / below[a]
+                    start = a
+                    choice = c
+            break  # wider windows are unstable too, but bound less tightly
+        # Last node of the current stretch in which every node weakens fast enough.
+        length = 0
+        for q in range(2 * n):
+            node = q if q < n else q - n
+            length = length + 1 if rate[node] >= thresholds[c] else 0
+            if length >= width and q >= width - 1:
+                a = (q - width + 1) % n
+                if above[a] < best * below[a]:
+                    best = above[a] / below[a]
+                    start = a
+                    choice = c
+    return best, start, choice

@@ -1,0 +1,60 @@
+"""The paper's figures, one module a figure.
+
+A figure is a module with `name`, `number` (the paper's), `title`, `needs` (names of studies),
+`caption(data)`, `draw(data)`, which returns a matplotlib figure, and `tables(data)`, the numbers
+behind it. To add one, write the module and list it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from stiction.errors import InputError, unknown_name
+from stiction.papers.albertini2020.figures import (
+    energy,
+    fidelity,
+    growth,
+    interaction,
+    mapping,
+    monte_carlo,
+    prediction,
+    problem,
+    rupture,
+    statistics,
+    variance,
+)
+
+FIGURES: dict[str, Any] = {
+    figure.name: figure
+    for figure in (
+        problem,
+        mapping,
+        rupture,
+        prediction,
+        monte_carlo,
+        statistics,
+        variance,
+        interaction,
+        energy,
+        growth,
+        fidelity,
+    )
+}
+
+
+def select(only: Iterable[str] | None) -> list[Any]:
+    """The figures of these names, in the order of the paper; all of them for None.
+
+    Raises
+    ------
+    InputError
+        Naming every unknown figure and the nearest valid name.
+    """
+    if only is None:
+        return list(FIGURES.values())
+    names = [only] if isinstance(only, str) else list(only)
+    problems = [unknown_name("only", str(name), FIGURES) for name in names if name not in FIGURES]
+    if problems:
+        raise InputError(problems)
+    return [figure for name, figure in FIGURES.items() if name in names]

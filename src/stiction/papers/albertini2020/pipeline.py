@@ -1,0 +1,188 @@
+"""The paper from end to end: studies, figures, tables, claims, report."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from stiction._model import describe
+from stiction._progress import progress_bar
+from stiction.errors import InputError
+from stiction.papers.albertini2020 import studies
+from stiction.papers.albertini2020.claims import CLAIMS, Claim, judged
+from stiction.papers.albertini2020.data import Data
+from stiction.papers.albertini2020.figures import select
+from stiction.papers.albertini2020.results import write_results
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies.context import Context
+from stiction.papers.albertini2020.summary import assemble, claims_table
+from stiction.report.page import ShownFigure
+from stiction.report.style import paper_style
+
+QUICK = 500
+FEWEST = 64
+RUNS = 20
+"""Ruptures at each correlation length, as in the paper."""
+_FEW = 2
+_FEWEST_DYNAMIC = 16
+DYNAMIC = 1000
+_DRAWING = 10_000  # work of a figure, for progress
+
+
+def run(
+    out: str | Path,
+    samples: int = 10_000,
+    seed: int = 0,
+    quick: bool = False,
+    full: bool = False,
+    ruptures: int | None = None,
+    workers: int | None = None,
+    only: Iterable[str] | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+    setting: Setting | None = None,
+) -> Path:
+    """Compute the paper's statistics, draw its figures, judge its claims and write a report.
+
+    Parameters
+    ----------
+    out : path
+        Folder, made if it is not there: `report.html`, `results.nc` (one group a study),
+        `figures/*.png` and `*.pdf`, `tables/*.csv`.
+    samples : int
+        For each correlation length of the Monte Carlo study, at least 64; side studies take a
+        quarter.
+    seed : int
+        Not negative. The same seed gives the same numbers, whatever the workers.
+    quick : bool
+        500 samples and two ruptures at each correlation length, for a first look.
+    full : bool
+        Also the Monte Carlo study by elastodynamics: an ensemble of ruptures at every correlation
+        length, about 0.2 s each on one core.
+    ruptures : int, optional
+        Ruptures at each correlation length of that ensemble, at least 16 (1,000 by default);
+        without `full`, of the comparison with simulations, at least 2 (20 by default).
+    workers : int, optional
+        Threads; all cores by default.
+    only : iterable of str, optional
+        Names of figures. Only their studies run, and only the claims that those can judge are
+        shown.
+    progress : bool or callable
+        True shows a bar on a terminal; a callable gets (done, total) in samples.
+    setting : Setting, optional
+        Other parameters than the paper's; figures and verdicts follow.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Notes
+    -----
+    Results of each study are kept in the folder. The same call after an interruption computes only
+    what is missing; so does a call for other figures.
+
+    Raises
+    ------
+    InputError
+        Naming all that is wrong, unknown figures with the nearest valid name.
+    """
+    started = time.perf_counter()
+    folder, figures = _checked(out, samples, seed, workers, only, full, ruptures)
+    context = Context(
+        setting or Setting(),
+        QUICK if quick else samples,
+        seed,
+        workers,
+        ruptures=_FEW if quick else RUNS if full or ruptures is None else ruptures,
+        dynamic=(ruptures or DYNAMIC) if full else 0,
+        folder=folder,
+    )
+    there = studies.offered(context)
+    figures = [figure for figure in figures if there.issuperset(figure.needs)]
+    claims = list(CLAIMS.values()) if only is None else _claims_of(figures)
+    claims = [claim for claim in claims if there.issuperset(claim.needs)]
+    needed = studies.with_needs(need for item in (*figures, *claims) for need in item.needs)
+    total = studies.cost(needed, context) + _DRAWING * len(figures)
+    with progress_bar(total, "paper", progress) as context.report:
+        results = studies.compute(needed, context)
+        data = Data(context.setting, context.samples, seed, results)
+        findings = judged(data, claims)
+        (folder / "figures").mkdir(parents=True, exist_ok=True)
+        (folder / "tables").mkdir(exist_ok=True)
+        shown = []
+        for figure in figures:
+            shown.append(_draw(figure, data, folder))
+            context.report(_DRAWING)
+    for table in (table for figure in shown for table in figure.tables):
+        table.write_csv(folder / "tables")
+    claims_table(findings).write_csv(folder / "tables")
+    write_results(folder / "results.nc", data)
+    html = assemble(data, shown, findings, context.warnings, time.perf_counter() - started)
+    return _write(folder / "report.html", html)
+
+
+def _checked(
+    out: Any, samples: Any, seed: Any, workers: Any, only: Any, full: bool, ruptures: Any
+) -> tuple[Path, list[Any]]:
+    problems = []
+    counts = [("samples", samples, FEWEST), ("seed", seed, 0)]
+    if ruptures is not None:
+        counts.append(("ruptures", ruptures, _FEWEST_DYNAMIC if full else _FEW))
+    for name, value, smallest in counts:
+        if isinstance(value, bool) or not isinstance(value, int) or value < smallest:
+            problems.append(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
+    figures: list[Any] = []
+    try:
+        figures = select(only)
+    except InputError as error:
+        problems += error.problems
+    if only is not None and not full and any("dynamic" in figure.needs for figure in figures):
+        problems.append("only: the Monte Carlo study by elastodynamics needs full")
+    folder = Path(out)
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        problems.append(f"out: {existing} is a file; give a folder")
+    elif not os.access(existing, os.W_OK):
+        problems.append(f"out: {existing} cannot be written")
+    if problems:
+        raise InputError(problems)
+    return folder, figures
+
+
+def _claims_of(figures: list[Any]) -> list[Claim]:
+    """Claims that the studies of these figures can judge; those that need none come with all."""
+    there = {need for figure in figures for need in figure.needs}
+    return [claim for claim in CLAIMS.values() if claim.needs and there.issuperset(claim.needs)]
+
+
+def _draw(figure: Any, data: Data, folder: Path) -> ShownFigure:
+    path = folder / "figures" / f"figure-{figure.number}-{figure.name}"
+    buffer = io.BytesIO()
+    with paper_style():
+        drawn = figure.draw(data)
+        drawn.savefig(buffer, format="png")
+        drawn.set_layout_engine("none")  # panels stay where they are
+        drawn.savefig(path.with_suffix(".pdf"))
+    path.with_suffix(".png").write_bytes(buffer.getvalue())
+    return ShownFigure(
+        figure.name,
+        figure.number,
+        figure.title,
+        figure.caption(data),
+        buffer.getvalue(),
+        tuple(figure.tables(data)),
+    )
+
+
+def _write(path: Path, text: str) -> Path:
+    """Written aside and renamed, so that a report is whole or not there."""
+    aside = path.with_name(path.name + ".part")
+    aside.write_text(text, encoding="utf-8")
+    aside.replace(path)
+    return path

@@ -1,0 +1,105 @@
+"""The paper's studies: what is computed before anything is drawn or judged, one module a study.
+
+A study is a module with `name`, `title`, `cost(context)` (work it will do, for progress) and
+`compute(context)`, which returns a labelled dataset. It may have `needs`, the names of studies
+whose results it uses, and `depends`, the attributes of the context besides the setting that its
+result depends on (samples and seed if it has none). To add one, write the module and list it here.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import xarray as xr
+
+from stiction.papers.albertini2020.studies import (
+    arrest,
+    convergence,
+    correction,
+    disorder,
+    dynamic,
+    free_end,
+    growth,
+    interaction,
+    interface_length,
+    many_local_samples,
+    monte_carlo,
+    representative,
+    ruptures,
+    skewness,
+    spectrum,
+    theory,
+    trend,
+    window,
+)
+from stiction.papers.albertini2020.studies.context import Context
+from stiction.papers.albertini2020.studies.study_cache import keep, kept
+
+STUDIES: dict[str, Any] = {
+    study.name: study
+    for study in (
+        theory,
+        monte_carlo,
+        interaction,
+        representative,
+        ruptures,
+        growth,
+        arrest,
+        convergence,
+        trend,
+        window,
+        correction,
+        skewness,
+        spectrum,
+        interface_length,
+        disorder,
+        free_end,
+        many_local_samples,
+        dynamic,
+    )
+}
+
+
+def offered(context: Context) -> set[str]:
+    """Names of the studies that this context asks for: the costliest only on demand."""
+    dear = {many_local_samples.name, dynamic.name}
+    return {name for name in STUDIES if name not in dear or context.dynamic}
+
+
+def with_needs(names: Iterable[str]) -> set[str]:
+    """The named studies and those whose results they use."""
+    wanted = set(names)
+    for name in reversed(STUDIES):
+        if name in wanted:
+            wanted.update(getattr(STUDIES[name], "needs", ()))
+    return wanted
+
+
+def cost(names: Iterable[str], context: Context) -> int:
+    """Work of the named studies, for progress."""
+    return sum(STUDIES[name].cost(context) for name in with_needs(names))
+
+
+def compute(names: Iterable[str], context: Context) -> dict[str, xr.Dataset]:
+    """The named studies, in the order of the registry, each with the time that it took.
+
+    With a folder in the context, what is kept there from an earlier run is not computed again.
+    """
+    wanted = with_needs(names)
+    for name, study in STUDIES.items():
+        if name not in wanted:
+            continue
+        dataset = kept(study, context)
+        if dataset is not None:
+            context.report(study.cost(context))
+        else:
+            started = time.perf_counter()
+            context.title = study.title
+            dataset = study.compute(context)
+            dataset.attrs["title"] = study.title
+            dataset.attrs["seconds"] = time.perf_counter() - started
+            keep(study, context, dataset)
+        context.results[name] = dataset
+    return {name: context.results[name] for name in STUDIES if name in wanted}

@@ -1,0 +1,128 @@
+"""What every study is given: the setting, how many samples, and whom to tell of progress."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from stiction.ensemble.monte_carlo import monte_carlo
+from stiction.errors import AccuracyWarning
+from stiction.papers.albertini2020.setting import Setting
+from stiction.problem import Problem
+from stiction.random.random_field import RandomField
+
+WORK = {"equilibrium": 15, "rupture": 4000}
+"""Cost of a sample by method, in samples by the local criterion (about 50 microseconds)."""
+
+
+def work(method: Any, samples: int) -> int:
+    """Cost of an ensemble, for progress."""
+    return WORK.get(method.type, 1) * samples
+
+
+def _unheard(count: int) -> None:
+    pass
+
+
+@dataclass
+class Context:
+    """How studies are run.
+
+    Attributes
+    ----------
+    setting : Setting
+    samples : int
+        For each point of the main study; side studies take a quarter.
+    seed : int
+    workers : int, optional
+    ruptures : int
+        Elastodynamic runs at each of the setting's `simulated_ratios`.
+    dynamic : int
+        Samples of the Monte Carlo study by elastodynamics at each correlation length; 0 for none.
+    folder : Path, optional
+        Where results of studies are kept, so that an interrupted run goes on.
+    report : callable
+        Gets the work just finished, see `WORK`.
+    warnings : dict of str to int
+        Accuracy warnings that came up, with how often; the page shows them.
+    results : dict of str to Dataset
+        Of the studies that are done; a study may use those that it names in `needs`.
+    title : str
+        Of the study that is running.
+    """
+
+    setting: Setting
+    samples: int
+    seed: int
+    workers: int | None = None
+    ruptures: int = 20
+    dynamic: int = 0
+    folder: Path | None = None
+    report: Callable[[int], None] = _unheard
+    warnings: dict[str, int] = field(default_factory=dict)
+    results: dict[str, xr.Dataset] = field(default_factory=dict)
+    title: str = ""
+
+    @property
+    def fewer(self) -> int:
+        """Samples of a side study."""
+        return max(self.samples // 4, min(self.samples, 250))
+
+    def monte_carlo(
+        self,
+        problem: Problem,
+        strength: RandomField,
+        method: Any,
+        samples: int,
+        first: int = 0,
+        weight: int = 1,
+        **others: Any,
+    ) -> xr.Dataset:
+        """An ensemble of this seed, its accuracy warnings kept for the report.
+
+        `weight` is how many times as dear as usual a sample is; `others` are random fields besides
+        the strength.
+        """
+        return self.listen(
+            lambda tell: monte_carlo(
+                problem,
+                strength,
+                method=method,
+                samples=samples,
+                seed=self.seed,
+                first=first,
+                workers=self.workers,
+                progress=tell,
+                **others,
+            ),
+            weight * work(method, 1),
+        )
+
+    def listen(
+        self, compute: Callable[[Callable[[int, int], None]], xr.Dataset], each: int
+    ) -> xr.Dataset:
+        """The result of `compute(progress)`; a sample counts as `each` units of work."""
+        seen = 0
+
+        def tell(done: int, total: int) -> None:
+            nonlocal seen
+            self.report((done - seen) * each)
+            seen = done
+
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            result = compute(tell)
+        for warning in caught:
+            if issubclass(warning.category, AccuracyWarning):
+                text = f"{self.title}: {warning.message}"
+                self.warnings[text] = self.warnings.get(text, 0) + 1
+            else:
+                warnings.warn_explicit(
+                    warning.message, warning.category, warning.filename, warning.lineno
+                )
+        return result

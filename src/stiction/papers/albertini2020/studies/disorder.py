@@ -1,0 +1,86 @@
+"""More disorder than the paper's: wide strength ranges, random load, random residual strength."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.equilibrium.method import Equilibrium
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies.context import Context, work
+from stiction.random.marginals import Beta
+from stiction.random.random_field import RandomField
+
+name = "disorder"
+title = "More disorder: wide strength range, random load, random residual strength"
+
+MOST = 250
+_EVENTS = 10  # cost of a sample with arrested events, in samples without
+
+
+def ratio_of(context: Context) -> float:
+    """The correlation length of this study: the second of the setting's."""
+    return context.setting.correlation_ratios[1]
+
+
+def widened(setting: Setting, factor: float) -> Beta:
+    """The setting's strength with the same lower bound on a wider range, as a Beta."""
+    own = setting.marginal
+    if isinstance(own, Beta):
+        return dataclasses.replace(own, high=own.low + factor * (own.high - own.low))
+    low = 0.66 * setting.mean
+    return Beta(alpha=1.5, beta=3.0, low=low, high=low + factor * setting.mean)
+
+
+def _noise(setting: Setting, ratio: float, deviation: float, centre: float) -> RandomField:
+    """A symmetric field between bounds sqrt(5) standard deviations apart from its centre."""
+    half = np.sqrt(5.0) * deviation
+    return setting.field(
+        ratio, marginal=Beta(alpha=2.0, beta=2.0, low=centre - half, high=centre + half)
+    )
+
+
+def _cases(context: Context) -> dict[str, tuple[RandomField, dict[str, Any]]]:
+    setting, ratio = context.setting, ratio_of(context)
+    own, unit = setting.field(ratio), setting.mean
+    # Residual strength stays below the weakest strength.
+    residual = float(np.mean(setting.problem.friction.residual_strength))
+    spread = 0.45 * (max(setting.bounds[0], 0.0) - residual) / (2.0 * np.sqrt(5.0))
+    cases: dict[str, tuple[RandomField, dict[str, Any]]] = {
+        "as it is": (own, {}),
+        "twice the range": (setting.field(ratio, marginal=widened(setting, 2.0)), {}),
+        "four times the range": (setting.field(ratio, marginal=widened(setting, 4.0)), {}),
+        "random load": (own, {"initial_stress": _noise(setting, ratio, 0.05 * unit, 0.0)}),
+    }
+    if spread > 0.0:
+        for label, factor in (("random stress drop", 1.0), ("more random stress drop", 2.0)):
+            noise = _noise(setting, 4.0 * ratio, factor * spread, residual + 2.3 * factor * spread)
+            cases[label] = (own, {"residual_strength": noise})
+    return cases
+
+
+def _count(context: Context) -> int:
+    return min(MOST, max(context.samples // 8, 32))
+
+
+def cost(context: Context) -> int:
+    """Every case."""
+    return len(_cases(context)) * work(Equilibrium(), _count(context)) * _EVENTS
+
+
+def compute(context: Context) -> xr.Dataset:
+    """First instability, critical stress and arrested events of the same draws, case by case."""
+    parts = []
+    cases = _cases(context)
+    count = _count(context)
+    for field, others in cases.values():
+        found = context.monte_carlo(
+            context.setting.problem, field, Equilibrium(), count, weight=_EVENTS, **others
+        )
+        parts.append(found[["first_instability", "critical_stress", "arrested_events"]])
+    dataset = xr.concat(parts, dim="case", combine_attrs="drop").assign_coords(case=list(cases))
+    dataset.attrs["correlation_ratio"] = ratio_of(context)
+    return dataset

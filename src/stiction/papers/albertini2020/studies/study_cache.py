@@ -1,0 +1,84 @@
+"""Results of studies kept on disk, each under a digest of everything that defines it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from stiction._model import to_plain
+from stiction.papers.albertini2020.studies.context import Context
+
+FOLDER = "studies"
+_WARNINGS = "accuracy_warnings"
+
+
+@cache
+def _sources() -> str:
+    """Digest of the package: a result of other code is not the same result."""
+    digest = hashlib.sha256()
+    root = Path(str(files("stiction")))
+    for path in sorted(root.rglob("*.py")):
+        if not {"cli", "report", "figures", "claims"} & set(path.relative_to(root).parts):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def place_of(study: Any, context: Context, depends: tuple[str, ...] | None = None) -> Path | None:
+    """Where its result is kept, without the ending; nowhere without a folder."""
+    if context.folder is None:
+        return None
+    if depends is None:
+        depends = getattr(study, "depends", ("samples", "seed"))
+    defined = {
+        "study": study.name,
+        "needs": [str(place_of(_named(name), context)) for name in getattr(study, "needs", ())],
+        "setting": to_plain(context.setting),
+        "sources": _sources(),
+        **{name: getattr(context, name) for name in depends},
+    }
+    text = json.dumps(defined, sort_keys=True)
+    return (
+        context.folder / FOLDER / f"{study.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    )
+
+
+def _named(name: str) -> Any:
+    from stiction.papers.albertini2020.studies import STUDIES
+
+    return STUDIES[name]
+
+
+def kept(study: Any, context: Context) -> xr.Dataset | None:
+    """The result of an earlier run; None if there is none that can be read."""
+    place = place_of(study, context)
+    if place is None:
+        return None
+    path = place.with_suffix(".nc")
+    try:
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError):
+        return None
+    for text, count in json.loads(dataset.attrs.pop(_WARNINGS, "{}")).items():
+        context.warnings[text] = count
+    return dataset
+
+
+def keep(study: Any, context: Context, dataset: xr.Dataset) -> None:
+    """Keep a result in place of an older one of the same study, whole or not at all."""
+    place = place_of(study, context)
+    if place is None:
+        return
+    place.parent.mkdir(parents=True, exist_ok=True)
+    own = {text: count for text, count in context.warnings.items() if text.startswith(study.title)}
+    aside = place.with_suffix(".part")
+    dataset.assign_attrs({_WARNINGS: json.dumps(own)}).to_netcdf(aside, engine="netcdf4")
+    aside.replace(place.with_suffix(".nc"))
+    for other in place.parent.glob(f"{study.name}-*.nc"):
+        if other.stem.rpartition("-")[0] == study.name and other.stem != place.name:
+            other.unlink()

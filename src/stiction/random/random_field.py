@@ -1,0 +1,336 @@
+"""The random field: a Gaussian field of given spectrum, mapped to a given marginal."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pydantic
+from pydantic import model_validator
+
+from stiction._model import Flag, Positive, describe, model, real_array
+from stiction._typing import Array
+from stiction.errors import InputError, warn_accuracy
+from stiction.interface import Interface
+from stiction.random.draws import standard_normal
+from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.marginals import Marginal
+from stiction.random.quantile_table import from_normal
+from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
+from stiction.random.synthesis import gaussian_rows
+
+FEWEST_LENGTHS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The discrete spectrum on an interface.
+
+    Attributes
+    ----------
+    sigma : (J + 1,) array
+        Standard deviations sigma_j of modes 0..J; their squares sum to 1. sigma_0 is zero without
+        the mean mode.
+    count : int
+        J, the highest mode.
+    dimension : int
+        Number of standard normal draws a sample.
+    """
+
+    sigma: Array
+    count: int
+    dimension: int
+
+
+@model
+class RandomField:
+    """Stationary, periodic, non-Gaussian random field F^-1(Phi(z(x))).
+
+    Parameters
+    ----------
+    marginal : Beta or frozen continuous scipy.stats distribution
+        Distribution F of the field at a point.
+    spectrum : PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum or callable g(k)
+        Power spectral density of the Gaussian field z.
+    mean_mode : bool
+        Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every sample has
+        the same mean of z, which is harmless only while the correlation length is short against
+        the interface.
+
+    Raises
+    ------
+    InputError
+        If the marginal or the spectrum is not valid.
+
+    Notes
+    -----
+    Translation process after Grigoriu (1995), spectral representation after Shinozuka and Deodatis
+    (1991); Albertini et al. (2020), Eqs. 2 to 7.
+    """
+
+    marginal: Marginal
+    spectrum: Spectrum
+    mean_mode: Flag = False
+
+    @model_validator(mode="after")
+    def _tabulated_marginal(self) -> RandomField:
+        low, high = self.marginal.distribution.support()
+        if not low < high:
+            raise InputError(f"marginal: its support [{low:g}, {high:g}] is empty")
+        return self
+
+    @property
+    def mean(self) -> float:
+        """Mean of the field, in its own unit (Pa for strength)."""
+        return float(self.marginal.distribution.mean())
+
+    @property
+    def standard_deviation(self) -> float:
+        """Standard deviation of the field, in its own unit."""
+        return float(self.marginal.distribution.std())
+
+    def modes(self, interface: Interface) -> Modes:
+        """The modes of this field on an interface.
+
+        Raises
+        ------
+        InputError
+            If truncation leaves no mode: the correlation length is too long for the interface.
+        """
+        if not isinstance(interface, Interface):
+            raise InputError(f"interface: must be an Interface, got {describe(interface)}")
+        return _modes(self, interface)
+
+    def draws(
+        self, interface: Interface, samples: int, seed: int, first: int = 0, *, stream: int = 0
+    ) -> Array:
+        """Standard normal draws of samples first .. first + samples - 1.
+
+        Draw j of sample i depends on (seed, stream, i, j) only: not on the batch, the spectrum or
+        the marginal.
+
+        Parameters
+        ----------
+        interface : Interface
+        samples, seed, first, stream : int
+            Not negative. Fields with different `stream` are independent under one seed.
+
+        Returns
+        -------
+        (samples, dimension) array
+            A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
+        """
+        _check_counts(samples=samples, seed=seed, first=first, stream=stream)
+        modes = self.modes(interface).count
+        return standard_normal(
+            seed, samples, modes, first=first, stream=stream, mean_mode=self.mean_mode
+        )
+
+    def gaussian(self, interface: Interface, draws: Array) -> Array:
+        """The underlying Gaussian field z of given draws, shape (samples, nodes), unit variance."""
+        modes = self.modes(interface)
+        try:
+            draws = real_array(draws)
+        except TypeError as error:
+            raise InputError(f"draws: must be numbers; {error}") from None
+        if draws.ndim != 2 or draws.shape[1] != modes.dimension:
+            raise InputError(
+                f"draws: must have shape (samples, {modes.dimension}), got shape {draws.shape}"
+            )
+        if not np.isfinite(draws).all():
+            raise InputError("draws: must be finite")
+        z = np.empty((draws.shape[0], interface.nodes))
+        gaussian_rows(draws, modes.sigma, self.mean_mode, interface.nodes, z)
+        return z
+
+    def profiles(self, interface: Interface, draws: Array) -> Array:
+        """The map from draws to profiles.
+
+        Parameters
+        ----------
+        interface : Interface
+        draws : (samples, dimension) array
+            Standard normal, in the order of `draws`.
+
+        Returns
+        -------
+        (samples, nodes) array, in the unit of the marginal
+        """
+        return from_normal(self.marginal, self.gaussian(interface, draws))
+
+    def sample(
+        self,
+        interface: Interface,
+        *,
+        samples: int = 1,
+        seed: int = 0,
+        first: int = 0,
+        stream: int = 0,
+    ) -> Array:
+        """Sample profiles.
+
+        Parameters
+        ----------
+        interface : Interface
+        samples : int
+            How many.
+        seed : int
+            Not negative.
+        first : int
+            Number of the first sample: sample i is the same in whatever batch it comes.
+        stream : int
+            Fields of different streams are independent under one seed.
+
+        Returns
+        -------
+        (samples, nodes) array, in the unit of the marginal
+
+        Raises
+        ------
+        InputError
+            If a number is not a whole number or negative, or no mode is left by truncation.
+
+        Warns
+        -----
+        AccuracyWarning
+            If the grid is coarser than the spectrum, or the interface is short against the
+            correlation length and the field has no mean mode.
+        """
+        warn_if_inaccurate(self, interface)
+        draws = self.draws(interface, samples, seed, first, stream=stream)
+        return self.profiles(interface, draws)
+
+    def correlation(self, interface: Interface, *, of: str = "strength") -> Array:
+        """Correlation at the lags ``interface.x``, shape (nodes,), on the periodic interface.
+
+        Parameters
+        ----------
+        interface : Interface
+        of : {"strength", "z"}
+            Of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian one.
+        """
+        modes = self.modes(interface)
+        spectrum = np.zeros(interface.nodes)
+        np.add.at(spectrum, np.arange(modes.sigma.size) % interface.nodes, modes.sigma**2)
+        rho = np.fft.fft(spectrum).real
+        if _which(of) == "z":
+            return rho
+        return correlation_of_mapped(rho, hermite_coefficients(self.marginal))
+
+    def efolding_length(self, *, of: str = "strength") -> float:
+        """Distance at which the correlation falls to 1/e, m, on an infinite line.
+
+        Parameters
+        ----------
+        of : {"strength", "z"}
+            Of the mapped field or of the Gaussian one.
+        """
+        if _which(of) == "z":
+            return self.spectrum.efolding_length
+        coefficients = hermite_coefficients(self.marginal)
+        low, high = 0.0, 1.0
+        for _ in range(60):  # the correlation of the mapped field is monotone in that of z
+            rho = 0.5 * (low + high)
+            if correlation_of_mapped(np.array([rho]), coefficients)[0] < math.exp(-1.0):
+                low = rho
+            else:
+                high = rho
+        return lag_of_correlation(self.spectrum, high)
+
+    def with_efolding_length(self, length: float, *, of: str = "strength") -> RandomField:
+        """The same field with a correlation that falls to 1/e at `length` (m).
+
+        Parameters
+        ----------
+        length : float
+            m, positive.
+        of : {"strength", "z"}
+            Correlation of the mapped field or of the Gaussian one.
+        """
+        if isinstance(self.spectrum, CustomSpectrum):
+            raise InputError("spectrum: a spectrum of your own has no length that could be set")
+        try:
+            length = pydantic.TypeAdapter(Positive).validate_python(length)
+        except pydantic.ValidationError:
+            raise InputError(f"length: must be a positive number, got {length!r}") from None
+        xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
+        spectrum = self.spectrum.with_correlation_length(xi)
+        return RandomField(self.marginal, spectrum, self.mean_mode)
+
+
+def _which(of: str) -> str:
+    if of not in ("strength", "z"):
+        raise InputError(f"of: must be 'strength' or 'z', got {of!r}")
+    return of
+
+
+def _check_counts(**counts: Any) -> None:
+    problems = [
+        f"{name}: must be a whole number >= 0, got {value!r}"
+        for name, value in counts.items()
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+MOST_MODES = 1 << 22
+
+
+@lru_cache(maxsize=256)
+def _modes(field: RandomField, interface: Interface) -> Modes:
+    spacing = 2.0 * math.pi / interface.length
+    # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
+    count = math.floor(field.spectrum.cutoff / spacing * (1.0 + 1e-12))
+    if count < 1 and not field.mean_mode:
+        raise InputError(
+            f"spectrum: no mode is left on an interface of {interface.length:g} m: the first mode"
+            f" is at {spacing:.3g} rad/m, the spectrum is truncated at"
+            f" {field.spectrum.cutoff:.3g} rad/m; shorten the correlation length, lengthen the"
+            " interface or raise the truncation"
+        )
+    if count > MOST_MODES:
+        raise InputError(
+            f"spectrum: has {count} modes on an interface of {interface.length:g} m, at most"
+            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
+        )
+    power = np.zeros(count + 1)
+    power[1:] = field.spectrum.density(spacing * np.arange(1, count + 1))
+    if field.mean_mode:
+        # A mode j >= 1 stands for the wavenumbers k and -k, the mean mode for one of them only.
+        power[0] = 0.5 * float(field.spectrum.density(np.zeros(1))[0])
+    total = power.sum()
+    if not 0.0 < total < np.inf:
+        raise InputError(
+            "spectrum: its power in the modes of this interface must be positive and finite,"
+            f" got {total:g}"
+        )
+    sigma = np.sqrt(power / total)
+    sigma.flags.writeable = False
+    return Modes(sigma, count, 2 * count + int(field.mean_mode))
+
+
+def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
+    """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
+    modes = field.modes(interface)
+    lost = float(np.sum(modes.sigma[interface.nodes // 2 + 1 :] ** 2))
+    if lost > 1e-4:
+        warn_accuracy(
+            f"the grid of {interface.nodes} nodes is coarser than the spectrum: values at the nodes"
+            f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
+            f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
+        )
+    if field.mean_mode:
+        return
+    ratio = interface.length / field.spectrum.efolding_length
+    if ratio < 2.0 * math.pi * FEWEST_LENGTHS:
+        gap = -float(field.correlation(interface, of="z").min())
+        if gap > 0.02:
+            warn_accuracy(
+                f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
+                f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
+                " RandomField(mean_mode=True) restores the mean's variability"
+            )

@@ -1,0 +1,324 @@
+"""Runs on disk: begin, go on, look at, export."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiction._model import describe
+from stiction.ensemble.assemble import Gathered
+from stiction.ensemble.files import Lock, cannot_write, sync_folder
+from stiction.ensemble.monte_carlo import check_run, warn_of_fields
+from stiction.ensemble.resume import run_stored
+from stiction.ensemble.same import refuse_another
+from stiction.ensemble.store import (
+    LOCK,
+    MANIFEST,
+    Store,
+    empty,
+    prepare_folder,
+    writing,
+)
+from stiction.ensemble.trouble import StoreError
+from stiction.ensemble.work import Failure, Outcome
+from stiction.errors import InputError
+from stiction.study.study import Study
+
+FAILED = "failed_samples"
+OVERHEAD = 2**16
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a run is.
+
+    Attributes
+    ----------
+    samples, done : int
+        Of all points together.
+    done_by_point : (points,) array
+    failures : tuple of Failure
+    damaged : tuple of str
+        Chunks that fail their checksum; running the study again computes them again.
+    chunks, bytes : int
+    seconds : float
+        Computing time of all workers together.
+    active : bool
+        Whether a process is writing to it now.
+    """
+
+    samples: int
+    done: int
+    done_by_point: NDArray[np.int64]
+    failures: tuple[Failure, ...]
+    damaged: tuple[str, ...]
+    chunks: int
+    bytes: int
+    seconds: float
+    active: bool
+
+    @property
+    def complete(self) -> bool:
+        """Whether every sample is stored."""
+        return self.done == self.samples
+
+
+class StoredRun:
+    """A run on disk, for reading: a folder, or the NetCDF file of a finished one.
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    StoreError
+        If there is no run.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        beside = folder_beside(self.path)
+        self._store: Store | None = None
+        if self.path.is_dir():
+            self._store = Store(self.path)
+        elif beside.is_dir():
+            self._store = Store(beside)
+        elif self.path.is_file():
+            self._result = _read_result(self.path)
+        else:
+            raise StoreError(f"{self.path}: there is no run here")
+        if self._store is not None:
+            self.study = Study.from_dict(self._store.study)
+        else:
+            self.study = Study.from_result(self._result)
+
+    def status(self) -> Status:
+        """How far it is; reads every chunk to check it."""
+        ensemble = self.study.ensemble
+        total = len(self.study.plans) * ensemble.samples
+        if self._store is None:
+            first = self._result[next(iter(self._result.data_vars))]
+            points = len(self.study.plans)
+            done = np.isfinite(first.values.reshape(points, -1)).sum(axis=1)
+            size = self.path.stat().st_size
+            return Status(total, int(done.sum()), done, self.failures, (), 1, size, 0.0, False)
+        store = self._store
+        damaged = store.damaged()
+        bad = {chunk.file for chunk in damaged}
+        store.chunks = [chunk for chunk in store.chunks if chunk.file not in bad]
+        done = store.done(len(self.study.plans), ensemble.samples, ensemble.first).sum(axis=1)
+        return Status(
+            total,
+            int(done.sum()),
+            done,
+            self.failures,
+            tuple(sorted(bad)),
+            len(store.chunks),
+            sum(chunk.bytes for chunk in store.chunks),
+            sum(chunk.seconds for chunk in store.chunks),
+            _is_active(store.path),
+        )
+
+    @property
+    def versions(self) -> list[str]:
+        """Versions of the package that computed it."""
+        if self._store is not None:
+            return self._store.versions
+        return [str(self._result.attrs["stiction_version"])]
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """The samples that have failed."""
+        if self._store is not None:
+            return tuple(self._store.failures.values())
+        return tuple(Failure(*item) for item in json.loads(self._result.attrs.get(FAILED, "[]")))
+
+    def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
+        """All that is stored, labelled, NaN where a sample is missing.
+
+        Parameters
+        ----------
+        only : sequence of str, optional
+            Names of the variables to read; all if left out.
+        """
+        if self._store is None:
+            names = [name for name in only or () if name in self._result]
+            return self._result if only is None else self._result[names]
+        study = self.study
+        gathered = Gathered(study.plans, study.ensemble.samples, study.ensemble.first, only)
+        for outcome in self._store.outcomes():
+            gathered.add(outcome)
+        attributes = study.attributes
+        if self.failures:
+            attributes[FAILED] = [list(failure) for failure in self.failures]
+        return gathered.dataset(attributes, study.axes)
+
+    def export(self, path: str | Path) -> None:
+        """Write `dataset` as one NetCDF file, whole or not at all.
+
+        Raises
+        ------
+        StoreError
+            If it cannot be written.
+        """
+        write_result(self.dataset(), Path(path))
+
+
+def _is_active(folder: Path) -> bool:
+    if not os.access(folder / LOCK, os.W_OK):
+        return False
+    try:
+        with Lock(folder / LOCK, announce=False):
+            return False
+    except StoreError:
+        return True
+
+
+def folder_beside(file: Path) -> Path:
+    """Where the chunks of ``result.nc`` are until it is complete."""
+    return file.parent / f"{file.name}.run"
+
+
+def write_result(result: xr.Dataset, path: Path) -> None:
+    """Write a result as one NetCDF file, whole or not at all."""
+    aside = path.with_name(path.name + ".part")
+    # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
+    if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
+        raise cannot_write(path, OSError(errno.ENOSPC, ""))
+    try:
+        result.to_netcdf(aside)
+        with open(aside, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(aside, path)
+    except (OSError, RuntimeError) as error:  # the NetCDF library raises either
+        aside.unlink(missing_ok=True)
+        raise cannot_write(path, error) from error
+    sync_folder(path.parent)
+
+
+def _free_bytes(folder: Path) -> float:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return math.inf
+
+
+def _read_result(path: Path) -> xr.Dataset:
+    try:
+        with xr.open_dataset(path) as opened:
+            result = opened.load()
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: is no NetCDF file that can be read: {error}") from None
+    if "study" not in result.attrs:
+        raise StoreError(f"{path}: holds no result of a study")
+    return result
+
+
+def check_target(path: Path) -> None:
+    """Refuse a place that cannot take a run, before any work is done.
+
+    Raises
+    ------
+    StoreError
+    """
+    if path.suffix != ".nc":
+        prepare_folder(path)
+        return
+    if path.is_dir():
+        raise StoreError(f"{path}: is a folder; a result needs a file name")
+    prepare_folder(folder_beside(path))
+    if not any(folder_beside(path).iterdir()):
+        folder_beside(path).rmdir()
+
+
+def run_into(
+    study: Study,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+    retry: bool = False,
+) -> StoredRun:
+    """Run a study, or what is missing of it, into a folder or a file; see `Study.run`."""
+    from stiction import __version__
+
+    path = Path(out)
+    ensemble, plans = study.ensemble, study.plans
+    check_run(ensemble.samples, ensemble.first, workers, executor)
+    plain = study.to_dict()  # refuses what cannot be written down
+    check_target(path)
+    warn_of_fields(plans)
+    to_file = path.suffix == ".nc"
+    folder = folder_beside(path) if to_file else path
+    before = None
+    if to_file and path.exists():
+        before = _read_result(path)
+        refuse_another(path, plain, json.loads(before.attrs["study"]))
+        same = json.loads(before.attrs["study"])["ensemble"]["samples"] == ensemble.samples
+        if same and not folder.exists() and not (retry and FAILED in before.attrs):
+            return StoredRun(path)
+    with writing(folder, plain, __version__) as store:
+        if before is not None and not store.chunks and FAILED not in before.attrs:
+            variables = {name: v for plan in plans for name, v in plan.variables.items()}
+            store.add(_outcomes_of(before, len(plans)), variables)
+        run_stored(
+            store,
+            plans,
+            ensemble.samples,
+            first=ensemble.first,
+            workers=workers,
+            executor=executor,
+            progress=progress,
+            retry=retry,
+        )
+        if to_file:
+            StoredRun(path).export(path)
+            if not store.failures:
+                empty(folder)
+    if to_file and not (folder / MANIFEST).exists():
+        shutil.rmtree(folder)
+    return StoredRun(path)
+
+
+def _outcomes_of(result: xr.Dataset, points: int) -> list[Outcome]:
+    """A finished result as outcomes, one a point."""
+    samples = result["sample"].values.astype(np.int64)
+    kept = result["kept_sample"].values.astype(np.int64) if "kept_sample" in result else samples
+    swept = result.sizes
+    values = {}
+    for name, variable in result.data_vars.items():
+        inner = [dim for dim in variable.dims if dim in ("sample", "kept_sample", "x")]
+        values[str(name)] = variable.values.reshape(points, *(swept[dim] for dim in inner))
+    return [
+        Outcome(point, samples, kept, {name: value[point] for name, value in values.items()})
+        for point in range(points)
+    ]
+
+
+def open_run(path: Any) -> StoredRun:
+    """A run on disk, by the path of its folder or file.
+
+    Raises
+    ------
+    InputError
+        If the path is not one.
+    StoreError
+        If there is no run.
+    """
+    if not isinstance(path, str | Path):
+        raise InputError(f"path: must be the path of a run, got {describe(path)}")
+    return StoredRun(path)

@@ -1,0 +1,1 @@
+"""A study: everything that defines a Monte Carlo computation, from Python or TOML."""

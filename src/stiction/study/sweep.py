@@ -1,0 +1,351 @@
+"""Sweeps: any key of a study takes several values; axes are crossed, keys of one axis zipped."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import math
+import numbers
+import typing
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pydantic
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from stiction._model import _models_in, describe, to_plain
+from stiction.ensemble.assemble import GridAxis
+from stiction.errors import InputError, unknown_name
+from stiction.random.marginals import ScipyMarginal
+from stiction.results import Variable
+
+MOST_POINTS = 100_000
+_FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
+_FIXED_TABLES = ("title", "sweep", "cluster", "ensemble.keep_limit")
+_RANGE = ("start", "stop", "count", "spacing")
+_UNITS = {
+    "length": "m",
+    "correlation_length": "m",
+    "critical_slip": "m",
+    "shear_modulus": "Pa",
+    "density": "kg m-3",
+    "weakening_rate": "Pa m-1",
+    "residual_strength": "Pa",
+    "initial_stress": "Pa",
+    "normal_pressure": "Pa",
+    "low": "Pa",
+    "high": "Pa",
+    "loc": "Pa",
+    "scale": "Pa",
+    "loading_rate": "Pa s-1",
+}
+
+
+class Axis(NamedTuple):
+    """Keys that vary together, each with one value for each step."""
+
+    keys: tuple[str, ...]
+    steps: tuple[tuple[Any, ...], ...]
+
+
+class Point(NamedTuple):
+    """One combination of a sweep: its number and the value of every swept key."""
+
+    number: int
+    values: dict[str, Any]
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
+    """Values of {start, stop, count, spacing = "linear" or "log"}, both ends included."""
+    problems = [unknown_name(key, name, _RANGE) for name in given if name not in _RANGE]
+    problems += [f"{key}.{name}: missing" for name in _RANGE[:3] if name not in given]
+    if problems:
+        raise InputError(problems)
+    start, stop, count = (given[name] for name in _RANGE[:3])
+    spacing = given.get("spacing", "linear")
+    for name in ("start", "stop"):
+        value = given[name]
+        if not _is_real(value) or not math.isfinite(value):
+            problems.append(f"{key}.{name}: must be a finite number, got {describe(value)}")
+    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 2:
+        problems.append(f"{key}.count: must be a whole number >= 2, got {describe(count)}")
+    if spacing not in ("linear", "log"):
+        problems.append(f"{key}.spacing: must be 'linear' or 'log', got {describe(spacing)}")
+    elif spacing == "log" and not problems and not (start > 0.0 and stop > 0.0):
+        problems.append(f"{key}: a log range needs positive ends, got {start!r} and {stop!r}")
+    if problems:
+        raise InputError(problems)
+    if spacing == "log":
+        values = np.geomspace(start, stop, int(count))
+    else:
+        values = np.linspace(start, stop, int(count))
+    whole = isinstance(start, numbers.Integral) and isinstance(stop, numbers.Integral)
+    if whole and np.all(values == np.round(values)):
+        return [int(value) for value in values]
+    return [float(value) for value in values]
+
+
+def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
+    if isinstance(given, Mapping):
+        return _range(key, given)
+    if isinstance(given, np.ndarray):
+        given = list(given) if given.ndim else given
+    if not isinstance(given, list | tuple) or not given:
+        raise InputError(
+            f"{key}: must be a list of values or a range such as {{start = 1e-3, stop = 4e-3,"
+            f" count = 4}}, got {describe(given)}"
+        )
+    return [_value(key, value, folder) for value in given]
+
+
+def _value(key: str, value: Any, folder: Path | None) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, str) and folder is not None and value.endswith((".npy", ".csv")):
+        path = folder / value
+        try:
+            if path.suffix == ".npy":
+                return np.load(path, allow_pickle=False).tolist()
+            return np.loadtxt(path, delimiter=",", ndmin=1).tolist()
+        except (OSError, ValueError) as error:
+            raise InputError(f"{key}: cannot read {value!r}: {error}") from None
+    return value
+
+
+def _axis(number: int, given: Any, folder: Path | None) -> Axis:
+    where = f"[{number}]"
+    if isinstance(given, Axis):
+        return given
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(
+            f"{where}: must be a table of keys and their values, got {describe(given)}"
+        )
+    problems, columns = [], {}
+    for key, values in _flat(given).items():
+        try:
+            columns[key] = _values(key, values, folder)
+        except InputError as error:
+            problems += [f"{where}.{text}" for text in error.problems]
+    lengths = {key: len(values) for key, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        named = ", ".join(f"{key} has {count}" for key, count in lengths.items())
+        problems.append(
+            f"{where}: keys of one table vary together and need as many values each ({named});"
+            " to cross them, give each a [[sweep]] of its own"
+        )
+    if problems:
+        raise InputError(problems)
+    return Axis(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+
+
+def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
+    result: dict[str, Any] = {}
+    for key, value in given.items():
+        name = f"{prefix}.{key}" if prefix else str(key)
+        if isinstance(value, Mapping) and not set(value) & set(_RANGE):
+            result |= _flat(value, name)
+        else:
+            result[name] = value
+    return result
+
+
+def _axes(given: Any, info: pydantic.ValidationInfo) -> tuple[Axis, ...]:
+    """Axes of a sweep from what was written: a list of tables, or one table of one key."""
+    folder = (info.context or {}).get("folder")
+    if isinstance(given, Mapping):
+        if len(_flat(given)) > 1:
+            raise InputError(
+                "must be a list of tables: a [[sweep]] for each key crosses them, one [[sweep]]"
+                " with several keys varies them together"
+            )
+        given = [given]
+    if not isinstance(given, list | tuple):
+        raise InputError(f"must be a list of tables, got {describe(given)}")
+    problems: list[str] = []
+    axes: list[Axis] = []
+    for number, table in enumerate(given):
+        try:
+            axes.append(_axis(number, table, None if folder is None else Path(folder)))
+        except InputError as error:
+            problems += error.problems
+    keys = [key for axis in axes for key in axis.keys]
+    for key in sorted(keys):
+        if key in _FIXED or key.split(".")[0] in _FIXED_TABLES or key in _FIXED_TABLES:
+            problems.append(f"{key}: cannot be swept")
+        if keys.count(key) > 1:
+            problems.append(f"{key}: is swept twice")
+        inner = [other for other in keys if other.startswith(f"{key}.")]
+        problems += [f"{other}: is part of {key}, which is swept too" for other in inner]
+    points = math.prod(len(axis.steps) for axis in axes)
+    if points > MOST_POINTS:
+        problems.append(f"makes {points} points, at most {MOST_POINTS} are allowed")
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    return tuple(axes)
+
+
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return to_plain(value) if dataclasses.is_dataclass(value) else value
+
+
+def _plain_axes(axes: tuple[Axis, ...]) -> list[dict[str, list[Any]]]:
+    return [
+        {key: [_plain_value(step[i]) for step in axis.steps] for i, key in enumerate(axis.keys)}
+        for axis in axes
+    ]
+
+
+Sweep: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_axes),
+    PlainSerializer(_plain_axes),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "description": "axes that are crossed; each a table of dotted keys that vary together,"
+            " with lists of values or {start, stop, count, spacing}",
+            "items": {"type": "object"},
+        }
+    ),
+]
+"""A list of tables of dotted keys and their values."""
+
+
+def points_of(axes: Sequence[Axis]) -> list[Point]:
+    """All combinations, the last axis running fastest."""
+    combinations = itertools.product(*(axis.steps for axis in axes))
+    keys = [key for axis in axes for key in axis.keys]
+    return [
+        Point(number, dict(zip(keys, itertools.chain(*steps), strict=True)))
+        for number, steps in enumerate(combinations)
+    ]
+
+
+def name_point(point: Point) -> str:
+    """For messages: 'point 3 (problem.interface.nodes = 512)'."""
+    values = ", ".join(f"{key} = {_text(value)}" for key, value in point.values.items())
+    return f"point {point.number} ({values})" if values else f"point {point.number}"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
+    return str(kind) if kind else describe(value)
+
+
+def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
+    """A copy of a model object with dotted keys replaced, all of them at once.
+
+    Raises
+    ------
+    InputError
+        If a key does not exist (the nearest valid one is named) or a value does not fit.
+    """
+    tree: dict[str, Any] = {}
+    for key, value in values.items():
+        *folders, last = key.split(".")
+        table = tree
+        for name in folders:
+            table = table.setdefault(name, {})
+        table[last] = _Leaf(value)
+    return _replaced(owner, tree, "")
+
+
+class _Leaf(NamedTuple):
+    value: Any
+
+
+def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
+    if isinstance(owner, ScipyMarginal):
+        changes = {name: leaf.value for name, leaf in tree.items() if isinstance(leaf, _Leaf)}
+        return {"type": owner.type, **dict(owner.parameters), **changes}
+    if not dataclasses.is_dataclass(owner):
+        raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
+    names = [field.name for field in dataclasses.fields(owner) if field.init]
+    unknown = [unknown_name(path or "sweep", name, names) for name in tree if name not in names]
+    if unknown:
+        raise InputError(unknown)
+    changes = {}
+    for name, branch in tree.items():
+        inner = f"{path}.{name}" if path else name
+        if isinstance(branch, _Leaf):
+            changes[name] = branch.value
+        else:
+            changes[name] = _replaced(getattr(owner, name), branch, inner)
+    try:
+        return dataclasses.replace(owner, **changes)  # type: ignore[type-var]  # a model object
+    except InputError as error:
+        kind = f"{type(owner).__name__}."
+        texts = (text.removeprefix(kind) for text in error.problems)
+        raise InputError([f"{path}.{text}" if path else text for text in texts]) from None
+
+
+def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:
+    """Swept keys that no study has, found without a valid study."""
+    texts = []
+    for key in (key for axis in axes for key in axis.keys):
+        classes, done = [cls], ""
+        for step in key.split("."):
+            found = [f.name for c in classes for f in dataclasses.fields(c) if f.init]
+            names = list(dict.fromkeys(found))
+            if classes and step not in names:
+                texts.append(unknown_name(f"sweep: {done or 'the study'}", step, names))
+                break
+            owners = [c for c in classes if step in {f.name for f in dataclasses.fields(c)}]
+            hints = [typing.get_type_hints(c, include_extras=True)[step] for c in owners]
+            classes = [inner for hint in hints for inner in _models_in(hint)]
+            done = f"{done}.{step}" if done else step
+    return texts
+
+
+def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
+    """The axes as dimensions of a result, named by the ends of their keys."""
+    keys = [key for axis in axes for key in axis.keys]
+    names = _short_names(keys, taken)
+    result = []
+    for axis in axes:
+        dim = names[axis.keys[0]]
+        coordinates = {}
+        for i, key in enumerate(axis.keys):
+            values = _coordinate([step[i] for step in axis.steps])
+            unit = _UNITS.get(key.rsplit(".", 1)[-1], "1")
+            unit = unit if values.dtype.kind in "if" else "1"
+            coordinates[names[key]] = (values, Variable(unit, key, (dim,)))
+        result.append(GridAxis(dim, len(axis.steps), coordinates))
+    return result
+
+
+def _short_names(keys: Sequence[str], taken: Sequence[str]) -> dict[str, str]:
+    names: dict[str, str] = {}
+    for key in keys:
+        parts = key.split(".")
+        for count in range(1, len(parts) + 1):
+            name = "_".join(parts[-count:])
+            alike = [other for other in keys if other.split(".")[-count:] == parts[-count:]]
+            if len(alike) == 1 and name not in taken:
+                break
+        names[key] = name if name not in taken else f"swept_{name}"
+    return names
+
+
+def _coordinate(values: Sequence[Any]) -> np.ndarray[Any, Any]:
+    if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
+        whole = all(isinstance(value, numbers.Integral) for value in values)
+        return np.array(values, dtype=np.int64 if whole else np.float64)
+    texts = [value if isinstance(value, str) else _text(value) for value in values]
+    if len(set(texts)) < len(texts):  # two tables of one type: write them out
+        texts = [json.dumps(_plain_value(value)) for value in values]
+    if len(set(texts)) < len(texts):
+        texts = [f"{number}: {text}" for number, text in enumerate(texts)]
+    return np.array(texts, dtype=object)
