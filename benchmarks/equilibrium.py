@@ -69,7 +69,7 @@ def main():
     for ratio, target in TARGETS.items():
         strength = st.paper.strength(problem, correlation_ratio=ratio)
         tau_p = strength.sample(problem.interface, samples=BATCH, seed=0)
-        rows = problem.rows(tau_p)
+        rows = problem.sample(tau_p)
         ours = median_time(lambda rows=rows: solver(rows), 5) / BATCH
         values = solver(rows)
         one = tau_p[0]

@@ -41,10 +41,10 @@ def main():
     for ratio in (2.0, 1.0, 0.5, 0.25, 0.15):
         strength = st.paper.strength(problem, correlation_ratio=ratio)
         tau_p = strength.sample(problem.interface, samples=SAMPLES + 1, seed=0)
-        solver(problem.rows(tau_p[:1]))
+        solver(problem.sample(tau_p[:1]))
         times, gaps = [], []
         for profile in tau_p[1:]:
-            rows = problem.rows(profile)
+            rows = problem.sample(profile)
             start = time.perf_counter()
             values = solver(rows)
             times.append(time.perf_counter() - start)

@@ -31,11 +31,11 @@ def main() -> None:
         )
         for rate in RATES:
             solver = Rupture(loading_rate=rate).prepare(problem)
-            solver(problem.rows(tau_p[:1]))
+            solver(problem.sample(tau_p[:1]))
             times, implicit, explicit = [], [], []
             for profile in tau_p[1:]:
                 start = time.perf_counter()
-                found = solver(problem.rows(profile))
+                found = solver(problem.sample(profile))
                 times.append(time.perf_counter() - start)
                 implicit.append(int(found["implicit_steps"][0]))
                 explicit.append(int(found["explicit_steps"][0]))
@@ -43,7 +43,7 @@ def main() -> None:
                 f"{ratio:8.2f} {rate:8.0e} {statistics.median(times):11.4f} {TARGET:7.1f} "
                 f"{statistics.median(implicit):9.0f} {statistics.median(explicit):9.0f}"
             )
-    profile = problem.rows(tau_p[1])
+    profile = problem.sample(tau_p[1])
     both = []
     for implicit_too in (True, False):
         solver = Rupture(loading_rate=2e7, implicit=implicit_too).prepare(problem)

@@ -27,7 +27,7 @@ def study(samples, method=METHOD):
     problem = st.paper.problem()
     return st.Study(
         problem=problem,
-        strength=st.paper.strength(problem, correlation_ratio=0.5),
+        random=st.paper.strength(problem, correlation_ratio=0.5),
         method=method,
         ensemble=st.Ensemble(samples=samples),
     )

@@ -32,13 +32,13 @@ length = 0.1
 nodes = 256
 [problem.friction]
 weakening_rate = 0.4e12
-[strength.marginal]
+[random.strength.marginal]
 type = "beta"
 alpha = 1.5
 beta = 3.0
 low = 0.66e6
 high = 1.66e6
-[strength.spectrum]
+[random.strength.spectrum]
 type = "power_law"
 [method]
 type = "local_criterion"
@@ -48,7 +48,7 @@ seed = 11
 keep = ["strength"]
 keep_samples = [0, 12345, 119999]
 [[sweep]]
-"strength.spectrum.correlation_length" = [2e-3, 3e-3, 4e-3, 6e-3]
+"random.strength.spectrum.correlation_length" = [2e-3, 3e-3, 4e-3, 6e-3]
 """
 
 # The command itself, with chunks that follow each other fifty times faster.

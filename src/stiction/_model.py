@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import numbers
 import typing
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform, overload
 
@@ -80,8 +81,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         array = np.array(real_array(value))
     except TypeError as error:
         raise ValueError(f"must be a number or an array of numbers, {error}") from None
-    if array.ndim != 1 or array.size == 0:
-        raise ValueError(f"must have shape (nodes,), got shape {array.shape}")
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
     if not np.all(np.isfinite(array)):
         raise ValueError(f"must be finite; entry {int(np.argmin(np.isfinite(array)))} is not")
     array.flags.writeable = False
@@ -218,16 +219,22 @@ def _equal(self: Any, other: Any) -> bool:
     return all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields)
 
 
+def _hashable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return (value + 0.0).tobytes()  # zeros of both signs are equal, so they must hash alike
+    if isinstance(value, dict):
+        return tuple((key, _hashable(inner)) for key, inner in value.items())
+    return value
+
+
 def _hash(self: Any) -> int:
-    values = (getattr(self, field.name) for field in dataclasses.fields(self))
-    # Zeros of both signs are equal, so they must hash alike.
-    return hash(tuple((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values))
+    return hash(tuple(_hashable(getattr(self, field.name)) for field in dataclasses.fields(self)))
 
 
 @overload
 def model(cls: type[T]) -> type[T]: ...
 @overload
-def model(*, kw_only: bool = ...) -> Any: ...
+def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """Class decorator: a frozen pydantic dataclass whose mistakes come as `InputError`.

@@ -1,8 +1,11 @@
-"""One call, any method: the onset of given strength profiles."""
+"""One call, any method: what a method is, which there are, and the onset of given profiles."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -13,37 +16,107 @@ from numpy.typing import NDArray
 from stiction._model import describe, to_plain
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.results import FRICTION_COEFFICIENT, POSITION, SAMPLE, Variable, to_dataset
-from stiction.sample import Rows
+from stiction.results import FRICTION_COEFFICIENT, SAMPLE, Variable, coordinate, to_dataset
+from stiction.sample import Sample
 
 Values = dict[str, NDArray[Any]]
+Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
+
+ENTRY_POINTS = "stiction.methods"
+"""Group of entry points by which other packages offer methods."""
+
+_OWN = {
+    "local_criterion": "criterion.method:LocalCriterion",
+    "equilibrium": "equilibrium.method:Equilibrium",
+    "rupture": "dynamics.method:Rupture",
+}
 
 
 class Method(Protocol):
-    """What makes an object a method: options that know how to prepare a solver."""
+    """What makes an object a method: options, and a solver that follows from them.
+
+    Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
+    package that names it under the entry points "stiction.methods" offers it in study files too;
+    its `type` is then a ``Literal`` with a default.
+    """
 
     @property
-    def variables(self) -> dict[str, Variable]:
-        """What the solver returns, all with 'sample' as first dimension."""
+    def type(self) -> str:
+        """Its name in study files."""
 
-    def prepare(self, problem: Problem) -> Callable[[Rows], Mapping[str, NDArray[Any]]]:
-        """A solver of rows; what is the same for all rows is computed here, once."""
+    @property
+    def label(self) -> str:
+        """Its name in figures, tables and progress."""
+
+    @property
+    def chunk_size(self) -> int:
+        """Samples that make a good piece of work."""
+
+    def variables(self, problem: Problem) -> Mapping[str, Variable]:
+        """What the solver returns, each with 'sample' as first dimension.
+
+        All of `stiction.results.onset_variables` must be among them.
+        """
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, in seconds, to a factor of three."""
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+
+    def prepare(self, problem: Problem) -> Solver:
+        """A solver of samples; what is the same for all of them is computed here, once."""
+
+
+MEMBERS = (
+    "type", "label", "chunk_size", "variables", "seconds_per_sample", "supports", "prepare",
+)  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def methods() -> Mapping[str, Any]:
+    """The classes of all methods by their `type`: the package's own, then those of others."""
+    found: dict[str, Any] = {}
+    for name, place in _OWN.items():
+        module, attribute = place.split(":")
+        found[name] = getattr(import_module(f"stiction.{module}"), attribute)
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name in found:
+            raise InputError(
+                f"{ENTRY_POINTS}: two methods are called {point.name!r}; uninstall one of them"
+            )
+        found[point.name] = point.load()
+    return MappingProxyType(found)
 
 
 def check_method(method: Any) -> None:
     """Refuse what is not a method object, in particular the class instead of an instance."""
-    if isinstance(method, type) or not hasattr(method, "prepare"):
-        hint = f"; write st.{method.__name__}(...)" if isinstance(method, type) else ""
+    if isinstance(method, type):
+        raise InputError(
+            f"method: must be an object, got the class {method.__name__}; write"
+            f" st.{method.__name__}(...)"
+        )
+    missing = [name for name in MEMBERS if not hasattr(method, name)]
+    if "prepare" in missing:
         raise InputError(
             "method: must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
-            f" st.Rupture(loading_rate=...), got {describe(method)}{hint}"
+            f" st.Rupture(loading_rate=...), got {describe(method)}"
         )
+    if missing:
+        raise InputError(f"method: {describe(method)} lacks {', '.join(missing)}")
 
 
 def check_problem(problem: Any) -> None:
     """Refuse what is not a `Problem`, such as arguments that changed places."""
     if not isinstance(problem, Problem):
         raise InputError(f"problem: must be a Problem, got {describe(problem)}")
+
+
+def check_support(problem: Problem, method: Method) -> None:
+    """Refuse a problem that the method cannot take, with its reasons."""
+    reasons = method.supports(problem)
+    if reasons:
+        raise InputError([f"method: the {method.label} cannot take this: {r}" for r in reasons])
 
 
 def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
@@ -54,21 +127,19 @@ def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
         return {"study_incomplete": str(error)}
 
 
-def solve(
-    problem: Problem, method: Method, solver: Callable[[Rows], Mapping[str, Any]], rows: Rows
-) -> Values:
+def solve(solver: Solver, sample: Sample) -> Values:
     """The solver's values, and what follows from them for every method alike."""
-    values = dict(solver(rows))
-    if problem.load.normal_pressure is not None:
-        pressure = float(np.mean(problem.load.normal_pressure))
+    values = dict(solver(sample))
+    pressure = sample.normal_pressure.mean(axis=sample.axes)
+    if not np.isnan(pressure).all():
         values["friction_coefficient"] = values["critical_stress"] / pressure
     return values
 
 
-def variables_of(problem: Problem, method: Method) -> dict[str, Variable]:
-    """All that `solve` returns."""
-    variables = dict(method.variables)
-    if problem.load.normal_pressure is not None:
+def variables_of(problem: Problem, method: Method, pressure: bool = False) -> dict[str, Variable]:
+    """All that `solve` returns; `pressure` says that the normal pressure differs by sample."""
+    variables = dict(method.variables(problem))
+    if pressure or problem.load.normal_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
     return variables
 
@@ -81,35 +152,28 @@ def label(
     attributes: Mapping[str, Any],
     more_variables: Mapping[str, Variable] = MappingProxyType({}),
 ) -> xr.Dataset:
-    """Values of many samples as a dataset over 'sample' (and 'x' where they have nodes)."""
-    variables = variables_of(problem, method) | dict(more_variables)
+    """Values of many samples as a dataset over 'sample' (and the nodes where they have them)."""
+    variables = variables_of(problem, method, "friction_coefficient" in values)
+    variables |= dict(more_variables)
     coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
-    if any("x" in variables[name].dims for name in values):
-        coordinates["x"] = (problem.interface.x, POSITION)
+    used = {dim for name in values for dim in variables[name].dims}
+    for dim in sorted(used - {"sample"}):
+        coordinates[dim] = coordinate(problem.interface, dim)
     return to_dataset(values, variables, coordinates, attributes)
 
 
-def onset(
-    problem: Problem,
-    tau_p: Any,
-    *,
-    method: Method,
-    residual_strength: Any = None,
-    initial_stress: Any = None,
-    weakening_rate: Any = None,
-) -> xr.Dataset:
+def onset(problem: Problem, profiles: Any, *, method: Method) -> xr.Dataset:
     """At which load, and where, do interfaces of given strength let go?
 
     Parameters
     ----------
     problem : Problem
-    tau_p : (samples, nodes) or (nodes,) array
-        Peak strength, Pa.
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane (samples, nx,
+        ny) or (nx, ny); or several profiles by name, such as ``{"strength": ...,
+        "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
-    residual_strength, initial_stress, weakening_rate : array, optional
-        What differs between samples besides the strength, (samples, nodes) or (samples, 1), Pa or
-        Pa/m; replaces the problem's own.
 
     Returns
     -------
@@ -122,15 +186,20 @@ def onset(
     ------
     InputError
         Naming all that does not fit.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
+    >>> bool(found.critical_stress.item() > tau_p.min())
+    True
     """
     check_method(method)
     check_problem(problem)
+    check_support(problem, method)
     attributes = study_attributes(problem, method)
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
-    values = solve(problem, method, method.prepare(problem), rows)
-    return label(problem, method, values, np.arange(rows.count), attributes)
+    sample = problem.sample(profiles)
+    values = solve(method.prepare(problem), sample)
+    return label(problem, method, values, np.arange(sample.samples), attributes)

@@ -9,10 +9,11 @@ from pydantic import model_validator
 
 from stiction._model import Mode, describe, model
 from stiction.errors import InputError, warn_accuracy
-from stiction.friction import SlipWeakening
+from stiction.friction import Friction
+from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.load import Load
-from stiction.sample import Rows, as_rows
+from stiction.sample import PROFILES, Sample, named_profiles, profiles_of
 from stiction.solid import Solid
 
 # lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
@@ -28,42 +29,57 @@ class Problem:
     ----------
     solid : Solid
     interface : Interface
-    friction : SlipWeakening
+    friction : SlipWeakening, ExponentialWeakening or PiecewiseWeakening
     load : Load, optional
         Uniform and without initial stress if left out.
     mode : {"II", "III"}
-        In-plane or anti-plane shear.
+        In-plane or anti-plane shear; a plane is in-plane along x and anti-plane along y.
 
     Raises
     ------
     InputError
-        If an array does not have one entry for each node, or the nucleation length spans fewer
-        than four nodes.
+        If an array does not have one entry for each node, the nucleation length spans fewer than
+        four nodes, or an interface of two dimensions is given plane stress or mode III.
     """
 
     solid: Solid
     interface: Interface
-    friction: SlipWeakening
+    friction: Friction
     load: Load = Load()
     mode: Mode = "II"
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
-        nodes = self.interface.nodes
+        shape = self.interface.shape
+        friction, load = self.friction, self.load
         arrays = {
-            "friction.weakening_rate": self.friction.weakening_rate,
-            "friction.critical_slip": self.friction.critical_slip,
-            "friction.residual_strength": self.friction.residual_strength,
-            "load.profile": self.load.profile,
-            "load.initial_stress": self.load.initial_stress,
-            "load.normal_pressure": self.load.normal_pressure,
+            "friction.weakening_rate": friction.weakening_rate,
+            "friction.critical_slip": friction.critical_slip,
+            "friction.fracture_energy": friction.fracture_energy,
+            "friction.residual_strength": friction.residual_strength,
+            "friction.residual_ratio": friction.residual_ratio,
+            "load.profile": load.profile,
+            "load.initial_stress": load.initial_stress,
+            "load.normal_pressure": load.normal_pressure,
         }
+        nodes = " x ".join(map(str, shape))
         problems = [
             f"{name}: must have one entry for each of the {nodes} nodes, got {describe(value)}"
             for name, value in arrays.items()
-            if isinstance(value, np.ndarray) and value.shape != (nodes,)
+            if isinstance(value, np.ndarray) and value.shape != shape
         ]
-        rate = self.friction.weakening_rate
+        if self.interface.is_plane:
+            if self.solid.plane != "strain":
+                problems.append(
+                    "solid.plane: on an interface of two dimensions the solids are in three, so"
+                    f" there is no plane {self.solid.plane}; leave plane = 'strain'"
+                )
+            if self.mode != "II":
+                problems.append(
+                    "mode: on an interface of two dimensions load and slip are along x, which is"
+                    f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
+                )
+        rate = friction.weakening_rate
         if rate is not None and not problems:
             problems += self._too_few_nodes(float(np.max(rate)))
         if problems:
@@ -72,7 +88,7 @@ class Problem:
 
     @property
     def effective_modulus(self) -> float:
-        """Static modulus G* of the plane state and mode, Pa."""
+        """Static modulus G* of the plane state and mode, Pa; on a plane that along x."""
         return self.solid.effective_modulus(self.mode)
 
     @property
@@ -82,104 +98,140 @@ class Problem:
         Raises
         ------
         InputError
-            If the weakening rate varies along the interface or follows from `critical_slip`.
+            If the weakening rate varies along the interface or follows from `critical_slip` or
+            `fracture_energy`.
         """
-        rate = self.friction.weakening_rate
-        if rate is None or np.ptp(rate) > 0.0:
+        rate = self.uniform_rate
+        if rate is None:
             raise InputError(
                 "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
                 " rate; where it varies, use st.Equilibrium() or st.Rupture()"
             )
-        return self.nucleation_length_of(float(np.max(rate)))
+        return self.nucleation_length_of(rate)
+
+    @property
+    def uniform_rate(self) -> float | None:
+        """The problem's weakening rate, Pa/m, if it is the same at all nodes, else None."""
+        rate = self.friction.weakening_rate
+        return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
 
     def nucleation_length_of(self, rate: float) -> float:
         """h_n, m, of a uniform weakening rate in Pa/m."""
         return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
 
-    def _too_few_nodes(self, steepest_rate: float) -> list[str]:
-        length = self.nucleation_length_of(steepest_rate)
-        resolution = length / self.interface.spacing
+    def nodes_in_nucleation_length(self, rate: float) -> float:
+        """Nodes that the nucleation length of a weakening rate (Pa/m) spans, where fewest.
+
+        Of a law that steepens with slip the steepest rate counts; on a plane the length across
+        the slip, that of mode III, counts as well.
+        """
+        friction, interface = self.friction, self.interface
+        steepest = rate * friction.steepest_slope / friction.initial_slope
+        unit = 2.0 * SMALLEST_EIGENVALUE / steepest
+        moduli = [self.effective_modulus]
+        if interface.is_plane:
+            moduli.append(self.solid.shear_modulus)
+        return min(
+            unit * modulus / spacing
+            for modulus, spacing in zip(moduli, interface.spacings, strict=True)
+        )
+
+    def _too_few_nodes(self, highest_rate: float) -> list[str]:
+        resolution = self.nodes_in_nucleation_length(highest_rate)
         if resolution >= FEWEST_NODES:
             return []
-        enough = 2.0 * np.ceil(0.5 * FEWEST_NODES * self.interface.length / max(length, 1e-300))
+        length = self.nucleation_length_of(highest_rate)
+        shape = self.interface.shape
+        finer = [2.0 * np.ceil(0.5 * FEWEST_NODES * n / max(resolution, 1e-300)) for n in shape]
+        enough = " x ".join(f"{n:.10g}" for n in finer)
         return [
             f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
-            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough:.10g},"
-            f" got {self.interface.nodes}"
+            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough},"
+            f" got {' x '.join(map(str, shape))}"
         ]
 
-    def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
+    def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
+        resolution = self.nodes_in_nucleation_length(float(sample.weakening_rate.max()))
         if resolution < enough:
             warn_accuracy(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
                 f" {cost}"
             )
 
-    def rows(
-        self,
-        tau_p: Any,
-        *,
-        residual_strength: Any = None,
-        initial_stress: Any = None,
-        weakening_rate: Any = None,
-    ) -> Rows:
-        """Strength profiles and what else varies between samples, validated and broadcast.
+    def sample(self, profiles: Any) -> Sample:
+        """What differs between samples, validated, with the problem's own for all the rest.
 
         Parameters
         ----------
-        tau_p : (samples, nodes) or (nodes,) array
-            Peak strength, Pa.
-        residual_strength, initial_stress, weakening_rate : array, optional
-            Where given, replaces the problem's own: (samples, nodes), (nodes,), (samples, 1) or a
-            number.
+        profiles : array, mapping of arrays, xarray.Dataset or Sample
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by name:
+            'strength', and any of 'residual_strength', 'initial_stress', 'normal_pressure' (Pa)
+            and one of 'weakening_rate' (Pa/m), 'critical_slip' (m) and 'fracture_energy' (J/m²),
+            which may also be (samples, 1) or a number and replace the problem's own.
+
+        Returns
+        -------
+        Sample
 
         Raises
         ------
         InputError
-            Naming all that is wrong: shapes, values that are not finite, strength not above the
-            residual strength and the initial stress, a weakening rate that is not positive.
+            Naming all that is wrong: names, shapes, values that are not finite, strength not above
+            the residual strength and the initial stress, a weakening rate that is not positive.
         """
-        nodes = self.interface.nodes
+        if isinstance(profiles, Sample):
+            return profiles
+        given = named_profiles(profiles)
+        shape = self.interface.shape
+        friction, load = self.friction, self.load
         problems: list[str] = []
 
-        def checked(name: str, given: Any, own: Any, count: int | None) -> Any:
+        def checked(name: str, own: Any, samples: int | None) -> Any:
             try:
-                return as_rows(name, own if given is None else given, nodes, count)
+                return profiles_of(name, given.get(name, own), shape, samples)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
 
-        strength = checked("tau_p", tau_p, None, None)
-        count = 1 if strength is None else strength.shape[0]
-        residual = checked(
-            "residual_strength", residual_strength, self.friction.residual_strength, count
-        )
-        initial = checked("initial_stress", initial_stress, self.load.initial_stress, count)
-        own_rate = self.friction.weakening_rate
-        rates = None
-        if weakening_rate is not None or own_rate is not None:
-            rates = checked("weakening_rate", weakening_rate, own_rate, count)
-            if rates is not None and rates.min() <= 0.0:
-                problems.append(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
+        if "strength" not in given:
+            raise InputError("strength: missing among the profiles")
+        strength = checked("strength", None, None)
+        samples = 1 if strength is None else strength.shape[0]
+        own_residual: Any = 0.0 if strength is None else friction.residual(strength)
+        residual = checked("residual_strength", own_residual, samples)
+        initial = checked("initial_stress", load.initial_stress, samples)
+        pressure = np.broadcast_to(np.nan, (samples, *shape))
+        if load.normal_pressure is not None or "normal_pressure" in given:
+            pressure = checked("normal_pressure", load.normal_pressure, samples)
+        scales = [name for name in SCALES if name in given]
+        if len(scales) > 1:
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+        scale, own_scale = friction.scale
+        scale = scales[0] if scales else scale
+        value = checked(scale, own_scale, samples)
+        if value is not None and value.min() <= 0.0:
+            problems.append(
+                f"{scale}: must be positive, got {value.min():g} {PROFILES[scale].units}"
+            )
         if residual is not None and residual.min() < 0.0:
             problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
         for name, other in (("residual_strength", residual), ("initial_stress", initial)):
             if strength is None or other is None or np.all(strength > other):
                 continue
-            sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
+            number, *node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
+            where = (number, *node)
             problems.append(
-                f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
-                f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
+                f"strength: must be above {name} everywhere; sample {number}, node"
+                f" {', '.join(map(str, node))}: {strength[where]:g} against {other[where]:g} Pa"
             )
         if problems:
             raise InputError(problems)
-        if rates is None:
-            with np.errstate(over="ignore"):  # too short a critical slip is refused just below
-                rates = (strength - residual) / np.asarray(self.friction.critical_slip)
+        rates = (
+            value if scale == "weakening_rate" else friction.rate(strength - residual, scale, value)
+        )
         too_few = self._too_few_nodes(float(rates.max()))
         if too_few:
             raise InputError(too_few)
-        profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)
-        return Rows(strength, residual, rates, initial, profile, self.interface.spacing)
+        profile = np.array(np.broadcast_to(load.profile, shape), dtype=np.float64)
+        return Sample(strength, residual, rates, initial, profile, pressure)

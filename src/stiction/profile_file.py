@@ -63,21 +63,21 @@ def read_profile(path: Path, interface: Interface) -> Array:
     if x is None:
         if strength.size != interface.nodes:
             raise InputError(
-                f"{path}: has {strength.size} values, the interface has {interface.nodes} nodes"
-                " (interface.nodes); give a value for each node, or x beside the values"
+                f"{path}: has {strength.size} values, the interface has {interface.size} nodes"
+                " (interface.size); give a value for each node, or x beside the values"
             )
         return strength
     return _on_nodes(path, x, strength, interface)
 
 
 def _on_nodes(path: Path, x: Array, strength: Array, interface: Interface) -> Array:
-    length = interface.length
+    length = interface.extent
     problems = []
     if not np.all(np.isfinite(x)) or not np.all(np.diff(x) > 0.0):
         problems.append(f"{path}: x must be finite and increase from line to line")
     elif x[0] < 0.0 or x[-1] > length * (1.0 + 1e-9):
         problems.append(
-            f"{path}: x must lie in [0, {length:g}] m (interface.length), got {x[0]:g} to {x[-1]:g}"
+            f"{path}: x must lie in [0, {length:g}] m (interface.extent), got {x[0]:g} to {x[-1]:g}"
         )
     if problems:
         raise InputError(problems)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+
+from stiction.interface import Interface
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,32 @@ ONSET_VARIABLES: dict[str, Variable] = {
     "first_instability": Variable("Pa", "mean interface stress when the first patch is unstable"),
     "critical_position": Variable("m", "position of the critical patch"),
 }
-"""What every method returns for each sample."""
+
+
+def along(interface: Interface, variable: Variable) -> Variable:
+    """The same variable with one value a node."""
+    return replace(variable, dims=(*variable.dims, *interface.dims))
+
+
+def position(interface: Interface, variable: Variable) -> Variable:
+    """The same variable as a place on the interface: on a plane it has two components."""
+    dims = (*variable.dims, "direction") if interface.is_plane else variable.dims
+    return replace(variable, dims=dims)
+
+
+def onset_variables(interface: Interface) -> dict[str, Variable]:
+    """What every method returns for each sample."""
+    place = position(interface, ONSET_VARIABLES["critical_position"])
+    return ONSET_VARIABLES | {"critical_position": place}
+
+
+def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
+    """Values and meaning of a dimension of the interface."""
+    if dim == "direction":
+        return np.array(interface.dims), Variable("", "direction of a component", ("direction",))
+    what = f"position along {dim}" if interface.is_plane else "position along the interface"
+    return interface.coordinates[dim], Variable("m", what, (dim,))
+
 
 FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 
@@ -77,4 +104,3 @@ def to_dataset(
 
 
 SAMPLE = Variable("1", "sample number", ("sample",))
-POSITION = Variable("m", "position along the interface", ("x",))

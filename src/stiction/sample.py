@@ -1,29 +1,32 @@
-"""Rows: validated strength profiles with everything else that may differ from sample to sample."""
+"""Sample: all that a method needs to know of an interface and that may differ between samples."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction._model import real_array
 from stiction._typing import Array
-from stiction.errors import InputError
+from stiction.errors import InputError, unknown_name
+from stiction.results import Variable
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """A batch of samples as solvers see them.
+class Sample(NamedTuple):
+    """One interface or many: the profiles that every method starts from.
+
+    A NamedTuple of arrays, so that compiled kernels take it as it is.
 
     Attributes
     ----------
-    strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
-        tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa); views of what was given, not to be written to.
-    load_profile : (nodes,) array
+    strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); views of what was given, not to be
+        written to. Without the first axis for `one` sample.
+    load_profile : (*shape) array
         p, dimensionless, positive.
-    spacing : float
-        Distance between nodes, m.
+    normal_pressure : (samples, *shape) array
+        Pa; NaN where the problem has none.
     """
 
     strength: Array
@@ -31,54 +34,101 @@ class Rows:
     weakening_rate: Array
     initial_stress: Array
     load_profile: Array
-    spacing: float
+    normal_pressure: Array
 
     @property
-    def count(self) -> int:
+    def samples(self) -> int:
         """Number of samples."""
         return int(self.strength.shape[0])
 
     @property
-    def nodes(self) -> int:
-        """Number of nodes."""
-        return int(self.strength.shape[1])
+    def shape(self) -> tuple[int, ...]:
+        """Number of nodes in each direction."""
+        return self.load_profile.shape
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the nodes, counted from the last."""
+        return tuple(range(-self.load_profile.ndim, 0))
+
+    def one(self, number: int) -> Sample:
+        """Sample `number` by itself, its arrays of shape (*shape) and contiguous."""
+        own = (np.ascontiguousarray(getattr(self, name)[number]) for name in BY_SAMPLE)
+        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
 
     @property
     def uniform_weakening(self) -> bool:
         """Whether W is the same at all nodes of each sample."""
-        return bool(np.all(self.weakening_rate == self.weakening_rate[:, :1]))
+        flat = self.weakening_rate.reshape(self.samples, -1)
+        return bool(np.all(flat == flat[:, :1]))
 
     def mean_stress(self, load: Array) -> Array:
         """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
-        mean: Array = self.initial_stress.mean(axis=1) + load * self.load_profile.mean()
+        mean: Array = self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
         return mean
 
 
-def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Array:
-    """`value` as a (samples, nodes) float64 array, or an `InputError` that names it.
+BY_SAMPLE = (
+    "strength", "residual_strength", "weakening_rate", "initial_stress", "normal_pressure"
+)  # fmt: skip
+"""What has an axis of samples."""
 
-    A single profile (nodes,) is one sample; where `count` is given, a scalar, a (nodes,) profile
-    or a (count, 1) column is broadcast to it.
+PROFILES: dict[str, Variable] = {
+    "strength": Variable("Pa", "peak strength"),
+    "residual_strength": Variable("Pa", "residual strength"),
+    "initial_stress": Variable("Pa", "initial stress"),
+    "weakening_rate": Variable("Pa m-1", "weakening rate"),
+    "critical_slip": Variable("m", "critical slip"),
+    "fracture_energy": Variable("J m-2", "fracture energy"),
+    "normal_pressure": Variable("Pa", "normal pressure"),
+}
+"""What may be given or sampled along an interface, with its unit; the order is that of the streams
+of random draws and never changes."""
+
+
+def profiles_of(name: str, value: Any, shape: tuple[int, ...], samples: int | None = None) -> Array:
+    """`value` as a (samples, *shape) float64 array, or an `InputError` that names it.
+
+    A single profile (*shape) is one sample; where `samples` is given, a number, a profile or one
+    number a sample, of shape (samples, 1), is broadcast to all.
     """
-    samples = "samples" if count is None else str(count)
-    valid = f"({samples}, {nodes}) or ({nodes},)"
-    if count is not None:
+    nodes = ", ".join(map(str, shape))
+    first = "samples" if samples is None else str(samples)
+    valid = f"({first}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
+    if samples is not None:
         valid += f", ({samples}, 1) or a number"
     try:
         array = real_array(value)
     except TypeError as error:
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
-    shapes: set[tuple[int, ...]] = {(nodes,)}
-    if count is not None:
-        shapes |= {(), (count, nodes), (count, 1)}
-    if array.shape not in shapes and not (count is None and array.shape[1:] == (nodes,)):
-        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}")
+    allowed: set[tuple[int, ...]] = {shape}
+    if samples is not None:
+        column = (samples, *(1 for _ in shape))
+        if array.shape == (samples, 1):
+            array = array.reshape(column)
+        allowed |= {(), (samples, *shape), column}
+    if array.shape not in allowed and not (samples is None and array.shape[1:] == shape):
+        turned = ""
+        if len(shape) == 2 and array.shape[-2:] == shape[::-1]:
+            turned = "; x and y have changed places: the first axis of a profile is x"
+        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{turned}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
     bad = ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
         raise InputError(f"{name}: must be finite; entry {where} is not")
-    if array.ndim < 2 or array.shape[1] != nodes:
-        array = np.broadcast_to(array, (count or 1, nodes))
-    return array
+    if samples is not None:
+        return np.broadcast_to(array, (samples, *shape))
+    return array[None] if array.shape == shape else array
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Profiles by name: of a mapping or dataset, or of the strength alone."""
+    if isinstance(given, Mapping):  # a Dataset is one too
+        names = [str(name) for name in given]
+        unknown = [name for name in names if name not in PROFILES]
+        if unknown and not hasattr(given, "data_vars"):
+            raise InputError([unknown_name("profiles", name, PROFILES) for name in unknown])
+        return {name: given[name] for name in names if name in PROFILES}
+    return {"strength": given}

@@ -21,7 +21,7 @@ def rupture(nodes, steps):
     strength = 1e6 - 0.35e6 * np.exp(-(((interface.x - 0.05) / 0.012) ** 2))
     method = Rupture(loading_rate=1.0, implicit=False, time_step=END / steps)
     history = load_history(([0.0, 1.0], [7.5e5, 7.5e5]), None)
-    run = make_run(method, method.medium(problem), problem.rows(strength), 0, history)
+    run = make_run(method, method.medium(problem), problem.sample(strength), 0, history)
     run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0)
     run.advance(state, steps)
@@ -67,7 +67,7 @@ def test_implicit_steps_approach_the_explicit_solution():
     interface = st.Interface(length=0.1, nodes=256)
     problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=2e11))
     strength = 1e6 - 3e5 * np.exp(-(((interface.x - 0.05) / 0.01) ** 2))
-    rows = problem.rows(strength)
+    rows = problem.sample(strength)
 
     def stress(**options):
         solver = Rupture(loading_rate=1e8, **options).prepare(problem)

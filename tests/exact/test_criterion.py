@@ -182,7 +182,9 @@ def test_weakening_rate_of_each_sample(problem, make_strength):
     """Samples of different W in one call are the same as one by one; columns are broadcast."""
     tau_p = make_strength(0.5).sample(problem.interface, samples=5, seed=1)
     rates = np.array([[0.5], [0.4], [0.5], [0.3], [0.45]]) * 1e12
-    together = st.onset(problem, tau_p, method=st.LocalCriterion(), weakening_rate=rates)
+    together = st.onset(
+        problem, {"strength": tau_p, "weakening_rate": rates}, method=st.LocalCriterion()
+    )
     for i in range(5):
         friction = st.SlipWeakening(weakening_rate=float(rates[i, 0]))
         alone = st.onset(
@@ -199,10 +201,10 @@ def test_critical_slip_is_a_weakening_rate(solid):
     """W = (tau_p - tau_r)/d_c, so a uniform strength has a uniform W."""
     interface = st.Interface(length=0.1, nodes=256)
     friction = st.SlipWeakening(critical_slip=2e-6, residual_strength=2e5)
-    rows = st.Problem(solid, interface, friction).rows(np.full((2, 256), 1e6))
+    rows = st.Problem(solid, interface, friction).sample(np.full((2, 256), 1e6))
     np.testing.assert_allclose(rows.weakening_rate, 8e5 / 2e-6, rtol=1e-15)
     tau_p = 1e6 - 1e5 * np.cos(2.0 * np.pi * interface.x / 0.1)
-    rows = st.Problem(solid, interface, friction).rows(tau_p)
+    rows = st.Problem(solid, interface, friction).sample(tau_p)
     np.testing.assert_allclose(rows.weakening_rate[0], (tau_p - 2e5) / 2e-6, rtol=1e-15)
 
 

@@ -62,7 +62,7 @@ def released(steps, end, mode="II"):
     unit = 1.0 / (k * solid.shear_wave_speed)
     method = Rupture(loading_rate=1.0, implicit=False, time_step=end * unit / steps)
     history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
-    rows = problem.rows(np.full(32, 1.001e6))
+    rows = problem.sample(np.full(32, 1.001e6))
     run = make_run(method, method.medium(problem), rows, 0, history)
     run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0, 1e-3 + 1e-6 * np.cos(k * interface.x))

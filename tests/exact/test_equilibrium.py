@@ -195,7 +195,7 @@ def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide,
     """A uniform initial stress is a load that is there already."""
     problem, tau_p = wide
     plain = st.equilibrium_events(problem, tau_p)
-    shifted = st.equilibrium_events(problem, tau_p, initial_stress=5e4)
+    shifted = st.equilibrium_events(problem, {"strength": tau_p, "initial_stress": 5e4})
     assert plain.sizes["event"] > 5
     np.testing.assert_allclose(shifted["stress"], plain["stress"], rtol=1e-9)
     np.testing.assert_allclose(shifted["load"], plain["load"] - 5e4, rtol=1e-9)

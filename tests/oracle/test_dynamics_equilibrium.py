@@ -49,7 +49,7 @@ def largest_load(problem, strength):
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 2.0])
 def test_first_instability_at_a_slow_rate_is_the_exact_equilibrium_onset(system, ratio):
     strength = fields(system, ratio, 4)
-    found = Rupture(loading_rate=1e5).prepare(system)(system.rows(strength))
+    found = Rupture(loading_rate=1e5).prepare(system)(system.sample(strength))
     exact = [largest_load(system, profile)[0] for profile in strength]
     # 0.1 % is asked for; at 1e5 Pa/s inertia still lifts the onset by some 1e-6.
     assert found["first_instability"] == pytest.approx(exact, rel=5e-6)
@@ -60,7 +60,7 @@ def test_effect_of_the_loading_rate_is_smooth_and_vanishes(system):
     exact, _ = largest_load(system, strength[0])
     excess = []
     for rate in (1e3, 1e5, 1e6, 1e7, 1e8):
-        found = Rupture(loading_rate=rate).prepare(system)(system.rows(strength))
+        found = Rupture(loading_rate=rate).prepare(system)(system.sample(strength))
         excess.append(float(found["first_instability"][0]) / exact - 1.0)
     assert abs(excess[0]) < 1e-7
     assert np.all(np.diff(excess) > 0.0)
@@ -120,7 +120,7 @@ def test_everything_may_vary_along_the_interface(mode, ratio, plane):
         ).x[-1]
         * 1e6
     )
-    found = Rupture(loading_rate=1e5).prepare(problem)(problem.rows(strength))
+    found = Rupture(loading_rate=1e5).prepare(problem)(problem.sample(strength))
     load = (found["first_instability"][0] - initial.mean()) / profile.mean()
     # Inertia at 1e5 Pa/s: some 1e-6, as above.
     assert load == pytest.approx(exact, rel=5e-6)
@@ -132,7 +132,7 @@ def test_an_arrested_event_is_the_one_that_equilibrium_finds():
     field = st.paper.strength(problem, correlation_ratio=0.5)
     tau_p = field.sample(problem.interface, samples=1, seed=0, first=18)
     exact = st.onset(problem, tau_p, method=st.Equilibrium())
-    found = Rupture(loading_rate=1e5).prepare(problem)(problem.rows(tau_p))
+    found = Rupture(loading_rate=1e5).prepare(problem)(problem.sample(tau_p))
     assert found["arrested_events"] == exact["arrested_events"].values == 1
     assert found["first_instability"] == pytest.approx(exact["first_instability"].values, rel=5e-6)
     # The arrested rupture overshoots its least equilibrium: 3e-5 lower seen for the second onset.

@@ -119,7 +119,7 @@ def test_interface_shorter_than_a_critical_patch(solid, make_strength):
 @pytest.mark.parametrize("ratio", [0.25, 1.0])
 def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
     tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=11)
-    rows = problem.rows(tau_p)
+    rows = problem.sample(tau_p)
     setting = Setting(problem)
     loads = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
     for row in range(5):
@@ -139,7 +139,7 @@ def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, r
     rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
     problem = st.Problem(solid, st.Interface(0.2, 2048), st.SlipWeakening(weakening_rate=rate))
     setting = Setting(problem)
-    rows = problem.rows(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
+    rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     for row in range(4):
         sample = sample_of(rows, row)
         dense = setting.programme(sample.excess, sample.rate)
@@ -170,7 +170,7 @@ def test_patches_alike_on_a_long_interface(solid):
     loads = []
     for periods in (1, 32):
         problem = st.Problem(solid, st.Interface(0.0135 * periods, 128 * periods), friction)
-        sample = sample_of(problem.rows(np.tile(dip, periods)), 0)
+        sample = sample_of(problem.sample(np.tile(dip, periods)), 0)
         found = Setting(problem).programme(sample.excess, sample.rate)
         assert found is not None
         loads.append(found.load)
@@ -259,7 +259,7 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
         ),
     )
     setting = Setting(problem)
-    rows = problem.rows(strength.sample(problem.interface, samples=12, seed=4))
+    rows = problem.sample(strength.sample(problem.interface, samples=12, seed=4))
     fates = []
     for row in range(12):
         sample = sample_of(rows, row)

@@ -61,7 +61,7 @@ def test_ruptures_with_the_papers_parameters_are_supershear():
     tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(
         problem.interface, samples=2, seed=1
     )
-    found = Rupture(loading_rate=2e7).prepare(problem)(problem.rows(tau_p))
+    found = Rupture(loading_rate=2e7).prepare(problem)(problem.sample(tau_p))
     solid = problem.solid
     # Medians of 1.48 to 1.53 km/s seen in nine runs; c_s = 925 m/s, c_d = 1597 m/s.
     assert np.all(found["median_rupture_speed"] > 1.4 * solid.shear_wave_speed)

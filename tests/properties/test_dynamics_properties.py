@@ -32,7 +32,11 @@ def strength(seed, low=0.7e6, high=1.5e6):
 
 def fresh_run(profile, method=METHOD):
     run = make_run(
-        method, method.medium(PROBLEM), PROBLEM.rows(profile), 0, uniform_rate(method.loading_rate)
+        method,
+        method.medium(PROBLEM),
+        PROBLEM.sample(profile),
+        0,
+        uniform_rate(method.loading_rate),
     )
     return run, run.start(first_slip(run))
 
@@ -67,7 +71,7 @@ def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
 @given(seed=some.integers(0, 10_000), shift=some.integers(1, NODES - 1))
 def test_onset_moves_with_the_profile_and_mirrors_with_it(seed, shift):
     profile = strength(seed)
-    rows = PROBLEM.rows(np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)]))
+    rows = PROBLEM.sample(np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)]))
     found = METHOD.prepare(PROBLEM)(rows)
     loads = found["critical_stress"]
     # Step sizes are chosen by thresholds, which round-off may tip: the accuracy of the method.
@@ -80,11 +84,11 @@ def test_onset_moves_with_the_profile_and_mirrors_with_it(seed, shift):
 def test_samples_do_not_depend_on_their_batch_or_thread():
     profiles = np.stack([strength(seed) for seed in range(4)])
     solver = METHOD.prepare(PROBLEM)
-    together = solver(PROBLEM.rows(profiles))
+    together = solver(PROBLEM.sample(profiles))
     alone = [None] * 4
 
     def solve(i):
-        alone[i] = solver(PROBLEM.rows(profiles[i]))
+        alone[i] = solver(PROBLEM.sample(profiles[i]))
 
     threads = [threading.Thread(target=solve, args=(i,)) for i in range(4)]
     for thread in threads:
@@ -166,7 +170,7 @@ def test_radiated_energy_is_steady_after_arrest():
 def test_arrested_event_is_counted_and_first_instability_below_the_critical_stress():
     profile = np.full(NODES, 3e6)
     profile[40:60] = 0.8e6
-    found = METHOD.prepare(PROBLEM)(PROBLEM.rows(profile))
+    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(profile))
     assert found["arrested_events"][0] >= 1
     assert found["first_instability"][0] < 0.9 * found["critical_stress"][0]
 
@@ -185,7 +189,7 @@ def test_work_is_the_load_times_the_slip_of_every_step(rate):
 def test_creep_stops_where_the_load_falls_and_never_runs_back():
     """Up to half of the creep, down, and up again."""
     profile = strength(3)
-    onset = float(METHOD.prepare(PROBLEM)(PROBLEM.rows(profile))["critical_stress"][0])
+    onset = float(METHOD.prepare(PROBLEM)(PROBLEM.sample(profile))["critical_stress"][0])
     high = 0.5 * (profile.min() + onset)
     low, end = 0.8 * high, 0.3
     run = simulate_rupture(

@@ -110,7 +110,9 @@ def test_what_else_is_random_is_independent_of_the_strength(arguments, make_stre
     # 300 samples of about 20 independent lengths each: correlations scatter by 1/sqrt(6000).
     assert abs(np.corrcoef(strength.ravel(), stress.ravel())[0, 1]) < 0.05
     direct = st.onset(
-        arguments["problem"], strength, method=st.LocalCriterion(), initial_stress=stress
+        arguments["problem"],
+        {"strength": strength, "initial_stress": stress},
+        method=st.LocalCriterion(),
     )
     np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
 

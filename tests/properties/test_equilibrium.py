@@ -141,8 +141,10 @@ def test_results_do_not_depend_on_the_batch():
     problem = problem_of(0.03, 0.0, False)
     tau_p = np.array([profile(seed, 1.0) for seed in range(24)])
     rates = 0.5e12 * np.where(np.arange(24) % 3 == 0, 1.0, rng.uniform(0.8, 1.2, 24))[:, None]
-    together = st.onset(problem, tau_p, method=METHOD, weakening_rate=rates)
+    together = st.onset(problem, {"strength": tau_p, "weakening_rate": rates}, method=METHOD)
     for row in (0, 1, 5, 23):
-        alone = st.onset(problem, tau_p[row], method=METHOD, weakening_rate=rates[row : row + 1])
+        alone = st.onset(
+            problem, {"strength": tau_p[row], "weakening_rate": rates[row : row + 1]}, method=METHOD
+        )
         for name in together.data_vars:
             np.testing.assert_array_equal(alone[name].values[0], together[name].values[row])

@@ -170,33 +170,27 @@ def test_more_that_is_random_is_sampled_with_it(system):
     )
     result = failure_probability(
         problem,
-        strength,
+        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
         0.68e6,
         method=LOCAL,
         algorithm="plain",
         target_cov=0.2,
-        residual_strength=residual,
-        initial_stress=initial,
     )
     ensemble = st.monte_carlo(
         problem,
-        strength,
+        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
         method=LOCAL,
         samples=result.evaluations,
-        residual_strength=residual,
-        initial_stress=initial,
     )
     assert result.probability == (ensemble["critical_stress"].values < 0.68e6).mean()
     assert set(result.failing_profiles.data_vars) >= {"strength", "residual_strength"}
     rare = failure_probability(
         problem,
-        strength,
+        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
         0.68e6,
         method=LOCAL,
         algorithm="subset",
         target_cov=0.15,
-        residual_strength=residual,
-        initial_stress=initial,
     )
     error = math.hypot(rare.coefficient_of_variation, result.coefficient_of_variation)
     assert abs(math.log(rare.probability / result.probability)) < 4.0 * error

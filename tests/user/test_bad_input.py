@@ -156,33 +156,38 @@ CASES = {
     ),
     "strength below residual": (
         lambda: st.onset(
-            make_problem(), np.ones(256), method=st.LocalCriterion(), residual_strength=2.0
+            make_problem(),
+            {"strength": np.ones(256), "residual_strength": 2.0},
+            method=st.LocalCriterion(),
         ),
         ["tau_p", "residual_strength", "node 0"],
     ),
     "samples of one and of another": (
         lambda: st.onset(
             make_problem(),
-            np.ones((3, 256)),
+            {"strength": np.ones((3, 256)), "initial_stress": np.zeros((2, 256))},
             method=st.LocalCriterion(),
-            initial_stress=np.zeros((2, 256)),
         ),
         ["initial_stress", "(2, 256)", "(3, 256)"],
     ),
     "strength below initial stress": (
         lambda: st.onset(
-            make_problem(), np.full(256, 1e6), method=st.LocalCriterion(), initial_stress=2e6
+            make_problem(),
+            {"strength": np.full(256, 1e6), "initial_stress": 2e6},
+            method=st.LocalCriterion(),
         ),
         ["tau_p", "initial_stress", "node 0", "2e+06"],
     ),
     "all rows at once": (
         lambda: st.onset(
             make_problem(),
-            np.full(256, np.nan),
+            {
+                "strength": np.full(256, np.nan),
+                "residual_strength": -1.0,
+                "initial_stress": "x",
+                "weakening_rate": -1.0,
+            },
             method=st.LocalCriterion(),
-            residual_strength=-1.0,
-            initial_stress="x",
-            weakening_rate=-1.0,
         ),
         ["tau_p", "residual_strength", "initial_stress", "weakening_rate"],
     ),
@@ -255,7 +260,11 @@ CASES = {
     ),
     "many wrong at once": (
         lambda: st.monte_carlo(
-            3, 4, method=st.LocalCriterion(), samples=10, seed="x", initial_stress=5
+            3,
+            st.RandomInterface(strength=4, initial_stress=5),
+            method=st.LocalCriterion(),
+            samples=10,
+            seed="x",
         ),
         ["problem", "strength", "seed", "initial_stress"],
     ),

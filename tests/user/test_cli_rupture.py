@@ -20,13 +20,13 @@ length = 0.05
 nodes = 128
 [problem.friction]
 weakening_rate = 0.25e12
-[strength.marginal]
+[random.strength.marginal]
 type = "beta"
 alpha = 1.5
 beta = 3.0
 low = 0.66e6
 high = 1.66e6
-[strength.spectrum]
+[random.strength.spectrum]
 type = "power_law"
 correlation_length = 6e-3
 [method]

@@ -26,13 +26,13 @@ nodes = 128
 weakening_rate = 0.25e12
 [problem.load]
 normal_pressure = 5e6
-[strength.marginal]
+[random.strength.marginal]
 type = "beta"
 alpha = 1.5
 beta = 3.0
 low = 0.66e6
 high = 1.66e6
-[strength.spectrum]
+[random.strength.spectrum]
 type = "power_law"
 correlation_length = 4e-3
 [method]
@@ -41,7 +41,7 @@ type = "local_criterion"
 samples = 200
 seed = 3
 [[sweep]]
-"strength.spectrum.correlation_length" = [4e-3, 6e-3, 8e-3]
+"random.strength.spectrum.correlation_length" = [4e-3, 6e-3, 8e-3]
 """
 
 

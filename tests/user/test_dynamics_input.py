@@ -83,7 +83,7 @@ def test_a_coarse_grid_warns_with_the_error_to_expect():
     for nodes, text in ((48, "spans 7.4 nodes: expect more than 15 %"), (80, "expect up to 6 %")):
         problem = make_problem(nodes=nodes)
         with pytest.warns(AccuracyWarning, match=text):
-            METHOD.prepare(problem)(problem.rows(profile(nodes)))
+            METHOD.prepare(problem)(problem.sample(profile(nodes)))
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
 def test_too_few_steps_is_said():
     problem = make_problem()
     with pytest.raises(InputError, match="max_steps: 20 steps"):
-        Rupture(loading_rate=1e8, max_steps=20).prepare(problem)(problem.rows(profile()))
+        Rupture(loading_rate=1e8, max_steps=20).prepare(problem)(problem.sample(profile()))
 
 
 def test_stop_conditions_and_progress():

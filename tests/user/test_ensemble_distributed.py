@@ -27,7 +27,7 @@ STUDY = {
     },
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 60_000, "seed": 3},
-    "sweep": [{"strength.spectrum.correlation_length": [3e-3, 4e-3]}],
+    "sweep": [{"random.strength.spectrum.correlation_length": [3e-3, 4e-3]}],
 }
 
 # Dask warns of its own affairs (ports, garbage collection) in every version differently.

@@ -16,14 +16,20 @@ def test_unstable_before_it_is_loaded(problem):
     initial = np.zeros(256)
     initial[77] = 0.95e6
     with pytest.raises(st.InputError, match="sample 0, node 77"):
-        st.onset(problem, np.full(256, 0.9e6), method=Equilibrium(), initial_stress=initial)
+        st.onset(
+            problem,
+            {"strength": np.full(256, 0.9e6), "initial_stress": initial},
+            method=Equilibrium(),
+        )
 
 
 def test_weakening_rate_negative_somewhere(problem):
     rate = np.full(256, 0.5e12)
     rate[3] = -1.0
     with pytest.raises(st.InputError, match="weakening_rate"):
-        st.onset(problem, np.full(256, 0.9e6), method=Equilibrium(), weakening_rate=rate)
+        st.onset(
+            problem, {"strength": np.full(256, 0.9e6), "weakening_rate": rate}, method=Equilibrium()
+        )
 
 
 def test_load_profile_not_positive():

@@ -251,7 +251,7 @@ def app():
 def test_command_writes_table_data_and_figures(app, system, tmp_path):
     study = st.Study(
         problem=system[0],
-        strength=system[1],
+        random=system[1],
         method=LOCAL,
         ensemble=st.Ensemble(samples=10, seed=3),
     )

@@ -34,7 +34,7 @@ STUDY = {
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
     "sweep": [
-        {"strength.spectrum.correlation_length": [4e-3, 6e-3]},
+        {"random.strength.spectrum.correlation_length": [4e-3, 6e-3]},
         {"problem.solid.poisson_ratio": [0.25, 0.33]},
     ],
 }

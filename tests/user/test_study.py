@@ -51,7 +51,7 @@ def test_python_and_toml_are_the_same_study(tmp_path):
             st.Interface(length=0.1, nodes=128),
             st.SlipWeakening(weakening_rate=0.5e12),
         ),
-        strength=st.RandomField(
+        random=st.RandomField(
             st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
             st.PowerLawSpectrum(correlation_length=1.7e-3),
         ),
@@ -111,10 +111,14 @@ def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
         ("problem.solid.densty", 1.0, ["problem.solid", "'densty'", "did you mean 'density'"]),
         ("problem.interface.nodes", "many", ["problem.interface.nodes", "'many'"]),
         ("problem.load", {"profile": "missing.npy"}, ["problem.load.profile", "missing.npy"]),
-        ("strength.marginal.type", "betta", ["strength", "'betta'", "did you mean 'beta'"]),
-        ("strength.marginal.low", 2e6, ["strength.marginal", "low must be below high"]),
-        ("strength.spectrum.type", "powerlaw", ["'powerlaw'", "did you mean 'power_law'"]),
-        ("strength.spectrum.correlation_length", 10.0, ["strength", "no mode is left"]),
+        ("random.strength.marginal.type", "betta", ["strength", "'betta'", "did you mean 'beta'"]),
+        (
+            "random.strength.marginal.low",
+            2e6,
+            ["random.strength.marginal", "low must be below high"],
+        ),
+        ("random.strength.spectrum.type", "powerlaw", ["'powerlaw'", "did you mean 'power_law'"]),
+        ("random.strength.spectrum.correlation_length", 10.0, ["strength", "no mode is left"]),
         ("method.type", "local", ["method.type", "'local'", "local_criterion"]),
         ("method.weight", "exact", ["method", "'weight'", "did you mean 'weights'"]),
         ("ensemble.samples", 0, ["ensemble.samples", "0"]),
@@ -137,7 +141,7 @@ def test_all_mistakes_come_at_once():
         st.Study.from_dict(study)
     text = str(caught.value)
     assert len(caught.value.problems) == 4
-    for word in ("problem.solid.density", "ensemble.samples", "'sed'", "strength.spectrum"):
+    for word in ("problem.solid.density", "ensemble.samples", "'sed'", "random.strength.spectrum"):
         assert word in text
 
 
@@ -148,7 +152,7 @@ def test_a_function_cannot_be_written_down(tmp_path):
     study = st.Study.from_dict(STUDY)
     own = st.Study(
         problem=study.problem,
-        strength=st.RandomField(study.strength.marginal, bell),
+        random=st.RandomField(study.strength.marginal, bell),
         method=study.method,
         ensemble=study.ensemble,
     )

@@ -23,7 +23,7 @@ STUDY = {
     "ensemble": {"samples": 30, "seed": 3},
 }
 KEEPING = {"samples": 30, "seed": 3, "keep": ["strength"], "keep_samples": 2}
-LENGTH = "strength.spectrum.correlation_length"
+LENGTH = "random.strength.spectrum.correlation_length"
 
 
 def swept(*axes, **changes):
@@ -74,7 +74,7 @@ def test_ranges():
 def test_toml_python_and_result_agree(tmp_path):
     text = """
     [[sweep]]
-    "strength.spectrum.correlation_length" = { start = 4e-3, stop = 8e-3, count = 3 }
+    "random.strength.spectrum.correlation_length" = { start = 4e-3, stop = 8e-3, count = 3 }
     [[sweep]]
     problem.solid.density = [1000.0, 2000.0]
     problem.solid.poisson_ratio = [0.2, 0.3]
@@ -86,7 +86,7 @@ def test_toml_python_and_result_agree(tmp_path):
     study = st.Study.from_toml(tmp_path / "study.toml")
     python = st.Study(
         problem=base.problem,
-        strength=base.strength,
+        random=base.strength,
         method=base.method,
         ensemble=base.ensemble,
         sweep=[
@@ -103,11 +103,11 @@ def test_toml_python_and_result_agree(tmp_path):
 
 def test_whole_tables_are_values_too():
     other = {"type": "lognorm", "s": 0.2, "scale": 1e6}
-    study = swept({"strength.marginal": [STUDY["strength"]["marginal"], other]})
+    study = swept({"random.strength.marginal": [STUDY["strength"]["marginal"], other]})
     result = study.run()
     np.testing.assert_array_equal(result["marginal"], ["beta", "lognorm"])
     assert study.plans[1].strength.mean == pytest.approx(scipy.stats.lognorm(0.2, scale=1e6).mean())
-    scales = swept({"strength.marginal.scale": [1e6, 2e6]}, strength={
+    scales = swept({"random.strength.marginal.scale": [1e6, 2e6]}, strength={
         "marginal": other, "spectrum": STUDY["strength"]["spectrum"]
     })  # fmt: skip
     stress = scales.run()["critical_stress"].values
@@ -119,11 +119,16 @@ def test_objects_and_functions_in_python():
     base = st.Study.from_dict(STUDY)
     study = st.Study(
         problem=base.problem,
-        strength=base.strength,
+        random=base.strength,
         method=base.method,
         ensemble=base.ensemble,
         sweep=[
-            {"strength.spectrum": [base.strength.spectrum, lambda k: np.exp(-((k * 2e-3) ** 2))]}
+            {
+                "random.strength.spectrum": [
+                    base.strength.spectrum,
+                    lambda k: np.exp(-((k * 2e-3) ** 2)),
+                ]
+            }
         ],
     )
     assert study.run()["critical_stress"].shape == (2, 30)
@@ -151,7 +156,10 @@ def test_profiles_in_files_can_be_swept(tmp_path):
 @pytest.mark.parametrize(
     ("axes", "words"),
     [
-        ([{"strength.spectrum.corelation_length": [1e-3]}], ["did you mean 'correlation_length'"]),
+        (
+            [{"random.strength.spectrum.corelation_length": [1e-3]}],
+            ["did you mean 'correlation_length'"],
+        ),
         ([{"problm.solid.density": [1.0]}], ["did you mean 'problem'"]),
         ([{LENGTH: [4e-3, -1.0]}], ["correlation_length", "greater than 0", "point 1"]),
         ([{LENGTH: 4e-3}], [LENGTH, "list of values or a range"]),
@@ -165,7 +173,7 @@ def test_profiles_in_files_can_be_swept(tmp_path):
             ["as many values each", "has 2", "has 3", "[[sweep]]"],
         ),
         ([{LENGTH: [1e-3]}, {LENGTH: [2e-3]}], ["swept twice"]),
-        ([{"strength.spectrum": []}, {LENGTH: [2e-3]}], ["strength.spectrum"]),
+        ([{"random.strength.spectrum": []}, {LENGTH: [2e-3]}], ["random.strength.spectrum"]),
         ([{"ensemble.samples": [10, 20]}], ["ensemble.samples: cannot be swept"]),
         ([{"problem.solid.density": [1.0, "heavy"]}], ["problem.solid.density", "'heavy'"]),
         ([{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}], ["1000000 points"]),

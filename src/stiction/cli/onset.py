@@ -51,7 +51,7 @@ def onset(
     problem = loaded.problem
     methods = _methods(loaded.method, method, loading_rate)
     profile = read_profile(strength, problem.interface)
-    problem.rows(profile)
+    problem.sample(profile)
     results: dict[str, Any] = {}
     refused: list[tuple[str, str]] = []
     for one in methods:
@@ -74,9 +74,9 @@ def onset(
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
     """The methods to ask: the study's own as it is, the others with their defaults."""
     from stiction.errors import unknown_name
-    from stiction.study.study import METHODS
+    from stiction.evaluation import methods
 
-    classes = {cls.__dataclass_fields__["type"].default: cls for cls in METHODS}
+    classes = methods()
     unknown = [
         unknown_name("--method", name, classes) for name in names or () if name not in classes
     ]

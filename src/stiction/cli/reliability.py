@@ -72,13 +72,8 @@ def reliability(
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
-    problem, field, method = loaded.problem, loaded.strength, loaded.method
+    problem, random, method = loaded.problem, loaded.random, loaded.method
     seed = loaded.ensemble.seed
-    others: dict[str, Any] = {
-        "residual_strength": loaded.residual_strength,
-        "initial_stress": loaded.initial_stress,
-        "weakening_rate": loaded.weakening_rate,
-    }
     # What is asked for last is refused first: the curve may take minutes.
     mistakes = [] if stress is None else check_stress("--stress", stress)
     mistakes += [] if probability is None else check_probability("--probability", probability)
@@ -90,17 +85,16 @@ def reliability(
         for ending in ("png", "pdf"):
             figure.savefig(out / f"{name}.{ending}")
 
-    _say(f"the curve down to P = {smallest:g}, by {method.type} ...")
+    _say(f"the curve down to P = {smallest:g}, by {method.label} ...")
     curve = failure_curve(
         problem,
-        field,
+        random,
         method=method,
         smallest=smallest,
         target_cov=target_cov,
         plain_samples=plain_samples,
         seed=seed,
         workers=workers,
-        **others,
     )
     aside = out / "failure_curve.nc.part"
     curve.to_netcdf(aside)
@@ -117,12 +111,12 @@ def reliability(
         typer.echo(line)
     typer.echo(
         f"bound {curve.attrs['lower_bound']:.7g} Pa; {curve.attrs['evaluations']} evaluations;"
-        f" {method.type}, {curve.attrs['event']}"
+        f" {method.label}, {curve.attrs['event']}"
     )
     if stress is not None:
         _say(f"the probability below {stress:g} Pa ...")
         found = failure_probability(
-            problem, field, stress, method=method, seed=seed, workers=workers, **others
+            problem, random, stress, method=method, seed=seed, workers=workers
         )
         typer.echo(f"{found}\n  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
@@ -134,26 +128,24 @@ def reliability(
         _say(f"the stress with P = {probability:g} ...")
         answer = design_stress(
             problem,
-            field,
+            random,
             probability=probability,
             method=method,
             seed=seed,
             workers=workers,
-            **others,
         )
         typer.echo(str(answer))
     if tails:
         _say("seven more curves: correlation lengths, interface lengths, distributions ...")
         several = tail_study(
             problem,
-            field,
+            random,
             method=method,
             smallest=smallest,
             target_cov=target_cov,
             plain_samples=plain_samples,
             seed=seed,
             workers=workers,
-            **others,
         )
         figures.tail_table(several).write_csv(out)
         save(figures.tail_figure(several), "failure_tails")

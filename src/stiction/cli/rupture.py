@@ -50,24 +50,21 @@ def rupture(
     problem, method = plan.problem, plan.method
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
-    extras: dict[str, Any] = {}
+    profiles: Any
     if strength is None:
         profiles = plan.profiles(sample, 1)
-        tau_p = profiles.pop("strength")
-        extras = profiles
     else:
-        tau_p = read_profile(strength, problem.interface)
+        profiles = read_profile(strength, problem.interface)
     with status_line("rupture") as say:
         result = simulate_rupture(
             problem,
-            tau_p,
+            profiles,
             method=method,
             every=every,
             progress=lambda now: say(
                 f"step {now.steps}, t = {now.time:.6g} s, mean stress"
                 f" {now.mean_stress * 1e-6:.4f} MPa, {now.weakened_fraction:.0%} weakened"
             ),
-            **extras,
         )
     result.to_netcdf(out / "rupture.nc")
     typer.echo(

@@ -151,7 +151,7 @@ def _description(study: Any) -> list[tuple[str, str]]:
     samples = f"{ensemble.samples} (seed {ensemble.seed})"
     if study.sweep:
         samples += f" at each of {len(plans)} points: {len(plans) * ensemble.samples} in all"
-    methods = list(dict.fromkeys(plan.method.type for plan in plans))
+    methods = list(dict.fromkeys(plan.method.label for plan in plans))
     lines = [("method", ", ".join(methods)), ("samples", samples)]
     for axis in study.axes:
         keys = " with ".join(variable.long_name for _, variable in axis.coordinates.values())
@@ -159,11 +159,13 @@ def _description(study: Any) -> list[tuple[str, str]]:
         lines.append(("sweep", f"{keys}: {axis.size} values, {values[0]} to {values[-1]}"))
     lines.append(("effective modulus", _range([p.problem.effective_modulus for p in plans], "Pa")))
     lines += _resolution([plan.problem for plan in plans])
-    means = _range([plan.strength.mean for plan in plans], "Pa")
-    deviations = _range([plan.strength.standard_deviation for plan in plans], "Pa")
-    modes = _range([plan.strength.modes(plan.problem.interface).count for plan in plans], "modes")
+    means = _range([plan.random.strength.mean for plan in plans], "Pa")
+    deviations = _range([plan.random.strength.standard_deviation for plan in plans], "Pa")
+    modes = _range(
+        [plan.random.strength.modes(plan.problem.interface).count for plan in plans], "modes"
+    )
     lines.append(("strength", f"mean {means}, standard deviation {deviations}, {modes}"))
-    fields = {plan.strength for plan in plans}
+    fields = {plan.random.strength for plan in plans}
     lines.append(
         (
             "correlation 1/e at",
@@ -189,7 +191,7 @@ def _resolution(problems: Any) -> list[tuple[str, str]]:
         return [("nucleation length", "varies along the interface")]
     pairs = list(zip(problems, lengths, strict=True))
     nodes = _range([length / problem.interface.spacing for problem, length in pairs], "nodes")
-    ratio = _range([problem.interface.length / length for problem, length in pairs], "h_n")
+    ratio = _range([problem.interface.extent / length for problem, length in pairs], "h_n")
     return [("nucleation length", f"{_range(lengths, 'm')}: {nodes}, L = {ratio}")]
 
 

@@ -19,8 +19,8 @@ from stiction.criterion.nucleation import (
     warn_if_coarse,
 )
 from stiction.problem import Problem
-from stiction.results import ONSET_VARIABLES, Variable
-from stiction.sample import Rows
+from stiction.results import Variable, onset_variables
+from stiction.sample import Sample
 
 ENOUGH_POINTS = 16
 
@@ -54,11 +54,32 @@ class LocalCriterion:
         return 1024
 
     @property
-    def variables(self) -> dict[str, Variable]:
-        """What the solver returns for each sample."""
-        return dict(ONSET_VARIABLES)
+    def label(self) -> str:
+        """Its name in figures and tables."""
+        return "local criterion"
 
-    def prepare(self, problem: Problem) -> Callable[[Rows], dict[str, Array]]:
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, s."""
+        return 3e-8 * problem.interface.size
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+        reasons = []
+        if problem.interface.is_plane:
+            reasons.append("it does not take interfaces of two dimensions")
+        rate = problem.friction.weakening_rate
+        if rate is not None and problem.uniform_rate is None:
+            reasons.append(
+                "the weakening rate varies along the interface, so that there is no one nucleation"
+                " length; use st.Equilibrium() or st.Rupture()"
+            )
+        return reasons
+
+    def variables(self, problem: Problem) -> dict[str, Variable]:
+        """What the solver returns for each sample."""
+        return onset_variables(problem.interface)
+
+    def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """A solver for rows of this problem.
 
         Raises
@@ -80,11 +101,11 @@ class LocalCriterion:
                     multipliers[rate] = found
             return found
 
-        def solve(rows: Rows) -> dict[str, Array]:
+        def solve(rows: Sample) -> dict[str, Array]:
             warn_if_coarse(problem, rows)
             rates = uniform_rates(rows)
             excess = np.ascontiguousarray(rows.strength - rows.initial_stress)
-            load, place = np.empty(rows.count), np.empty(rows.count)
+            load, place = np.empty(rows.samples), np.empty(rows.samples)
             for rate in np.unique(rates):
                 same = rates == rate
                 table, factor = multiplier(float(rate))
@@ -98,7 +119,7 @@ class LocalCriterion:
                 "critical_load": load,
                 "critical_stress": stress,
                 "first_instability": stress.copy(),
-                "critical_position": place * rows.spacing,
+                "critical_position": place * problem.interface.spacing,
             }
 
         return solve

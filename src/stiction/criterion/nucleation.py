@@ -11,7 +11,7 @@ from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.moving_average import average_rows
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.sample import Rows
+from stiction.sample import Sample
 
 Weights = Literal["exact", "rounded"]
 
@@ -25,17 +25,17 @@ def weight_of(weights: Weights) -> Weight:
 
 def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights = "exact") -> Array:
     """What the moving average over h_n does to each wavenumber, shape (nodes//2 + 1,)."""
-    if nucleation_length > problem.interface.length:
+    if nucleation_length > problem.interface.extent:
         raise InputError(
             f"interface.length: the nucleation length {nucleation_length:.4g} m is longer than the"
-            f" interface ({problem.interface.length:.4g} m); the local criterion does not hold"
+            f" interface ({problem.interface.extent:.4g} m); the local criterion does not hold"
             " there, use st.Equilibrium() or st.Rupture()"
         )
     z = problem.interface.wavenumbers * nucleation_length / 2.0
     return np.ascontiguousarray(weight_of(weights).multiplier(z))
 
 
-def warn_if_coarse(problem: Problem, rows: Rows) -> None:
+def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the moving average is a coarse sum."""
     problem.warn_if_coarse(
         rows,
@@ -45,7 +45,7 @@ def warn_if_coarse(problem: Problem, rows: Rows) -> None:
     )
 
 
-def uniform_rates(rows: Rows) -> Array:
+def uniform_rates(rows: Sample) -> Array:
     """W of each sample, shape (samples,); `InputError` where it varies along the interface."""
     if not rows.uniform_weakening:
         raise InputError(
@@ -83,7 +83,7 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
         If the profile does not fit the problem, the weakening rate varies along the interface, or
         h_n is longer than the interface.
     """
-    rows = problem.rows(tau_p)
+    rows = problem.sample(tau_p)
     if problem.friction.weakening_rate is None:
         rate = float(uniform_rates(rows)[0])
         if np.ptp(rows.weakening_rate) > 0.0:
@@ -100,10 +100,10 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
     return result[0] if np.ndim(tau_p) == 1 else result
 
 
-def averaged_load(rows: Rows, multiplier: Array) -> Array:
+def averaged_load(rows: Sample, multiplier: Array) -> Array:
     """<g, p> at the nodes, with a weight of unit integral, shape (nodes,)."""
     spectrum = np.fft.rfft(rows.load_profile) * (multiplier / multiplier[0])
-    average: Array = np.fft.irfft(spectrum, rows.nodes)
+    average: Array = np.fft.irfft(spectrum, rows.load_profile.size)
     if not average.min() > 0.0:
         raise InputError(
             "load.profile: varies too sharply for this grid: its average over the nucleation"

@@ -90,7 +90,7 @@ def prepare_medium(
         [problem.effective_modulus * wavenumbers, solid.shear_modulus * wavenumbers]
     )
     return Medium(
-        nodes=interface.nodes,
+        nodes=interface.size,
         spacing=interface.spacing,
         impedance=solid.shear_modulus / (2.0 * speed),
         step=step,

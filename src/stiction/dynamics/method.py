@@ -17,8 +17,8 @@ from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, uniform_rate
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
-from stiction.results import ONSET_VARIABLES, Variable
-from stiction.sample import Rows
+from stiction.results import Variable, onset_variables
+from stiction.sample import Sample
 
 Floats = NDArray[np.float64]
 Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
@@ -114,9 +114,23 @@ class Rupture:
         return 8
 
     @property
-    def variables(self) -> dict[str, Variable]:
+    def label(self) -> str:
+        """Its name in figures and tables."""
+        return "rupture"
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, s."""
+        return 0.1 * (problem.interface.size / 1024) ** 2
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+        return (
+            ["it does not take interfaces of two dimensions"] if problem.interface.is_plane else []
+        )
+
+    def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        return ONSET_VARIABLES | _MORE
+        return onset_variables(problem.interface) | _MORE
 
     def medium(self, problem: Problem) -> Medium:
         """Kernel and tables for a problem."""
@@ -128,18 +142,20 @@ class Rupture:
             time_step=self.time_step,
         )
 
-    def prepare(self, problem: Problem) -> Callable[[Rows], dict[str, NDArray[Any]]]:
+    def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """A solver for rows of this problem; the kernel is fitted here, once."""
         medium = self.medium(problem)
         history = uniform_rate(self.loading_rate)
 
-        def solve(rows: Rows) -> dict[str, NDArray[Any]]:
+        def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             warn_if_coarse(problem, rows)
             found = [
                 self._one(problem, make_run(self, medium, rows, i, history))
-                for i in range(rows.count)
+                for i in range(rows.samples)
             ]
-            return {name: np.array([one[name] for one in found]) for name in self.variables}
+            return {
+                name: np.array([one[name] for one in found]) for name in self.variables(problem)
+            }
 
         return solve
 
@@ -158,9 +174,11 @@ class Rupture:
         return summary(problem, run, state)
 
 
-def warn_if_coarse(problem: Problem, rows: Rows) -> None:
+def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the nucleation length is not resolved, with the error to expect."""
-    resolution = problem.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
+    resolution = (
+        problem.nucleation_length_of(float(rows.weakening_rate.max())) / problem.interface.spacing
+    )
     if resolution < 15.0:
         # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
         # at 8, 16 and 32 nodes.
@@ -216,7 +234,7 @@ def check_pace(run: Run, time: float) -> None:
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
 
 
-def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: History) -> Run:
+def make_run(method: Rupture, medium: Medium, rows: Sample, sample: int, history: History) -> Run:
     """The run of one sample."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
@@ -268,7 +286,7 @@ def front_speed(problem: Problem, run: Run, state: State, lengths: float) -> Flo
     shortest = problem.nucleation_length_of(float(run.rows[2].max()))
     if not _resolves_steps(run, state.time):
         return np.full(run.medium.nodes, np.nan)
-    window = min(max(lengths * shortest, 8.0 * run.medium.spacing), 0.25 * problem.interface.length)
+    window = min(max(lengths * shortest, 8.0 * run.medium.spacing), 0.25 * problem.interface.extent)
     return rupture_speed(state.arrival, run.medium.spacing, window)
 
 

@@ -147,12 +147,9 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
 
 def simulate_rupture(
     problem: Problem,
-    tau_p: Any,
+    profiles: Any,
     *,
     method: Rupture,
-    residual_strength: Any = None,
-    initial_stress: Any = None,
-    weakening_rate: Any = None,
     load: Any = None,
     initial_slip: Any = None,
     initial_load: float | None = None,
@@ -176,12 +173,10 @@ def simulate_rupture(
     Parameters
     ----------
     problem : Problem
-    tau_p : (nodes,) or (1, nodes) array
-        Peak strength, Pa.
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
     method : Rupture
         Loading rate and numerical options.
-    residual_strength, initial_stress, weakening_rate : array, optional
-        (nodes,), Pa or Pa/m; replaces the problem's own.
     load : callable or (times, values), optional
         tau_0(t), Pa, instead of the method's constant rate. It must not fall before the first
         slip. A callable needs `end_time`.
@@ -233,14 +228,9 @@ def simulate_rupture(
     """
     _check(dict(locals()))
     check_variables(variables)
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
-    if rows.count != 1:
-        raise InputError(f"tau_p: one profile at a time, got {rows.count}")
+    rows = problem.sample(profiles)
+    if rows.samples != 1:
+        raise InputError(f"profiles: one sample at a time, got {rows.samples}")
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
@@ -369,7 +359,7 @@ def _complete(
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         scalars = summary(problem, run, state)
     for name, value in scalars.items():
-        variable = method.variables[name]
+        variable = method.variables(problem)[name]
         label = {"units": variable.units, "long_name": variable.long_name}
         # Energies and moment are already there over 'time'; their last value is the total.
         if name not in dataset:

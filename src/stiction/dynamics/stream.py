@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from stiction.dynamics.frames import FIELDS, SCALARS, STEPS, TIME
 from stiction.errors import InputError
-from stiction.results import POSITION, to_dataset
+from stiction.results import Variable, to_dataset
 
 FORMAT = 2
+POSITION = Variable("m", "position along the interface", ("x",))
 _MANIFEST = "rupture.json"
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.work import Outcome
-from stiction.results import POSITION, SAMPLE, Variable, to_dataset
+from stiction.results import SAMPLE, Variable, coordinate, to_dataset
 
 KEPT_SAMPLE = Variable("1", "number of the sample whose profiles are kept", ("kept_sample",))
 
@@ -126,11 +126,14 @@ class Gathered:
         used = {dim for variable in variables.values() for dim in variable.dims}
         if "kept_sample" in used:
             coordinates["kept_sample"] = (self._kept, KEPT_SAMPLE)
-        if "x" in used:
-            places = [plan.problem.interface.x for plan in self.plans]
-            if all(np.array_equal(x, places[0]) for x in places):
-                coordinates["x"] = (places[0], POSITION)
+        for dim in sorted(used & {"x", "y", "direction"}):
+            places = [coordinate(plan.problem.interface, dim) for plan in self.plans]
+            values_of, meaning = places[0]
+            if all(np.array_equal(place, values_of) for place, _ in places):
+                coordinates[dim] = places[0]
             else:  # the length is swept: every point has positions of its own
-                each = replace(POSITION, dims=(*dims, "x"))
-                coordinates["position"] = (np.reshape(places, (*shape, -1)), each)
+                name = "position" if dim == "x" else f"position_{dim}"
+                each = replace(meaning, dims=(*dims, dim))
+                stacked = np.reshape([place for place, _ in places], (*shape, -1))
+                coordinates[name] = (stacked, each)
         return to_dataset(values, variables, coordinates, attributes)

@@ -14,13 +14,15 @@ import xarray as xr
 from stiction._model import describe, to_plain
 from stiction._progress import progress_bar
 from stiction.ensemble.assemble import Gathered, GridAxis
-from stiction.ensemble.plan import PROFILES, STREAMS, Plan
+from stiction.ensemble.plan import Plan
 from stiction.ensemble.scheduler import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy
-from stiction.evaluation import Method, check_method, variables_of
+from stiction.evaluation import Method, check_method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.sample import PROFILES
 
 KEEP_LIMIT = 2.0**30
 FEW = 4
@@ -28,37 +30,38 @@ FEW = 4
 
 def make_plan(
     problem: Problem,
-    strength: RandomField,
+    random: Any,
     method: Method,
     seed: int,
-    fields: Mapping[str, RandomField | None],
     keep: tuple[str, ...] = (),
     keep_samples: tuple[int, ...] | None = None,
 ) -> Plan:
     """The plan of these arguments, or one `InputError` with all that is wrong with them."""
     check_method(method)
-    problems = []
+    problems: list[str] = []
     if not isinstance(problem, Problem):
         problems.append(f"problem: must be a Problem, got {describe(problem)}")
-    for name, field in {"strength": strength, **fields}.items():
-        if field is None and name != "strength":
-            continue
-        if not isinstance(field, RandomField):
-            problems.append(f"{name}: must be a RandomField, got {describe(field)}")
-        elif isinstance(problem, Problem):
+    interface = None
+    try:
+        interface = as_random_interface(random)
+    except InputError as error:
+        problems += error.problems
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
+    if isinstance(problem, Problem):
+        for reason in method.supports(problem):
+            problems.append(f"method: the {method.label} cannot take this: {reason}")
+    if isinstance(problem, Problem) and interface is not None:
+        for name, field in interface.properties.items():
             try:
                 field.modes(problem.interface)
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
-    random = tuple((name, field) for name, field in fields.items() if field is not None)
-    if isinstance(problem, Problem):
-        method, mistakes = _keep_of_method(problem, method, keep, {name for name, _ in random})
+        method, mistakes = _keep_of_method(problem, method, keep, set(interface.names))
         problems += mistakes
-    if problems:
+    if problems or interface is None:
         raise InputError(problems)
-    return Plan(problem, strength, method, int(seed), random, keep, keep_samples)
+    return Plan(problem, interface, method, int(seed), keep, keep_samples)
 
 
 def _keep_of_method(
@@ -70,28 +73,24 @@ def _keep_of_method(
         for field in dataclasses.fields(method)
         if isinstance(getattr(method, field.name), bool)
     }
+
+    def wide(name: str) -> bool:
+        wider = dataclasses.replace(method, **{name: True}) if name in switches else method
+        found = wider.variables(problem)
+        return name in found and len(found[name].dims) > 1
+
     problems = []
     for name in keep:
-        if name == "strength" or name in random:
-            continue
-        if name not in variables_of(problem, method) and name in switches:
-            wider = dataclasses.replace(method, **{name: True})
-            if name in variables_of(problem, wider):
-                method = wider
-                continue
-        if name in PROFILES:
-            valid = ", ".join(sorted({"strength", *random}))
+        known = name in random or name in method.variables(problem)
+        if not known and name in switches and wide(name):
+            method = dataclasses.replace(method, **{name: True})
+        elif not known and name in PROFILES:
+            valid = ", ".join(sorted(random))
             problems.append(f"keep: {name!r} is not random here (valid: {valid})")
-        elif name not in variables_of(problem, method):
-            wide = {n for n in switches | set(variables_of(problem, method)) if _wide(method, n)}
-            problems.append(unknown_name("keep", name, sorted({"strength"} | random | wide)))
+        elif not known:
+            names = {n for n in switches | set(method.variables(problem)) if wide(n)}
+            problems.append(unknown_name("keep", name, sorted(random | names)))
     return method, problems
-
-
-def _wide(method: Any, name: str) -> bool:
-    if isinstance(getattr(method, name, None), bool):
-        method = dataclasses.replace(method, **{name: True})
-    return name in method.variables and len(method.variables[name].dims) > 1
 
 
 def check_count(name: str, value: Any, smallest: int) -> None:
@@ -117,7 +116,7 @@ def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
     kept = samples
     if plan.keep_samples is not None:
         kept = sum(first <= sample < first + samples for sample in plan.keep_samples)
-    return 8.0 * plan.problem.interface.nodes * len(plan.wide) * kept
+    return 8.0 * plan.problem.interface.size * len(plan.wide) * kept
 
 
 def check_size(needed: float, limit: float) -> None:
@@ -132,12 +131,13 @@ def check_size(needed: float, limit: float) -> None:
 
 def warn_of_fields(plans: Sequence[Plan]) -> None:
     """Warn of fields that the grid or the interface cannot do justice to, once each."""
-    found = [
-        (field, plan.problem.interface)
-        for plan in plans
-        for _, field in (("strength", plan.strength), *plan.fields)
-    ]
-    pairs = list(dict.fromkeys(found))
+    pairs = list(
+        dict.fromkeys(
+            (field, plan.problem.interface)
+            for plan in plans
+            for field in plan.random.properties.values()
+        )
+    )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         for field, interface in pairs:
@@ -158,11 +158,10 @@ def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
     try:
         study: dict[str, Any] = {
             "problem": to_plain(plan.problem),
-            "strength": to_plain(plan.strength),
+            "random": to_plain(plan.random),
             "method": to_plain(plan.method),
             "ensemble": ensemble,
         }
-        study |= {name: to_plain(field) for name, field in plan.fields}
     except InputError as error:  # a function of the user's: the result says so and is still one
         return {"study_incomplete": str(error), "seed": plan.seed}
     return {"study": study, "seed": plan.seed}
@@ -199,21 +198,18 @@ def run_plans(
 
 def method_name(plans: Sequence[Plan]) -> str:
     """For the progress bar."""
-    names = {plan.method.type for plan in plans}
+    names = {plan.method.label for plan in plans}
     return str(names.pop()) if len(names) == 1 else "samples"
 
 
 def monte_carlo(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     *,
     method: Method,
     samples: int,
     seed: int = 0,
     first: int = 0,
-    residual_strength: RandomField | None = None,
-    initial_stress: RandomField | None = None,
-    weakening_rate: RandomField | None = None,
     keep: tuple[str, ...] = (),
     keep_samples: Sequence[int] | None = None,
     keep_limit: float = KEEP_LIMIT,
@@ -228,8 +224,8 @@ def monte_carlo(
     Parameters
     ----------
     problem : Problem
-    strength : RandomField
-        Peak strength, Pa.
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
     method : LocalCriterion, Equilibrium or Rupture
     samples : int
         Number of samples.
@@ -237,8 +233,6 @@ def monte_carlo(
         Not negative.
     first : int
         Number of the first sample, to continue an ensemble.
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength, Pa or Pa/m, independent of it.
     keep : tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"sensitivity"``.
@@ -266,14 +260,8 @@ def monte_carlo(
     RuntimeError
         Naming the sample and the seed, if a solver fails.
     """
-    fields = {
-        "residual_strength": residual_strength,
-        "initial_stress": initial_stress,
-        "weakening_rate": weakening_rate,
-    }
-    assert fields.keys() == STREAMS.keys()
     chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, strength, method, seed, fields, tuple(keep), chosen)
+    plan = make_plan(problem, random, method, seed, tuple(keep), chosen)
     check_run(samples, first, workers, executor)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(

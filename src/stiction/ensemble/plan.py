@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._typing import Array
 from stiction.evaluation import Method, Values, solve, variables_of
 from stiction.problem import Problem
 from stiction.random.draws import BLOCK
-from stiction.random.random_field import RandomField
-from stiction.results import Variable
-
-STREAMS = {"residual_strength": 1, "initial_stress": 2, "weakening_rate": 3}
-"""What may be random besides the strength (stream 0); streams are independent of each other."""
-
-PROFILES: dict[str, Variable] = {
-    "strength": Variable("Pa", "peak strength", ("sample", "x")),
-    "residual_strength": Variable("Pa", "residual strength", ("sample", "x")),
-    "initial_stress": Variable("Pa", "initial stress", ("sample", "x")),
-    "weakening_rate": Variable("Pa m-1", "weakening rate", ("sample", "x")),
-}
-"""Sampled profiles that may be kept."""
+from stiction.random.random_interface import RandomInterface
+from stiction.results import Variable, along
+from stiction.sample import PROFILES
 
 SLOW = 32
 
@@ -36,29 +27,27 @@ class Plan:
 
     Attributes
     ----------
-    problem, strength, method
+    problem, random, method
     seed : int
-    fields : tuple of (str, RandomField)
-        What is random besides the strength, by keyword.
     keep : tuple of str
-        Fields whose sampled profiles are kept beside the results; 'strength' among them.
+        What is kept along the interface: sampled profiles by name, and what the method adds.
     keep_samples : tuple of int, optional
         Samples whose profiles are kept; all if None.
     """
 
     problem: Problem
-    strength: RandomField
+    random: RandomInterface
     method: Any
     seed: int
-    fields: tuple[tuple[str, RandomField], ...] = field(default=())
     keep: tuple[str, ...] = ()
     keep_samples: tuple[int, ...] | None = None
 
     @property
     def variables(self) -> dict[str, Variable]:
         """All that `compute` returns."""
-        kept = {name: PROFILES[name] for name in self.keep if name in PROFILES}
-        return variables_of(self.problem, self.method) | kept
+        interface, names = self.problem.interface, self.random.names
+        kept = {name: along(interface, PROFILES[name]) for name in self.keep if name in names}
+        return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
 
     @property
     def wide(self) -> tuple[str, ...]:
@@ -68,21 +57,15 @@ class Plan:
     @property
     def piece(self) -> int:
         """Samples solved at once, as the method likes it."""
-        size = int(getattr(self.method, "chunk_size", BLOCK))
+        size = int(self.method.chunk_size)
         # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
         return size if size < SLOW else max(size, BLOCK)
 
-    def profiles(self, first: int, samples: int) -> dict[str, NDArray[np.float64]]:
+    def profiles(self, first: int, samples: int) -> dict[str, Array]:
         """The random profiles of samples first .. first + samples - 1, by name."""
-        interface = self.problem.interface
-        named = {"strength": self.strength, **dict(self.fields)}
-        return {
-            name: field.profiles(
-                interface,
-                field.draws(interface, samples, self.seed, first, stream=STREAMS.get(name, 0)),
-            )
-            for name, field in named.items()
-        }
+        return self.random.profiles(
+            self.problem.interface, samples=samples, seed=self.seed, first=first
+        )
 
     def wide_rows(self, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of these samples keep their wide variables."""
@@ -99,11 +82,8 @@ def _solver(problem: Problem, method: Method) -> Any:
 def compute(plan: Plan, first: int, samples: int) -> Values:
     """Results of samples first .. first + samples - 1; a plain function, for any executor."""
     profiles = plan.profiles(first, samples)
-    extras: Mapping[str, Any] = {name: profiles[name] for name, _ in plan.fields}
-    rows = plan.problem.rows(profiles["strength"], **extras)
-    solver = _solver(plan.problem, plan.method)
-    values = solve(plan.problem, plan.method, solver, rows)
-    return values | {name: profiles[name] for name in plan.keep if name in PROFILES}
+    values = solve(_solver(plan.problem, plan.method), plan.problem.sample(profiles))
+    return values | {name: profiles[name] for name in plan.keep if name in profiles}
 
 
 def chunks(samples: int, size: int, first: int = 0) -> Iterator[tuple[int, int]]:

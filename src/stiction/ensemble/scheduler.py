@@ -67,7 +67,7 @@ class Sizer:
         # A fair share of what is left, but not so small that drawing blocks in parts costs more.
         size = min(size, max(-(-left // (2 * slots)), BLOCK))
         if plan.wide:
-            nodes = plan.problem.interface.nodes
+            nodes = plan.problem.interface.size
             bytes_each = max(self._bytes, 8.0 * nodes * len(plan.wide))
             size = min(size, int(MOST_BYTES / bytes_each))
         size = max(1, min(size, span.samples))

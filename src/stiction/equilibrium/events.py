@@ -26,21 +26,15 @@ VARIABLES = {
 
 def equilibrium_events(
     problem: Problem,
-    tau_p: Any,
-    *,
-    residual_strength: Any = None,
-    initial_stress: Any = None,
-    weakening_rate: Any = None,
+    profiles: Any,
 ) -> xr.Dataset:
     """Instabilities that come to rest before the interface as a whole lets go.
 
     Parameters
     ----------
     problem : Problem
-    tau_p : (samples, nodes) or (nodes,) array
-        Peak strength, Pa.
-    residual_strength, initial_stress, weakening_rate : array, optional
-        What differs between samples, as in `onset`.
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength, Pa, or several profiles by name, as in `onset`.
 
     Returns
     -------
@@ -60,18 +54,13 @@ def equilibrium_events(
     The patch jumps to the least equilibrium at the same load: an overdamped interface would stop
     there. Inertia may carry a rupture through; only `Rupture` decides that.
     """
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
+    rows = problem.sample(profiles)
     _, events = Solver(problem).solve(rows)
     found = [(sample, event) for sample, several in events.items() for event in several]
     sample = np.array([number for number, _ in found], dtype=np.int64)
     load = np.array([event.load for _, event in found], dtype=np.float64)
     mean_initial = rows.initial_stress.mean(axis=1)[sample] if found else np.zeros(0)
-    spacing = rows.spacing
+    spacing = problem.interface.spacing
     values = {
         "sample": sample,
         "load": load,
@@ -87,5 +76,5 @@ def equilibrium_events(
         values,
         VARIABLES,
         {"event": (np.arange(len(found)), EVENT)},
-        {"study": {"problem": to_plain(problem)}, "samples": rows.count},
+        {"study": {"problem": to_plain(problem)}, "samples": rows.samples},
     )

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from stiction._model import model
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
-from stiction.results import ONSET_VARIABLES, Variable
-from stiction.sample import Rows
+from stiction.results import Variable, along, onset_variables
+from stiction.sample import Sample as Samples
 
 OWN_VARIABLES: dict[str, Variable] = {
     "certificate_gap": Variable("Pa", "distance between the bounds of the first instability"),
@@ -21,10 +21,8 @@ OWN_VARIABLES: dict[str, Variable] = {
     "residual_reached": Variable("1", "whether a node was at its residual strength before sliding"),
     "sliding_position": Variable("m", "position of the patch that runs along the whole interface"),
 }
-SLIP = Variable("m", "slip at the first instability", ("sample", "x"))
-SENSITIVITY = Variable(
-    "1", "sensitivity of the first instability to the strength at each node", ("sample", "x")
-)
+SLIP = Variable("m", "slip at the first instability")
+SENSITIVITY = Variable("1", "sensitivity of the first instability to the strength at each node")
 
 
 @model(kw_only=True)
@@ -63,16 +61,30 @@ class Equilibrium:
         return 256
 
     @property
-    def variables(self) -> dict[str, Variable]:
+    def label(self) -> str:
+        """Its name in figures and tables."""
+        return "equilibrium"
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, s."""
+        return 3e-4 * (problem.interface.size / 1024) ** 1.5
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+        return (
+            ["it does not take interfaces of two dimensions"] if problem.interface.is_plane else []
+        )
+
+    def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        variables = ONSET_VARIABLES | OWN_VARIABLES
+        variables = onset_variables(problem.interface) | OWN_VARIABLES
         if self.slip:
-            variables["slip"] = SLIP
+            variables["slip"] = along(problem.interface, SLIP)
         if self.sensitivity:
-            variables["sensitivity"] = SENSITIVITY
+            variables["sensitivity"] = along(problem.interface, SENSITIVITY)
         return variables
 
-    def prepare(self, problem: Problem) -> Callable[[Rows], dict[str, NDArray[Any]]]:
+    def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
         """A solver for rows of this problem.
 
         Raises

@@ -15,7 +15,7 @@ from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.results import POSITION, Variable, to_dataset
+from stiction.results import Variable, coordinate, to_dataset
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {
@@ -76,24 +76,18 @@ def _check_loads(loads: Any) -> Array:
 
 def equilibrium_path(
     problem: Problem,
-    tau_p: Any,
+    profiles: Any,
     loads: Any,
-    *,
-    residual_strength: Any = None,
-    initial_stress: Any = None,
-    weakening_rate: Any = None,
 ) -> xr.Dataset:
     """Slip and stress of one interface at rising loads: patches grow, merge and become unstable.
 
     Parameters
     ----------
     problem : Problem
-    tau_p : (nodes,) array
-        Peak strength of one sample, Pa.
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
-    residual_strength, initial_stress, weakening_rate : array, optional
-        As in `onset`.
 
     Returns
     -------
@@ -108,20 +102,15 @@ def equilibrium_path(
         If there is more than one profile or the loads do not rise, and as `onset` does.
     """
     given = _check_loads(loads)
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
-    if rows.count != 1:
-        raise InputError(f"tau_p: must be one profile of shape (nodes,), got {rows.count} samples")
+    rows = problem.sample(profiles)
+    if rows.samples != 1:
+        raise InputError(f"profiles: must be one sample, got {rows.samples}")
     setting = Setting(problem)
     sample = sample_of(rows, 0)
     path = Path(setting, sample)
     initial = rows.initial_stress[0]
-    slip = np.full((given.size, rows.nodes), np.nan)
-    stress = np.full((given.size, rows.nodes), np.nan)
+    slip = np.full((given.size, problem.interface.size), np.nan)
+    stress = np.full((given.size, problem.interface.size), np.nan)
     events = np.zeros(given.size, dtype=np.int64)
     sliding = np.zeros(given.size, dtype=np.bool_)
     for i, load in enumerate(given):
@@ -140,6 +129,6 @@ def equilibrium_path(
     }
     coordinates = {
         "load": (given, LOAD),
-        "x": (problem.interface.x, POSITION),
+        "x": coordinate(problem.interface, "x"),
     }
     return to_dataset(values, VARIABLES, coordinates, {"study": {"problem": to_plain(problem)}})

@@ -44,11 +44,11 @@ class Setting:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.nodes = problem.interface.nodes
+        self.nodes = problem.interface.size
         self.spacing = problem.interface.spacing
         self.modulus = problem.effective_modulus
-        self.unit = np.pi * self.modulus / problem.interface.length
-        column = stiffness_column(self.nodes, problem.interface.length, self.modulus)
+        self.unit = np.pi * self.modulus / problem.interface.extent
+        column = stiffness_column(self.nodes, problem.interface.extent, self.modulus)
         self.grid = Grid(column, coupling_strip(column))
         self.wide_column = np.tile(column, 3)
         self.profile = np.array(

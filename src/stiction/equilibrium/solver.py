@@ -28,13 +28,13 @@ from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.workspace import Sample
 from stiction.errors import warn_accuracy
 from stiction.problem import Problem
-from stiction.sample import Rows
+from stiction.sample import Sample as Samples
 
 WORST_GAP = 1e-9
 """Certificate gap, as a share of the load, from which on there is a warning."""
 
 
-def sample_of(rows: Rows, row: int) -> Sample:
+def sample_of(rows: Samples, row: int) -> Sample:
     """One row as the kernels take it."""
     initial = rows.initial_stress[row]
     excess = np.ascontiguousarray(rows.strength[row] - initial)
@@ -58,16 +58,16 @@ class Solver:
         self.sensitivity = sensitivity
         self.slip = slip
 
-    def __call__(self, rows: Rows) -> dict[str, NDArray[Any]]:
+    def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """The onset of each row; see `Equilibrium` for what comes back."""
         return self.solve(rows)[0]
 
-    def solve(self, rows: Rows) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
+    def solve(self, rows: Samples) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
         """The onset of each row, and the arrested events of the rows that have any."""
         self.setting.problem.warn_if_coarse(
             rows, 8.0, "single onsets are about 0.5 % off at 9 nodes and 1 to 2 % at 4"
         )
-        count, nodes = rows.count, rows.nodes
+        count, nodes = rows.samples, self.setting.nodes
         table = np.empty((count, batch.COLUMNS))
         multipliers = np.empty((count, nodes))
         slips = np.empty((count if self.slip else 0, nodes))
@@ -93,7 +93,7 @@ class Solver:
                 events[row] = state.events
             residual[row] = bool(residual_nodes(sample, state.slip).any())
             if state.direction.any():
-                sliding_at[row] = main_patch(state.direction)[2] * rows.spacing
+                sliding_at[row] = main_patch(state.direction)[2] * self.setting.spacing
             if fate[row] == batch.FLOOR_REACHED:
                 at_first = state.first or state  # it has none if it could not be followed so far
                 self._rewrite(sample, at_first, table[row], multipliers[row])
@@ -130,7 +130,7 @@ class Solver:
         fall(self.setting, sample, state)
         return follow(self.setting, sample, state)
 
-    def _batch(self, rows: Rows, table: Array, slips: Array, multipliers: Array) -> None:
+    def _batch(self, rows: Samples, table: Array, slips: Array, multipliers: Array) -> None:
         """Solve the programme of all rows in one compiled loop."""
         setting = self.setting
         rate = np.ascontiguousarray(rows.weakening_rate)
@@ -144,7 +144,7 @@ class Solver:
         )  # fmt: skip
 
     def _one(
-        self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array
+        self, rows: Samples, row: int, table: Array, slips: Array, multipliers: Array
     ) -> Solution | None:
         """Solve the programme of one row on a large grid, and test quickly for arrest."""
         setting = self.setting

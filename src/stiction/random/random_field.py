@@ -142,8 +142,8 @@ class RandomField:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        z = np.empty((draws.shape[0], interface.nodes))
-        gaussian_rows(draws, modes.sigma, self.mean_mode, interface.nodes, z)
+        z = np.empty((draws.shape[0], interface.size))
+        gaussian_rows(draws, modes.sigma, self.mean_mode, interface.size, z)
         return z
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
@@ -213,8 +213,8 @@ class RandomField:
             Of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian one.
         """
         modes = self.modes(interface)
-        spectrum = np.zeros(interface.nodes)
-        np.add.at(spectrum, np.arange(modes.sigma.size) % interface.nodes, modes.sigma**2)
+        spectrum = np.zeros(interface.size)
+        np.add.at(spectrum, np.arange(modes.sigma.size) % interface.size, modes.sigma**2)
         rho = np.fft.fft(spectrum).real
         if _which(of) == "z":
             return rho
@@ -282,7 +282,7 @@ MOST_MODES = 1 << 22
 
 @lru_cache(maxsize=256)
 def _modes(field: RandomField, interface: Interface) -> Modes:
-    spacing = 2.0 * math.pi / interface.length
+    spacing = 2.0 * math.pi / interface.extent
     # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
     count = math.floor(field.spectrum.cutoff / spacing * (1.0 + 1e-12))
     if count < 1 and not field.mean_mode:
@@ -316,16 +316,16 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
 def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
     """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
     modes = field.modes(interface)
-    lost = float(np.sum(modes.sigma[interface.nodes // 2 + 1 :] ** 2))
+    lost = float(np.sum(modes.sigma[interface.size // 2 + 1 :] ** 2))
     if lost > 1e-4:
         warn_accuracy(
-            f"the grid of {interface.nodes} nodes is coarser than the spectrum: values at the nodes"
+            f"the grid of {interface.size} nodes is coarser than the spectrum: values at the nodes"
             f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
             f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
         )
     if field.mean_mode:
         return
-    ratio = interface.length / field.spectrum.efolding_length
+    ratio = interface.extent / field.spectrum.efolding_length
     if ratio < 2.0 * math.pi * FEWEST_LENGTHS:
         gap = -float(field.correlation(interface, of="z").min())
         if gap > 0.02:

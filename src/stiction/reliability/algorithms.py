@@ -308,7 +308,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
 def by_importance(request: Request, reason: str) -> FailureProbability:
     """Importance sampling around the design point at a random place."""
     state, stress = request.state, request.stress
-    (_, field), problem = state.fields[0], state.problem
+    field, problem = state.random.strength, state.problem
     # The problem is uniform: stress = tau_i + load p and load = average of (tau_p - tau_i)/p.
     point = design_point(problem, field, stress)
     if float(state(np.zeros((1, state.dimension)))[0]) <= stress:
@@ -318,7 +318,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         )
         counted = by_counting(request, reason, None)
         return replace(counted, warnings=(*counted.warnings, *say([text])))
-    mixture = Mixture(point.draws, problem.interface.nodes, field.mean_mode)
+    mixture = Mixture(point.draws, problem.interface.size, field.mean_mode)
     rng = generator(request.seed, 4)
     found: list[Array] = []
     kept: list[Array] = []

@@ -13,6 +13,7 @@ from stiction.errors import InputError
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 from stiction.reliability.design import (
     TailRequest,
     check_probability,
@@ -72,7 +73,7 @@ def _rice(problem: Problem, strength: RandomField, stress: Array, seed: int) -> 
     """Rice's formula at falling stresses, NaN where crossings are too few to know their rate."""
     levels = np.unique(stress)
     found = rice_distribution(problem, strength, profiles=RICE_SAMPLES, seed=seed, stress=levels)
-    crossings = found.crossing_rate * RICE_SAMPLES * problem.interface.length
+    crossings = found.crossing_rate * RICE_SAMPLES * problem.interface.extent
     # Far above the median of tau_n nothing crosses either, but the interface lies below.
     known = (crossings > FEWEST_CROSSINGS - 0.5) | (found.point_survival < 0.5)
     chance: Array = np.where(known, found.probability, np.nan)
@@ -81,7 +82,7 @@ def _rice(problem: Problem, strength: RandomField, stress: Array, seed: int) -> 
 
 def failure_curve(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     *,
     method: Method,
     smallest: float = 1e-9,
@@ -92,9 +93,6 @@ def failure_curve(
     max_evaluations: int | None = None,
     confidence: float = 0.95,
     event: Event = "critical_stress",
-    residual_strength: RandomField | None = None,
-    initial_stress: RandomField | None = None,
-    weakening_rate: RandomField | None = None,
     workers: int | None = None,
 ) -> xr.Dataset:
     """P(onset < s) from one half down to a smallest probability.
@@ -102,8 +100,8 @@ def failure_curve(
     Parameters
     ----------
     problem : Problem
-    strength : RandomField
-        Peak strength, Pa.
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
     method : LocalCriterion or Equilibrium
     smallest : float
         Probability down to which the curve goes.
@@ -115,8 +113,6 @@ def failure_curve(
         Samples of plain Monte Carlo to compare with; 0 for none.
     seed, max_evaluations, confidence, event, workers
         As in `failure_probability`.
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength.
 
     Returns
     -------
@@ -131,11 +127,6 @@ def failure_curve(
     InputError
         Naming all that does not fit.
     """
-    fields = {
-        "residual_strength": residual_strength,
-        "initial_stress": initial_stress,
-        "weakening_rate": weakening_rate,
-    }
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_probability("smallest", smallest)
     for name, value, least in (
@@ -147,10 +138,9 @@ def failure_curve(
             problems.append(text)
     state = make_limit_state(
         problem,
-        strength,
+        random,
         method,
         seed,
-        fields,
         event,
         workers,
         problems=problems,
@@ -191,7 +181,7 @@ def failure_curve(
         "stress_high": sides[:, 1],
     }
     if state.not_alike_everywhere() is None:
-        values["rice_probability"] = _rice(problem, strength, stress, int(seed))
+        values["rice_probability"] = _rice(problem, state.random.strength, stress, int(seed))
     if plain_samples:
         plain = _plain(state, int(seed), stress, int(plain_samples), confidence)
         values |= dict(zip(("plain_probability", "plain_low", "plain_high"), plain, strict=True))
@@ -202,12 +192,12 @@ def failure_curve(
         "seed": int(seed),
         "evaluations": sum(run.evaluations for run in tail.runs),
         "plain_samples": int(plain_samples),
-        "method": method.type,  # type: ignore[attr-defined]  # every method names its type
+        "method": method.type,
     }
     try:
         attributes["study"] = {
             "problem": to_plain(problem),
-            "strength": to_plain(strength),
+            "random": to_plain(state.random),
             "method": to_plain(method),
         }
     except InputError:  # a function of the user's in it

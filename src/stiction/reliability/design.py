@@ -14,6 +14,7 @@ from stiction.criterion.method import LocalCriterion
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 from stiction.reliability.algorithms import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
 from stiction.reliability.estimate import (
     ALIKE,
@@ -249,7 +250,7 @@ def _finish(
 
 def design_stress(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     *,
     probability: float,
     method: Method,
@@ -259,9 +260,6 @@ def design_stress(
     max_evaluations: int | None = None,
     confidence: float = 0.95,
     event: Event = "critical_stress",
-    residual_strength: RandomField | None = None,
-    initial_stress: RandomField | None = None,
-    weakening_rate: RandomField | None = None,
     workers: int | None = None,
 ) -> DesignStress:
     """Below which stress does the interface let go with a given probability?
@@ -271,8 +269,8 @@ def design_stress(
     Parameters
     ----------
     problem : Problem
-    strength : RandomField
-        Peak strength, Pa.
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
     probability : float
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
@@ -284,8 +282,6 @@ def design_stress(
         Coefficient of variation to reach, of the failure probability at the stress.
     seed, max_evaluations, confidence, event, workers
         As in `failure_probability`.
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength.
 
     Returns
     -------
@@ -302,19 +298,13 @@ def design_stress(
     AccuracyWarning
         If the evaluations allowed do not suffice.
     """
-    fields = {
-        "residual_strength": residual_strength,
-        "initial_stress": initial_stress,
-        "weakening_rate": weakening_rate,
-    }
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_probability("probability", probability)
     state = make_limit_state(
         problem,
-        strength,
+        random,
         method,
         seed,
-        fields,
         event,
         workers,
         problems=problems,

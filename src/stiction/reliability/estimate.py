@@ -11,6 +11,7 @@ from stiction.errors import unknown_name
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 from stiction.reliability.algorithms import (
     Request,
     by_counting,
@@ -129,7 +130,7 @@ def _chosen(request: Request) -> tuple[str, str, Count | None]:
 
 def failure_probability(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     stress: float,
     *,
     method: Method,
@@ -139,9 +140,6 @@ def failure_probability(
     max_evaluations: int | None = None,
     confidence: float = 0.95,
     event: Event = "critical_stress",
-    residual_strength: RandomField | None = None,
-    initial_stress: RandomField | None = None,
-    weakening_rate: RandomField | None = None,
     workers: int | None = None,
 ) -> FailureProbability:
     """How likely does an interface of random strength let go below a given stress?
@@ -149,8 +147,8 @@ def failure_probability(
     Parameters
     ----------
     problem : Problem
-    strength : RandomField
-        Peak strength, Pa.
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
     stress : float
         Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
@@ -175,8 +173,6 @@ def failure_probability(
     event : {"critical_stress", "first_instability"}
         Which stress counts as letting go: that of the whole interface, or that at which the first
         patch becomes unstable, arrested or not. By the local criterion they are the same.
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength, as in `monte_carlo`.
     workers : int, optional
         Threads; all cores by default.
 
@@ -201,19 +197,13 @@ def failure_probability(
     of the failing samples, Lee and Whiteley (2018). Intervals are binomial (Clopper and Pearson,
     1934) for plain Monte Carlo, log-normal otherwise.
     """
-    fields = {
-        "residual_strength": residual_strength,
-        "initial_stress": initial_stress,
-        "weakening_rate": weakening_rate,
-    }
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_stress("stress", stress)
     state = make_limit_state(
         problem,
-        strength,
+        random,
         method,
         seed,
-        fields,
         event,
         workers,
         problems=problems,

@@ -80,7 +80,7 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
     Der Kiureghian (1995) does not fall. The gradient is the criterion's weight g times the slope
     of the map.
     """
-    nodes = problem.interface.nodes
+    nodes = problem.interface.size
     weight = np.fft.irfft(multiplier_of(problem, problem.nucleation_length), nodes)
     draws = np.zeros(field.modes(problem.interface).dimension)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,11 +13,12 @@ import numpy as np
 from stiction._model import describe
 from stiction._typing import Array
 from stiction.ensemble.monte_carlo import make_plan
-from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
+from stiction.friction.law import SCALES
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 
 Event = Literal["critical_stress", "first_instability"]
 
@@ -44,8 +45,7 @@ class LimitState:
     Attributes
     ----------
     problem : Problem
-    fields : tuple of (str, RandomField)
-        'strength' first, then what else is random; their draws stand side by side.
+    random : RandomInterface
     method : LocalCriterion, Equilibrium or Rupture
     event : {"critical_stress", "first_instability"}
         Which of the method's stresses.
@@ -54,19 +54,15 @@ class LimitState:
     """
 
     problem: Problem
-    fields: tuple[tuple[str, RandomField], ...]
+    random: RandomInterface
     method: Any
     event: Event = "critical_stress"
     workers: int = 1
 
-    @cached_property
-    def _sizes(self) -> tuple[int, ...]:
-        return tuple(f.modes(self.problem.interface).dimension for _, f in self.fields)
-
     @property
     def dimension(self) -> int:
         """Number of draws of a sample."""
-        return sum(self._sizes)
+        return self.random.dimension(self.problem.interface)
 
     @cached_property
     def _solver(self) -> Callable[..., Any]:
@@ -82,26 +78,15 @@ class LimitState:
 
         The same samples as `stiction.monte_carlo` takes, shape (samples, dimension).
         """
-        interface = self.problem.interface
-        parts = [
-            field.draws(interface, samples, seed, first, stream=STREAMS.get(name, 0))
-            for name, field in self.fields
-        ]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        return self.random.draws(self.problem.interface, samples, seed, first)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
-        """Sampled profiles by name, each of shape (samples, nodes)."""
-        found, start = {}, 0
-        for (name, field), size in zip(self.fields, self._sizes, strict=True):
-            part = draws[:, start : start + size]
-            found[name] = field.profiles(self.problem.interface, part)
-            start += size
-        return found
+        """Sampled profiles by name, each of shape (samples, *shape)."""
+        return self.random.from_draws(self.problem.interface, draws)
 
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
-        others = {name: value for name, value in profiles.items() if name != "strength"}
-        return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
+        return dict(self._solver(self.problem.sample(profiles)))
 
     def _stress(self, draws: Array) -> Array:
         # On a coarse grid the local criterion rings, up to a little below the bound.
@@ -126,7 +111,7 @@ class LimitState:
         node; and the mean stress of an interface whose slip sums to no net force is at most the
         mean of its strength. Both hold for every method and every sample.
         """
-        fields = dict(self.fields)
+        fields = self.random.properties
         low, high = (float(end) for end in fields["strength"].marginal.distribution.support())
         load = self.problem.load
         profile = np.asarray(load.profile, dtype=np.float64)
@@ -136,10 +121,10 @@ class LimitState:
             ends = fields["initial_stress"].marginal.distribution.support()
             least, most = (float(end) for end in ends)
         lowest_load = float(np.min((low - most) / profile))
-        nodes = self.problem.interface.nodes
-        mean = float(np.mean(np.broadcast_to(profile, (nodes,))))
+        shape = self.problem.interface.shape
+        mean = float(np.mean(np.broadcast_to(profile, shape)))
         # The mean of the initial stress is itself random where it is a field: take its lowest.
-        initial = float(np.mean(np.broadcast_to(least, (nodes,))))
+        initial = float(np.mean(np.broadcast_to(least, shape)))
         # The rounded weight of the local criterion integrates to a little more than one: it takes
         # tau_p - tau_i for that much higher.
         rounded = getattr(self.method, "weights", "exact") == "rounded"
@@ -148,18 +133,15 @@ class LimitState:
 
     def no_single_length(self) -> str | None:
         """Why the local criterion cannot serve as a first stage, or None if it can."""
-        friction = self.problem.friction
-        if friction.weakening_rate is None or "weakening_rate" in dict(self.fields):
+        if self.problem.uniform_rate is None or set(SCALES) & set(self.random.names):
             return "the weakening rate is not uniform"
-        if np.ptp(friction.weakening_rate) > 0.0:
-            return "the weakening rate varies along the interface"
-        if self.problem.nucleation_length > self.problem.interface.length:
+        if self.problem.nucleation_length > self.problem.interface.lengths[0]:
             return "the nucleation length is longer than the interface"
         return None
 
     def not_alike_everywhere(self) -> str | None:
         """Why a shifted sample would not let go at the same stress, or None if it would."""
-        if len(self.fields) > 1:
+        if len(self.random.names) > 1:
             return "more than the strength is random"
         load, friction = self.problem.load, self.problem.friction
         parts = {
@@ -176,10 +158,9 @@ class LimitState:
 
 def make_limit_state(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     method: Any,
     seed: int,
-    fields: Mapping[str, RandomField | None],
     event: str,
     workers: int | None,
     *,
@@ -190,10 +171,8 @@ def make_limit_state(
 
     Parameters
     ----------
-    problem, strength, method, seed, event, workers
+    problem, random, method, seed, event, workers
         As in `failure_probability`.
-    fields : mapping
-        What else is random, by name, or None.
     problems : sequence of str
         What is wrong with other arguments; reported with the rest.
     check : callable, optional
@@ -206,15 +185,13 @@ def make_limit_state(
         found.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     state = None
     try:
-        make_plan(problem, strength, method, seed, dict(fields))
-        random = tuple((name, field) for name, field in fields.items() if field is not None)
+        interface = make_plan(problem, random, method, seed).random
         kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
-        state = LimitState(problem, (("strength", strength), *random), method, kind)
+        state = LimitState(problem, interface, method, kind)
         found += check(state) if check else []
     except InputError as error:
         found += error.problems
     if found or state is None:
         raise InputError(found)
-    for _, field in state.fields:
-        warn_if_inaccurate(field, problem.interface)
+    state.random.warn_if_inaccurate(problem.interface)
     return replace(state, workers=usable_cores() if workers is None else int(workers))

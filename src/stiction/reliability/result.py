@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._typing import Array
-from stiction.ensemble.plan import PROFILES
 from stiction.errors import warn_accuracy
+from stiction.evaluation import label
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
-from stiction.results import ONSET_VARIABLES, POSITION, SAMPLE, to_dataset
+from stiction.results import ONSET_VARIABLES, along
+from stiction.sample import PROFILES
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +105,8 @@ def profiles_of(state: LimitState, draws: Array) -> xr.Dataset:
     if draws.shape[0] == 0:
         return xr.Dataset()
     profiles = state.profiles(draws)
-    values: dict[str, Any] = dict(profiles)
     onset = state.onset(profiles)
-    values |= {name: onset[name] for name in ONSET_VARIABLES}
-    coordinates = {
-        "sample": (np.arange(draws.shape[0]), SAMPLE),
-        "x": (state.problem.interface.x, POSITION),
-    }
-    return to_dataset(values, {**PROFILES, **ONSET_VARIABLES}, coordinates, {})
+    values = dict(profiles) | {name: onset[name] for name in ONSET_VARIABLES}
+    interface = state.problem.interface
+    meaning = {name: along(interface, PROFILES[name]) for name in profiles}
+    return label(state.problem, state.method, values, np.arange(draws.shape[0]), {}, meaning)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.spectra import CustomSpectrum
 from stiction.reliability.curve import failure_curve
 
@@ -79,7 +81,7 @@ def longer(problem: Problem, ratio: int) -> Problem:
     varying = [name for name, value in parts.items() if isinstance(value, np.ndarray)]
     if varying:
         raise InputError([f"{name}: is given node by node; give a number" for name in varying])
-    interface = Interface(ratio * problem.interface.length, ratio * problem.interface.nodes)
+    interface = Interface(ratio * problem.interface.extent, ratio * problem.interface.size)
     return Problem(problem.solid, interface, friction, load, problem.mode)
 
 
@@ -106,16 +108,13 @@ def alike_marginals(strength: RandomField) -> dict[str, Any]:
 
 def tail_study(
     problem: Problem,
-    strength: RandomField,
+    random: RandomInterface | RandomField,
     *,
     method: Method,
     smallest: float = 1e-9,
     target_cov: float = 0.3,
     plain_samples: int = 10_000,
     seed: int = 0,
-    residual_strength: RandomField | None = None,
-    initial_stress: RandomField | None = None,
-    weakening_rate: RandomField | None = None,
     workers: int | None = None,
 ) -> TailStudy:
     """Failure curves for several correlation lengths, two lengths and three lower ends.
@@ -124,13 +123,12 @@ def tail_study(
     ----------
     problem : Problem
         Uniform along the interface.
-    strength : RandomField
-        Its spectrum must have a correlation length.
+    random : RandomInterface or RandomField
+        What is random; the spectrum of the strength must have a correlation length, and only the
+        strength differs between the curves.
     method : LocalCriterion or Equilibrium
     smallest, target_cov, plain_samples, seed, workers
         As in `failure_curve`.
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength; the same in all curves.
 
     Returns
     -------
@@ -141,6 +139,8 @@ def tail_study(
     InputError
         If something varies along the interface, or the spectrum has no correlation length.
     """
+    random = as_random_interface(random)
+    strength = random.strength
     if isinstance(strength.spectrum, CustomSpectrum):
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
     options: dict[str, Any] = {
@@ -149,30 +149,26 @@ def tail_study(
         "target_cov": target_cov,
         "plain_samples": plain_samples,
         "seed": seed,
-        "residual_strength": residual_strength,
-        "initial_stress": initial_stress,
-        "weakening_rate": weakening_rate,
         "workers": workers,
     }
     long = longer(problem, LONGER)
 
     own_spectrum = strength.spectrum
 
-    def field(ratio: float) -> RandomField:
-        spectrum = own_spectrum.with_correlation_length(ratio * problem.nucleation_length)
-        return RandomField(strength.marginal, spectrum, strength.mean_mode)
+    def curve(field: RandomField, system: Problem = problem) -> xr.Dataset:
+        return failure_curve(system, dataclasses.replace(random, strength=field), **options)
 
-    own = failure_curve(problem, strength, **options)
+    def of_length(ratio: float) -> RandomField:
+        spectrum = own_spectrum.with_correlation_length(ratio * problem.nucleation_length)
+        return dataclasses.replace(strength, spectrum=spectrum)
+
+    own = curve(strength)
     others = list(alike_marginals(strength).items())
     ends = {others[0][0]: own}
     for name, marginal in others[1:]:
-        ends[name] = failure_curve(
-            problem, RandomField(marginal, strength.spectrum, strength.mean_mode), **options
-        )
+        ends[name] = curve(dataclasses.replace(strength, marginal=marginal))
     return TailStudy(
-        correlation={
-            ratio: failure_curve(problem, field(ratio), **options) for ratio in CORRELATION_RATIOS
-        },
-        length={1: own, LONGER: failure_curve(long, strength, **options)},
+        correlation={ratio: curve(of_length(ratio)) for ratio in CORRELATION_RATIOS},
+        length={1: own, LONGER: curve(strength, long)},
         lower_end=ends,
     )

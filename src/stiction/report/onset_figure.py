@@ -58,7 +58,7 @@ def draw_onset(
             markeredgewidth=1.2,
             label=f"{NAMES.get(name, name)}: {load:.4f} MPa at {place:.2f} mm",
         )
-    axes.set_xlim(0.0, problem.interface.length * 1e3)
+    axes.set_xlim(0.0, problem.interface.extent * 1e3)
     axes.set_xlabel("position $x$ (mm)")
     axes.set_ylabel("shear stress (MPa)")
     axes.margins(y=0.08)

@@ -52,7 +52,7 @@ pre { background: #f6f6f4; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem;
 </head>
 <body>
 <h1>{{ title }}</h1>
-<p>{{ state.done }} of {{ state.samples }} samples{% if not state.complete %}
+<p>{{ state.done }} of {{ state.samples }} samples by {{ methods }}{% if not state.complete %}
 <span class="bad">: the run is not complete</span>{% endif %}.
 {% if state.seconds %}Computed in {{ "%.4g"|format(state.seconds) }} s of one core.{% endif %}</p>
 {% for figure in figures %}
@@ -188,6 +188,7 @@ def write_report(stored: StoredRun, path: Path) -> None:
     page = _PAGE.render(
         title=stored.study.title or "Onset of sliding: a Monte Carlo study",
         state=state,
+        methods=" and ".join(dict.fromkeys(plan.method.label for plan in stored.study.plans)),
         figures=figures,
         tables=onset_tables(stored),
         failures=[str(failure) for failure in state.failures[:MOST_ROWS]],

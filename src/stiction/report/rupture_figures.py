@@ -85,7 +85,7 @@ def _nucleation_arrow(axes: Axes, problem: Problem, run: xr.Dataset, height: flo
         arrowprops={"arrowstyle": "<->", "color": ACCENT, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
     )
     # Beside the arrow, on the side where there is room.
-    right = centre + half < 0.9 * problem.interface.length * _MILLI
+    right = centre + half < 0.9 * problem.interface.extent * _MILLI
     at, align = (centre + 1.3 * half, "left") if right else (centre - 1.3 * half, "right")
     axes.text(at, height, "$h_n$", color=ACCENT, ha=align, va="center")
 
@@ -133,7 +133,7 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         top.set_ylabel(r"$\tau_p$ (MPa)")
         top.set_ylim(strength.min() - 0.05, height + 0.25 * np.ptp(strength))
 
-        before = _BEFORE * problem.interface.length / problem.solid.shear_wave_speed
+        before = _BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
         near = np.flatnonzero(times >= onset - before)
         near = near if near.size > 2 else np.arange(times.size)
         _mesh(zoom, x, (times[near] - onset) * _MICRO, rate[near])
@@ -145,7 +145,7 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         low = times[0] / onset
         whole.set_ylim(low, max(end / onset, 1.0 + 0.03 * (1.0 - low)))
         whole.set_xlabel("$x$ (mm)")
-        whole.set_xlim(0.0, problem.interface.length * _MILLI)
+        whole.set_xlim(0.0, problem.interface.extent * _MILLI)
         for axes in (top, zoom):
             axes.tick_params(labelbottom=False)
         whole.tick_params(labelleft=False)
@@ -206,7 +206,7 @@ def front_figure(run: xr.Dataset, problem: Problem) -> Figure:
             place_of = below.get_yaxis_transform()
             below.text(1.01, value, name, transform=place_of, va=sides[i], color=INK)
         below.set_ylim(0.0, 1.6 * waves[-1][1])
-        below.set_xlim(0.0, problem.interface.length * _MILLI)
+        below.set_xlim(0.0, problem.interface.extent * _MILLI)
         below.set_xlabel("$x$ (mm)")
         below.set_ylabel("front speed (m/s)")
         panel(above, "a")
@@ -318,7 +318,7 @@ def rupture_film(
         above.legend(loc="upper right", ncols=2)
         (moving,) = below.semilogy(x, slip_rate[0], color=ACCENT)
         below.set_ylim(1e-7, 100.0)
-        below.set_xlim(0.0, problem.interface.length * _MILLI)
+        below.set_xlim(0.0, problem.interface.extent * _MILLI)
         below.set_xlabel("$x$ (mm)")
         below.set_ylabel("slip rate (m/s)")
         clock = above.text(0.0, 1.04, " ", transform=above.transAxes, color=QUIET)

@@ -140,8 +140,8 @@ def nucleation_statistics(
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
     """Share of Var[tau_p] at each wavenumber of the grid, (nodes//2 + 1,); it sums to 1."""
     interface = problem.interface
-    power = np.fft.rfft(strength.correlation(interface)).real / interface.nodes
-    power[1 : interface.nodes // 2] *= 2.0
+    power = np.fft.rfft(strength.correlation(interface)).real / interface.size
+    power[1 : interface.size // 2] *= 2.0
     return np.maximum(power, 0.0)
 
 
@@ -182,7 +182,7 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
     else:
         # One wave is left, of unit variance: its harmonics m carry c_m^2 through the map.
         h = problem.nucleation_length
-        wave = 2.0 * math.pi / problem.interface.length
+        wave = 2.0 * math.pi / problem.interface.extent
         x = np.linspace(0.0, 1.0, 4096, endpoint=False)
         wave_correlation = np.cos(2.0 * math.pi * x)
         c = correlation_of_mapped(wave_correlation, hermite_coefficients(strength.marginal))

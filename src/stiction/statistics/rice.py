@@ -124,7 +124,7 @@ def rice_distribution(
 
     # A dip that only just reaches down between two nodes is a crossing as well.
     factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / problem.nucleation_length)
-    points = factor * problem.interface.nodes
+    points = factor * problem.interface.size
 
     def batches() -> Any:
         for first in range(0, profiles, BATCH):
@@ -149,9 +149,9 @@ def rice_distribution(
         _count_crossings(tau_n, levels, crossings, below)
     seen = np.cumsum(crossings)[:-1]
     survival = 1.0 - np.cumsum(below)[:-1] / (profiles * points)
-    rate = seen / (profiles * problem.interface.length)
+    rate = seen / (profiles * problem.interface.extent)
     with np.errstate(divide="ignore", invalid="ignore"):
-        exponent = np.where(survival > 0.0, problem.interface.length * rate / survival, np.inf)
+        exponent = np.where(survival > 0.0, problem.interface.extent * rate / survival, np.inf)
     probability = np.maximum.accumulate(1.0 - np.clip(survival, 0.0, 1.0) * np.exp(-exponent))
     return RiceDistribution(
         stress=levels,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import operator
 import tomllib
 from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import pydantic
 import tomli_w
@@ -16,16 +18,15 @@ import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from stiction._model import Count, Positive, _count, describe, explain, model, to_plain
-from stiction.criterion.method import LocalCriterion
-from stiction.dynamics.method import Rupture
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
 from stiction.ensemble.plan import Plan
-from stiction.equilibrium.method import Equilibrium
 from stiction.errors import InputError
+from stiction.evaluation import methods
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.sweep import (
     Point,
     Sweep,
@@ -36,8 +37,13 @@ from stiction.study.sweep import (
     with_values,
 )
 
-METHODS: tuple[Any, ...] = (LocalCriterion, Equilibrium, Rupture)
-AnyMethod = Annotated[LocalCriterion | Equilibrium | Rupture, Field(discriminator="type")]
+AnyMethod: Any = Annotated[
+    functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
+]
+"""Any registered method; in a study file ``type`` says which."""
+
+FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_rate")
+"""Tables of the study files of the first version, now below [random]."""
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 
@@ -51,6 +57,16 @@ def _chosen(value: Any) -> Any:
             f" got {describe(value)}"
         )
     return tuple(value)
+
+
+def _interface(value: Any) -> Any:
+    return as_random_interface(value) if isinstance(value, RandomField) else value
+
+
+if TYPE_CHECKING:  # a field alone is accepted and becomes an interface
+    AnyRandom = RandomInterface | RandomField
+else:
+    AnyRandom = Annotated[RandomInterface, BeforeValidator(_interface)]
 
 
 @model(kw_only=True)
@@ -92,12 +108,10 @@ class Study:
     Parameters
     ----------
     problem : Problem
-    strength : RandomField
-        Peak strength, Pa.
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
-    residual_strength, initial_stress, weakening_rate : RandomField, optional
-        What is random besides the strength.
     sweep : list of dict
         Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
         of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
@@ -115,12 +129,9 @@ class Study:
     """
 
     problem: Problem
-    strength: RandomField
+    random: AnyRandom
     method: AnyMethod
     ensemble: Ensemble
-    residual_strength: RandomField | None = None
-    initial_stress: RandomField | None = None
-    weakening_rate: RandomField | None = None
     sweep: Sweep = ()
     cluster: Cluster | None = None
     title: str = ""
@@ -128,7 +139,7 @@ class Study:
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
         plans = self.plans
-        nodes = {plan.problem.interface.nodes for plan in plans}
+        nodes = {plan.problem.interface.size for plan in plans}
         if len(nodes) > 1 and any(plan.wide for plan in plans):
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
@@ -168,22 +179,18 @@ class Study:
         return plans
 
     def _plan(self) -> Plan:
-        fields = {
-            "residual_strength": self.residual_strength,
-            "initial_stress": self.initial_stress,
-            "weakening_rate": self.weakening_rate,
-        }
-        given = self.ensemble
+        given, random = self.ensemble, as_random_interface(self.random)
         return make_plan(
-            self.problem, self.strength, self.method, given.seed, fields, given.keep,
-            given.keep_samples,
-        )  # fmt: skip
+            self.problem, random, self.method, given.seed, given.keep, given.keep_samples
+        )
 
     @property
     def axes(self) -> list[GridAxis]:
         """The axes of the sweep as dimensions of the result."""
         variables = {name for plan in self.plans for name in plan.variables}
-        return grid_axes(self.sweep, sorted(variables | {"sample", "kept_sample", "x", "position"}))
+        return grid_axes(
+            self.sweep, sorted(variables | {"sample", "kept_sample", "x", "y", "position"})
+        )
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -272,6 +279,7 @@ class Study:
 
         A key that is swept need not have a value of its own.
         """
+        _refuse_first_version(given)
         sweep, mistakes = _read_sweep(given, folder)
         if sweep:
             given = _completed(given, sweep)
@@ -303,6 +311,21 @@ class Study:
         if "study" not in result.attrs:
             raise InputError(f"result: has no attribute 'study': {describe(type(result))}")
         return cls.from_dict(json.loads(result.attrs["study"]))
+
+
+def _refuse_first_version(given: Any) -> None:
+    """Say what to write instead of the tables of the first version's study files."""
+    if not isinstance(given, dict) or "random" in given:
+        return
+    old = [name for name in FIRST_VERSION if name in given]
+    if old:
+        raise InputError(
+            [
+                f"{name}: what is random stands in one table now: write [random.{name}]"
+                for name in old
+            ]
+            + ["sweep: keys below these tables begin with 'random.' as well"] * ("sweep" in given)
+        )
 
 
 def _at_points(text: str, points: list[Point]) -> str:

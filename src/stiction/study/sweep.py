@@ -270,6 +270,8 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
     if isinstance(owner, ScipyMarginal):
         changes = {name: leaf.value for name, leaf in tree.items() if isinstance(leaf, _Leaf)}
         return {"type": owner.type, **dict(owner.parameters), **changes}
+    if path == "random.correlation":
+        return _joined(owner or {}, tree)
     if not dataclasses.is_dataclass(owner):
         raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
     names = [field.name for field in dataclasses.fields(owner) if field.init]
@@ -289,6 +291,15 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
         raise InputError([f"{path}.{text}" if path else text for text in texts]) from None
+
+
+def _joined(owner: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
+    """A nested mapping with the leaves of the tree put into it."""
+    result = dict(owner)
+    for name, branch in tree.items():
+        leaf = isinstance(branch, _Leaf)
+        result[name] = branch.value if leaf else _joined(result.get(name, {}), branch)
+    return result
 
 
 def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:

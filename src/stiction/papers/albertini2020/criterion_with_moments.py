@@ -15,13 +15,13 @@ from stiction.criterion.moving_average import average_rows
 from stiction.criterion.nucleation import multiplier_of
 from stiction.problem import Problem
 from stiction.results import Variable
-from stiction.sample import Rows
+from stiction.sample import Sample
 
 STATIONS = 64
 
 
 @model(kw_only=True)
-class ObservedCriterion:
+class CriterionWithMoments:
     """Local criterion that also keeps minimum strength and moments of the nucleation stress.
 
     Parameters
@@ -31,13 +31,30 @@ class ObservedCriterion:
     """
 
     reference: float
-    type: Literal["observed_criterion"] = "observed_criterion"
+    type: Literal["criterion_with_moments"] = "criterion_with_moments"
 
     @property
-    def variables(self) -> dict[str, Variable]:
+    def label(self) -> str:
+        """Its name in figures and tables."""
+        return "local criterion"
+
+    @property
+    def chunk_size(self) -> int:
+        """Samples that make a good piece of work in an ensemble."""
+        return 1024
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, s."""
+        return LocalCriterion().seconds_per_sample(problem)
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+        return LocalCriterion().supports(problem)
+
+    def variables(self, problem: Problem) -> dict[str, Variable]:
         """Those of the local criterion and what is kept besides."""
         return {
-            **LocalCriterion().variables,
+            **LocalCriterion().variables(problem),
             "weakest_strength": Variable("Pa", "smallest peak strength of the sample"),
             "weakest_position": Variable("m", "position of the weakest node"),
             "largest_nucleation_stress": Variable("Pa", "largest nucleation stress of the sample"),
@@ -51,22 +68,22 @@ class ObservedCriterion:
             ),
         }
 
-    def prepare(self, problem: Problem) -> Callable[[Rows], dict[str, Array]]:
+    def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """A solver for rows of this problem, without initial stress and with a uniform load."""
         onset = LocalCriterion().prepare(problem)
         multiplier = multiplier_of(problem, problem.nucleation_length)
-        every = max(problem.interface.nodes // STATIONS, 1)
+        every = max(problem.interface.size // STATIONS, 1)
 
-        def solve(rows: Rows) -> dict[str, Array]:
-            tau_n = np.empty((rows.count, rows.nodes))
+        def solve(rows: Sample) -> dict[str, Array]:
+            tau_n = np.empty((rows.samples, problem.interface.size))
             strength = np.ascontiguousarray(rows.strength)
             average_rows(strength, multiplier, tau_n)
-            numbers = np.empty((rows.count, 6))
+            numbers = np.empty((rows.samples, 6))
             _observe(strength, tau_n, self.reference, numbers)
             return {
                 **onset(rows),
                 "weakest_strength": numbers[:, 0],
-                "weakest_position": numbers[:, 1] * rows.spacing,
+                "weakest_position": numbers[:, 1] * problem.interface.spacing,
                 "largest_nucleation_stress": numbers[:, 2],
                 "nucleation_moments": numbers[:, 3:],
                 "nucleation_stress": tau_n[:, ::every],

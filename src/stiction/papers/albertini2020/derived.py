@@ -41,7 +41,7 @@ def misplaced(data: Data, ratio: float, *, printed: bool = False) -> Array:
     study = data["interaction"].sel(correlation_ratio=ratio)
     local = study["printed_critical_position"] if printed else data.at(ratio)["critical_position"]
     gap = np.abs(local.values - study["critical_position"].values)
-    gap = np.minimum(gap, problem.interface.length - gap)
+    gap = np.minimum(gap, problem.interface.extent - gap)
     result: Array = gap > 0.5 * problem.nucleation_length
     return result
 
@@ -63,7 +63,7 @@ def displaced(data: Data, ratio: float, prediction: str) -> Array:
     problem = data.setting.problem
     runs = data["ruptures"].sel(correlation_ratio=ratio)
     gap = np.abs(runs[f"{prediction}_critical_position"].values - runs["critical_position"].values)
-    gap = np.minimum(gap, problem.interface.length - gap)
+    gap = np.minimum(gap, problem.interface.extent - gap)
     result: Array = gap > 0.5 * problem.nucleation_length
     return result
 

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from stiction._model import Positive, model
 from stiction.errors import InputError
-from stiction.friction import SlipWeakening
+from stiction.friction.linear import SlipWeakening
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.random.marginals import Beta, Marginal

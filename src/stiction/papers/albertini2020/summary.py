@@ -261,7 +261,7 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
             f" rho = {solid.density:g} kg/m^3, plane {solid.plane}",
         ),
         ("Effective modulus", f"G* = {problem.effective_modulus:.6g} Pa (mode {problem.mode})"),
-        ("Interface", f"L = {interface.length:g} m, {interface.nodes} nodes"),
+        ("Interface", f"L = {interface.length:g} m, {interface.size} nodes"),
         (
             "Friction",
             f"W = {rate:g} Pa/m, residual strength"
@@ -270,7 +270,7 @@ def _parameters(data: Data) -> list[tuple[str, str]]:
         (
             "Nucleation length",
             f"h_n = {length * 1e3:.4g} mm, L/h_n ="
-            f" {interface.length / length:.4g},"
+            f" {interface.extent / length:.4g},"
             f" {length / interface.spacing:.1f} nodes",
         ),
         (

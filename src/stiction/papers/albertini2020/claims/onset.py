@@ -253,7 +253,7 @@ def skewness_amplified(data: Data) -> Finding:
 )
 def uniform_position(data: Data) -> Finding:
     """Kolmogorov-Smirnov probabilities, against 0.01 over all correlation lengths together."""
-    length = data.setting.problem.interface.length
+    length = data.setting.problem.interface.extent
     chance = [
         float(kstest(data.at(ratio)["critical_position"].values / length, "uniform").pvalue)
         for ratio in data.ratios
@@ -293,7 +293,7 @@ def position_independent(data: Data) -> Finding:
 def weakest_does_not_govern(data: Data) -> Finding:
     """Share of samples whose onset is more than h_n/2 from the weakest node."""
     problem = data.setting.problem
-    length = problem.interface.length
+    length = problem.interface.extent
     series = []
     for ratio in data.ratios:
         at = data.at(ratio)

@@ -95,7 +95,7 @@ def nucleation_factor(data: Data) -> Finding:
 def nucleation_length(data: Data) -> Finding:
     """With the modulus of the setting's plane state, and with the printed one."""
     problem = data.setting.problem
-    length = problem.interface.length
+    length = problem.interface.extent
     own = Estimate(problem.nucleation_length / length)
     strain = dataclasses.replace(problem, solid=dataclasses.replace(problem.solid, plane="strain"))
     printed = Estimate(strain.nucleation_length / length)
@@ -118,7 +118,7 @@ def nucleation_length(data: Data) -> Finding:
 def long_interface(data: Data) -> Finding:
     """At least ten nucleation lengths."""
     problem = data.setting.problem
-    found = Estimate(problem.interface.length / problem.nucleation_length)
+    found = Estimate(problem.interface.extent / problem.nucleation_length)
     verdict = Verdict.HOLDS if found.value >= 10.0 else Verdict.FAILS
     return Finding((Quantity("L/h_n", found),), verdict)
 

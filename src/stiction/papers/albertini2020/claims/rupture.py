@@ -61,7 +61,7 @@ def release_rate_grows(data: Data) -> Finding:
     G = L drop^2 tan(pi a/L)/(2 G*) (Koiter, 1959), which is linear while a << L.
     """
     problem = data.setting.problem
-    length, period = problem.nucleation_length, problem.interface.length
+    length, period = problem.nucleation_length, problem.interface.extent
 
     def rate(crack: float) -> float:
         return math.tan(math.pi * crack / (2.0 * period))

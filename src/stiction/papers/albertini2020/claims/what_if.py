@@ -235,4 +235,4 @@ def free_end(data: Data) -> Finding:
 
 def _near_by_chance(data: Data) -> float:
     problem = dataclasses.replace(data.setting.problem, mode="III")
-    return problem.nucleation_length / problem.interface.length
+    return problem.nucleation_length / problem.interface.extent

@@ -166,7 +166,7 @@ def _bias(axes: Axes, data: Data) -> None:
 
 
 def _positions(axes: Axes, data: Data) -> None:
-    length = data.setting.problem.interface.length
+    length = data.setting.problem.interface.extent
     axes.plot([0, 1], [0, 1], color=PALE, linewidth=0.8, zorder=0)
     for i in (0, len(data.ratios) - 1):
         ratio = data.ratios[i]

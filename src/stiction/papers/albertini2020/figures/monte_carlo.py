@@ -84,7 +84,7 @@ def _densities(data: Data, ratio: float) -> dict[str, Density]:
     setting, at = data.setting, data.at(ratio)
     low, high = (bound / setting.mean if np.isfinite(bound) else None for bound in setting.bounds)
     # Points of tau_n closer than half a nucleation length tell the same.
-    lengths = setting.problem.interface.length / setting.problem.nucleation_length
+    lengths = setting.problem.interface.extent / setting.problem.nucleation_length
     return {
         "min tau_p": density(data.relative(at["weakest_strength"].values), bounds=(low, high)),
         "tau_n": density_of_counts(
@@ -162,7 +162,7 @@ def _profiles(axes: Axes, data: Data, key: str, limits: tuple[float, float]) -> 
     interface = data.setting.problem.interface
     for i, ratio in enumerate(data.ratios):
         values = data.relative(data.at(ratio)[key].values)
-        axes.plot(interface.x / interface.length, values, linewidth=0.9, **series(i))
+        axes.plot(interface.x / interface.extent, values, linewidth=0.9, **series(i))
     axes.axhline(1.0, color=PALE, linewidth=0.8, zorder=0)
     for bound in data.setting.bounds:
         if np.isfinite(bound):
@@ -222,7 +222,7 @@ def _extent(estimates: list[Density], share: float) -> tuple[float, float]:
 
 
 def _positions(axes: Axes, data: Data) -> None:
-    length = data.setting.problem.interface.length
+    length = data.setting.problem.interface.extent
     edges = np.linspace(0.0, 1.0, BINS + 1)
     spread = 1.96 * np.sqrt(BINS * (1.0 - 1.0 / BINS) / data.samples)
     axes.axhspan(1.0 - spread, 1.0 + spread, color=PALE, zorder=0, linewidth=0)

@@ -90,7 +90,7 @@ def draw(data: Data) -> Figure:
 
 def _profile(axes: Axes, data: Data) -> None:
     run, interface = data["representative"], data.setting.problem.interface
-    x = interface.x / interface.length
+    x = interface.x / interface.extent
     tau_n = data.relative(run["nucleation_stress"].values)
     axes.plot(
         x, data.relative(run["peak_strength"].values), color=QUIET, linewidth=0.7,
@@ -100,7 +100,7 @@ def _profile(axes: Axes, data: Data) -> None:
     lowest = int(tau_n.argmin())
     axes.plot([x[lowest]], [tau_n[lowest]], "o", color=INK, markersize=5, zorder=5)
     axes.plot(
-        [float(run["critical_position"]) / interface.length],
+        [float(run["critical_position"]) / interface.extent],
         [float(data.relative(run["critical_stress"].values))],
         "x", color=color(2), markersize=7, markeredgewidth=1.6, zorder=6,
     )  # fmt: skip
@@ -143,7 +143,7 @@ def _diagonal(axes: Axes, values: np.ndarray) -> None:
 
 
 def _place(axes: Axes, data: Data) -> None:
-    length = data.setting.problem.interface.length
+    length = data.setting.problem.interface.extent
     axes.plot([0, 1], [0, 1], color=PALE, linewidth=0.9, zorder=0)
     for i, ratio in enumerate(data.setting.simulated_ratios):
         at = data["ruptures"].sel(correlation_ratio=ratio)

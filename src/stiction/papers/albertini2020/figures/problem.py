@@ -141,7 +141,7 @@ def _field(axes: Axes, data: Data) -> None:
     setting, ratio = data.setting, data.ratios[SHOWN]
     interface = setting.problem.interface
     sample = data.relative(data.at(ratio)["profile_strength"].values)
-    axes.plot(interface.x / interface.length, sample, color=series(1)["color"], linewidth=0.9)
+    axes.plot(interface.x / interface.extent, sample, color=series(1)["color"], linewidth=0.9)
     axes.axhline(1.0, color=PALE, linewidth=0.8, zorder=0)
     for bound in setting.bounds:
         if np.isfinite(bound):
@@ -149,7 +149,7 @@ def _field(axes: Axes, data: Data) -> None:
     axes.set_xlim(0, 1)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.16 * (high - low))
-    length = setting.problem.nucleation_length / interface.length
+    length = setting.problem.nucleation_length / interface.extent
     level = high + 0.05 * (high - low)
     axes.plot(
         [0.04, 0.04 + length], [level, level], color=INK, linewidth=2.0, solid_capstyle="butt"

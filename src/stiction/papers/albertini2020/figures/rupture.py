@@ -18,7 +18,7 @@ def caption(data: Data) -> str:
     """What is seen."""
     run = data["representative"]
     peak, place = float(run["critical_stress"]), float(run["critical_position"])
-    length = data.setting.problem.interface.length
+    length = data.setting.problem.interface.extent
     return (
         f"(a) Peak strength at xi_0/h_n = {run.attrs['correlation_ratio']:g}, and the nucleation"
         " length. (b) Slip rate along the interface around the onset, at T; what sticks is white."

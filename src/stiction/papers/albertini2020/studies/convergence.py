@@ -28,7 +28,7 @@ def _cases(problem: Problem) -> dict[str, tuple[Problem, Rupture, int]]:
     """Label -> problem, method, and cost in runs as they are."""
 
     def grid(factor: float) -> Problem:
-        nodes = 2 * round(problem.interface.nodes * factor / 2)
+        nodes = 2 * round(problem.interface.size * factor / 2)
         return dataclasses.replace(
             problem, interface=dataclasses.replace(problem.interface, nodes=nodes)
         )

@@ -33,7 +33,7 @@ def compute(context: Context) -> xr.Dataset:
     for ratio in setting.correlation_ratios:
         study = Study(
             problem=setting.problem,
-            strength=setting.field(ratio),
+            random=setting.field(ratio),
             method=METHOD,
             ensemble=Ensemble(samples=context.dynamic, seed=context.seed),
             title=f"elastodynamics at xi_0/h_n = {ratio:g}",

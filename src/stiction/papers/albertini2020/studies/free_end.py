@@ -41,7 +41,7 @@ def compute(context: Context) -> xr.Dataset:
     double = dataclasses.replace(
         problem,
         interface=dataclasses.replace(
-            interface, length=2.0 * interface.length, nodes=2 * interface.nodes
+            interface, length=2.0 * interface.extent, nodes=2 * interface.size
         ),
     )
     numbers: dict[str, list[np.ndarray]] = {key: [] for key in ("periodic", "free", "end", "rule")}
@@ -60,8 +60,8 @@ def compute(context: Context) -> xr.Dataset:
             found["rule"].append(nucleation_stress(double, mirrored).min(axis=1))
             # Nodes are half a spacing from the mirror planes.
             place = free["critical_position"].values + 0.5 * interface.spacing
-            place = np.mod(place, interface.length)
-            found["end"].append(np.minimum(place, interface.length - place) / length)
+            place = np.mod(place, interface.extent)
+            found["end"].append(np.minimum(place, interface.extent - place) / length)
             context.report(3 * work(Equilibrium(), part))
         for key, values in found.items():
             numbers[key].append(np.concatenate(values))

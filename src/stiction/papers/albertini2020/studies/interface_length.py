@@ -35,8 +35,8 @@ def compute(context: Context) -> xr.Dataset:
     for factor in FACTORS:
         grid = dataclasses.replace(
             interface,
-            length=interface.length * factor,
-            nodes=2 * round(interface.nodes * factor / 2),
+            length=interface.extent * factor,
+            nodes=2 * round(interface.size * factor / 2),
         )
         longer = dataclasses.replace(problem, interface=grid)
         result = context.monte_carlo(longer, field, LocalCriterion(), context.fewer)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.criterion.nucleation import nucleation_stress
-from stiction.papers.albertini2020.criterion_with_moments import STATIONS, ObservedCriterion
+from stiction.papers.albertini2020.criterion_with_moments import STATIONS, CriterionWithMoments
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.statistics.densities import count_into
 
@@ -28,7 +28,7 @@ def compute(context: Context) -> xr.Dataset:
     """Onset of every sample, moments and a histogram of tau_n, and one sample to be drawn."""
     setting = context.setting
     interface = setting.problem.interface
-    method = ObservedCriterion(reference=setting.mean)
+    method = CriterionWithMoments(reference=setting.mean)
     parts, profiles = [], []
     for ratio in setting.correlation_ratios:
         field = setting.field(ratio)
@@ -55,7 +55,7 @@ def compute(context: Context) -> xr.Dataset:
         tau_n,
         {"units": "Pa", "long_name": "nucleation stress of sample 0"},
     )
-    dataset.attrs["stations"] = min(STATIONS, interface.nodes)
+    dataset.attrs["stations"] = min(STATIONS, interface.size)
     return dataset.assign_coords(
         correlation_ratio=(
             "correlation_ratio",

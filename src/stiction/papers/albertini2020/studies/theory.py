@@ -79,7 +79,7 @@ def compute(context: Context) -> xr.Dataset:
 
 def _resolved(field: RandomField, interface: Interface) -> bool:
     """Whether the interface holds a mode of the field, and its grid nearly all of the power."""
-    if 2.0 * np.pi / interface.length > field.spectrum.cutoff:
+    if 2.0 * np.pi / interface.extent > field.spectrum.cutoff:
         return False
-    unresolved = field.modes(interface).sigma[interface.nodes // 2 + 1 :]
+    unresolved = field.modes(interface).sigma[interface.size // 2 + 1 :]
     return float(np.sum(unresolved**2)) < UNRESOLVED

@@ -18,7 +18,7 @@ MEAN_MODES = (0, 1)
 def _ratios(context: Context) -> list[float]:
     """Those at which at least one mode is left, whatever the setting."""
     setting = context.setting
-    longest = 2.0 * setting.truncation * setting.problem.interface.length
+    longest = 2.0 * setting.truncation * setting.problem.interface.extent
     length = setting.problem.nucleation_length
     return [ratio for ratio in RATIOS if ratio * length < 0.5 * longest]
 

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.stats import ks_2samp
 
 from stiction.criterion.method import LocalCriterion
-from stiction.papers.albertini2020.criterion_with_moments import ObservedCriterion
+from stiction.papers.albertini2020.criterion_with_moments import CriterionWithMoments
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.studies.summary import stack, summarise
 
@@ -33,8 +33,8 @@ def compute(context: Context) -> xr.Dataset:
     field = setting.field(largest)
     resolution = problem.nucleation_length / interface.spacing / FACTORS[-1]
     finer = 2 ** max(int(np.ceil(np.log2(NODES_IN_WINDOW / resolution))), 0)
-    grid = dataclasses.replace(interface, nodes=interface.nodes * finer)
-    base = ObservedCriterion(reference=setting.mean)
+    grid = dataclasses.replace(interface, nodes=interface.size * finer)
+    base = CriterionWithMoments(reference=setting.mean)
     parts, weakest = {}, None
     for factor in FACTORS:
         friction = dataclasses.replace(

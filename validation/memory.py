@@ -2,7 +2,7 @@
 
 The same predictor-corrector steps through a rupture: with sums of exponentials, with the full
 history, and with a history cut off at |k| c_s t = 100, as tables of the kernel are.
-Run: python examples/validation_memory.py [folder for the figure]
+Run: python validation/memory.py [folder for the figure]
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Random strength at xi_0/h_n = 0.25, 0.5 and 2: the difference is smooth in the loading rate and
 vanishes with it.
-Run: python examples/validation_onset.py [folder for the figure]
+Run: python validation/onset.py [folder for the figure]
 """
 
 from __future__ import annotations

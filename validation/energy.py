@@ -2,7 +2,7 @@
 
 Work of the load, less friction, less the static strain energy of the slip, is radiated: never
 negative, and steady once everything rests.
-Run: python examples/validation_energy.py [folder for the figure]
+Run: python validation/energy.py [folder for the figure]
 """
 
 from __future__ import annotations

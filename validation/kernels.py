@@ -1,7 +1,7 @@
 """Validation: the elastodynamic memory kernel and its short sums of exponentials.
 
 Prints the pairs needed at each tolerance and Poisson's ratio, and draws kernel and errors.
-Run: python examples/validation_kernels.py [folder for the figure]
+Run: python validation/kernels.py [folder for the figure]
 """
 
 from __future__ import annotations

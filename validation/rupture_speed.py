@@ -3,7 +3,7 @@
 Uniform interface, a weak patch that breaks at once. For weak driving the speed tends to the
 Rayleigh speed from below; for strong driving the rupture becomes supershear (Burridge 1973,
 Andrews 1976: in an unbounded medium below S of about 1.77).
-Run: python examples/validation_rupture_speed.py [folder for the figure]
+Run: python validation/rupture_speed.py [folder for the figure]
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The same continuous strength, sampled by ever more nodes, against the finest grid: slip when the
 mean stress has fallen by 5 % of the mean of tau_p - tau_r after its peak, and critical stress.
-Run: python examples/validation_grid.py
+Run: python validation/grid.py
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Validation: a wave of slip released on a frictionless interface, against its Laplace solution.
 
 Slip a_0 cos(kx), held in equilibrium and let go: a = a_0 (1 - D0/D)/s in Laplace space.
-Run: python examples/validation_waves.py [folder for the figure]
+Run: python validation/waves.py [folder for the figure]
 """
 
 from __future__ import annotations

@@ -1,0 +1,75 @@
+# What editors see: the names of the lazy table in __init__.py, imported for real.
+# A test keeps the two equal.
+
+from stiction.criterion.method import LocalCriterion as LocalCriterion
+from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
+from stiction.dynamics.method import Rupture as Rupture
+from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
+from stiction.dynamics.stream import open_rupture as open_rupture
+from stiction.ensemble.distributed import Cluster as Cluster
+from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
+from stiction.ensemble.trouble import RunError as RunError
+from stiction.equilibrium.events import equilibrium_events as equilibrium_events
+from stiction.equilibrium.method import Equilibrium as Equilibrium
+from stiction.equilibrium.path import equilibrium_path as equilibrium_path
+from stiction.errors import (
+    AccuracyWarning as AccuracyWarning,
+)
+from stiction.errors import (
+    InputError as InputError,
+)
+from stiction.evaluation import onset as onset
+from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
+from stiction.friction.linear import SlipWeakening as SlipWeakening
+from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
+from stiction.interface import Interface as Interface
+from stiction.load import Load as Load
+from stiction.problem import Problem as Problem
+from stiction.random.marginals import Beta as Beta
+from stiction.random.random_field import RandomField as RandomField
+from stiction.random.random_interface import RandomInterface as RandomInterface
+from stiction.random.spectra import (
+    CustomSpectrum as CustomSpectrum,
+)
+from stiction.random.spectra import (
+    ExponentialSpectrum as ExponentialSpectrum,
+)
+from stiction.random.spectra import (
+    PowerLawSpectrum as PowerLawSpectrum,
+)
+from stiction.random.spectra import (
+    SquaredExponentialSpectrum as SquaredExponentialSpectrum,
+)
+from stiction.reliability.curve import failure_curve as failure_curve
+from stiction.reliability.design import (
+    DesignStress as DesignStress,
+)
+from stiction.reliability.design import (
+    design_stress as design_stress,
+)
+from stiction.reliability.estimate import failure_probability as failure_probability
+from stiction.reliability.result import FailureProbability as FailureProbability
+from stiction.solid import Solid as Solid
+from stiction.statistics.densities import density as density
+from stiction.statistics.moments import (
+    nucleation_limits as nucleation_limits,
+)
+from stiction.statistics.moments import (
+    nucleation_statistics as nucleation_statistics,
+)
+from stiction.statistics.quantiles import quantiles as quantiles
+from stiction.statistics.rice import rice_distribution as rice_distribution
+from stiction.stored_run import (
+    StoredRun as StoredRun,
+)
+from stiction.stored_run import (
+    open_run as open_run,
+)
+from stiction.study.study import (
+    Ensemble as Ensemble,
+)
+from stiction.study.study import (
+    Study as Study,
+)
+
+__version__: str

@@ -1,0 +1,36 @@
+"""Friction laws: how strength falls with slip.
+
+`law.py` says what a law is, `kernels.py` how compiled kernels evaluate one; each law is a file. To
+add one, write a class like those here and add it to `Friction`; in Python, an object of any class
+that derives from `FrictionLaw` serves.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Tag
+
+from stiction._model import describe
+from stiction.friction.exponential import ExponentialWeakening
+from stiction.friction.law import FrictionLaw
+from stiction.friction.linear import SlipWeakening
+from stiction.friction.piecewise import PiecewiseWeakening
+
+
+def _tag(value: Any) -> str:
+    if isinstance(value, dict):
+        return str(value.get("type", "linear"))
+    if isinstance(value, SlipWeakening | ExponentialWeakening | PiecewiseWeakening):
+        return value.type
+    return "own" if isinstance(value, FrictionLaw) else describe(value)
+
+
+Friction: TypeAlias = Annotated[
+    Annotated[SlipWeakening, Tag("linear")]
+    | Annotated[ExponentialWeakening, Tag("exponential")]
+    | Annotated[PiecewiseWeakening, Tag("piecewise")]
+    | Annotated[FrictionLaw, Tag("own")],
+    Discriminator(_tag),
+]
+"""Any friction law; in a study file ``type`` says which, linear if left out."""

@@ -1,0 +1,88 @@
+"""Linear slip weakening."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from stiction._jit import jit
+from stiction._model import model
+from stiction._typing import Array
+from stiction.friction.kernels import register
+from stiction.friction.law import FrictionLaw
+
+
+class Linear(NamedTuple):
+    """The linear law needs no numbers but those of the sample."""
+
+
+@jit
+def _strength(law: Linear, peak: float, residual: float, rate: float, slip: float) -> float:
+    return max(peak - rate * slip, residual)
+
+
+@jit
+def _slope(law: Linear, peak: float, residual: float, rate: float, slip: float) -> float:
+    return rate if peak - rate * slip > residual else 0.0
+
+
+register(Linear, _strength, _slope)
+
+
+@model
+class SlipWeakening(FrictionLaw):
+    """Strength that falls linearly with slip: max(tau_p - W d, tau_r).
+
+    Parameters
+    ----------
+    weakening_rate : float or (nodes,) array, optional
+        W, Pa/m, positive. Give one of this, `critical_slip` and `fracture_energy`.
+    critical_slip : float or (nodes,) array, optional
+        d_c, m, positive: then W = (tau_p - tau_r)/d_c varies with the strength.
+    residual_strength : float or (nodes,) array
+        tau_r, Pa, not negative.
+    fracture_energy : float or (nodes,) array, optional
+        Gamma, J/m², positive: then W = (tau_p - tau_r)²/(2 Gamma) varies with the strength.
+    residual_ratio : float or (nodes,) array, optional
+        tau_r/tau_p in [0, 1), instead of `residual_strength`.
+
+    Raises
+    ------
+    InputError
+        If none or several of W, d_c and Gamma are given, or a value is out of range.
+
+    Notes
+    -----
+    Linear slip weakening after Ida (1972) and Palmer and Rice (1973). The fracture energy is
+    Gamma = (tau_p - tau_r)²/(2 W).
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.SlipWeakening(critical_slip=2e-6, residual_strength=0.4e6).scale
+    ('critical_slip', 2e-06)
+    """
+
+    type: Literal["linear"] = "linear"
+
+    linear: ClassVar[bool] = True
+
+    @property
+    def initial_slope(self) -> float:
+        """-f'(0) = 1."""
+        return 1.0
+
+    @property
+    def integral(self) -> float:
+        """Integral of f: 1/2."""
+        return 0.5
+
+    def fraction(self, u: Any) -> Array:
+        """f(u) = max(1 - u, 0)."""
+        return np.maximum(1.0 - np.asarray(u, dtype=np.float64), 0.0)
+
+    @property
+    def parameters(self) -> Linear:
+        """For kernels."""
+        return Linear()

@@ -1,0 +1,327 @@
+"""The random interface: everything that is random along it, and how it is correlated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, PlainSerializer, model_validator
+
+from stiction._model import describe, model
+from stiction._typing import Array
+from stiction.errors import InputError, unknown_name
+from stiction.friction.law import SCALES
+from stiction.interface import Interface
+from stiction.random.draws import standard_normal
+from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.sample import PROFILES
+
+NAMES = tuple(PROFILES)
+DEFINITE = 1e-12
+"""Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
+
+
+def _pairs(value: Any) -> Any:
+    """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
+    if not isinstance(value, Mapping):
+        raise InputError(
+            "must map pairs of names to numbers, such as"
+            f' {{("strength", "residual_strength"): 0.8}}, got {describe(value)}'
+        )
+    flat: dict[tuple[Any, Any], Any] = {}
+    for key, inner in value.items():
+        if isinstance(inner, Mapping):
+            flat |= {(key, other): rho for other, rho in inner.items()}
+        elif isinstance(key, tuple) and len(key) == 2:
+            flat[key] = inner
+        else:
+            raise InputError(f"must name a pair of properties, got {describe(key)}")
+    found: dict[str, dict[str, float]] = {}
+    problems = []
+    for (one, other), rho in flat.items():
+        for name in (one, other):
+            if name not in NAMES:
+                problems.append(unknown_name("correlation", str(name), NAMES))
+        number = isinstance(rho, int | float | np.number) and not isinstance(rho, bool)
+        if not number or not -1.0 <= rho <= 1.0:
+            problems.append(f"{one}, {other}: must be a number in [-1, 1], got {describe(rho)}")
+        if one == other:
+            problems.append(f"{one}, {other}: a property is not correlated with itself")
+        if not problems:
+            first, second = sorted((one, other), key=NAMES.index)
+            known = found.setdefault(first, {}).setdefault(second, float(rho))
+            if known != rho:
+                problems.append(f"{one}, {other}: given twice, as {known:g} and {rho:g}")
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+Correlation = Annotated[
+    dict[str, dict[str, float]], BeforeValidator(_pairs), PlainSerializer(lambda value: value)
+]
+
+
+def nearest_correlation(matrix: Array) -> Array:
+    """The correlation matrix nearest to a symmetric one with unit diagonal.
+
+    Alternating projections with Dykstra's correction (Higham, 2002), in the Frobenius norm.
+    """
+    correction = np.zeros_like(matrix)
+    result = matrix.copy()
+    for _ in range(500):
+        shifted = result - correction
+        values, vectors = np.linalg.eigh(shifted)
+        positive: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        correction = positive - shifted
+        before, result = result, positive.copy()
+        np.fill_diagonal(result, 1.0)
+        if np.abs(result - before).max() < 1e-12:
+            break
+    return result
+
+
+def lower_factor(matrix: Array) -> Array:
+    """L with L L^T = matrix, lower triangular, of a matrix that may be singular."""
+    size = matrix.shape[0]
+    factor = np.zeros_like(matrix)
+    for j in range(size):
+        pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
+        if pivot <= DEFINITE:
+            continue  # property j follows from those before it
+        factor[j, j] = np.sqrt(pivot)
+        factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / factor[
+            j, j
+        ]
+    return factor
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the draws of each property stand in the vector of all draws.
+
+    Attributes
+    ----------
+    names : tuple of str
+    starts : tuple of int
+        First entry of each property.
+    modes : tuple of int
+        Modes drawn for each: those of the property with most modes that it is correlated with.
+    mean_mode : tuple of bool
+        Whether the mean mode is drawn.
+    dimension : int
+        Length of the vector.
+    """
+
+    names: tuple[str, ...]
+    starts: tuple[int, ...]
+    modes: tuple[int, ...]
+    mean_mode: tuple[bool, ...]
+    dimension: int
+
+
+@model(kw_only=True)
+class RandomInterface:
+    """What is random along an interface: the strength, and whatever else varies.
+
+    Parameters
+    ----------
+    strength : RandomField
+        Peak strength, Pa.
+    residual_strength, initial_stress, normal_pressure : RandomField, optional
+        Pa.
+    weakening_rate, critical_slip, fracture_energy : RandomField, optional
+        At most one of them: Pa/m, m or J/m².
+    correlation : mapping, optional
+        Correlation coefficients of the Gaussian fields of two properties, mode by mode:
+        ``{("strength", "residual_strength"): 0.8}``, in a study file
+        ``correlation.strength.residual_strength = 0.8``. Pairs that are not named are independent.
+        With 1 and the same spectrum one field is a function of the other.
+
+    Raises
+    ------
+    InputError
+        If two properties say the same, a correlated one is not given, or the correlations
+        contradict each other; the nearest ones that do not are named.
+
+    Notes
+    -----
+    Correlated translation fields after Grigoriu (1995): the draws of a property are a combination,
+    by the Cholesky factor of the correlation matrix, of independent draws of its own and of the
+    properties before it. So what is drawn for one does not depend on those that come after it in
+    the list above, and a property that is correlated with none keeps its draws whatever else is
+    random. Where spectra differ, so do the weights of the modes, and the correlation of the fields
+    at a point is a little less than that of the modes.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256, residual_strength=0.3e6)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> residual = st.RandomField(st.Beta(2.0, 2.0, low=0.2e6, high=0.4e6), strength.spectrum)
+    >>> random = st.RandomInterface(
+    ...     strength=strength,
+    ...     residual_strength=residual,
+    ...     correlation={("strength", "residual_strength"): 0.8},
+    ... )
+    >>> sorted(random.profiles(problem.interface, samples=2, seed=1))
+    ['residual_strength', 'strength']
+    """
+
+    strength: RandomField
+    residual_strength: RandomField | None = None
+    initial_stress: RandomField | None = None
+    weakening_rate: RandomField | None = None
+    critical_slip: RandomField | None = None
+    fracture_energy: RandomField | None = None
+    normal_pressure: RandomField | None = None
+    correlation: Correlation | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RandomInterface:
+        problems = []
+        scales = [name for name in SCALES if getattr(self, name) is not None]
+        if len(scales) > 1:
+            problems.append(f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+        for one, others in (self.correlation or {}).items():
+            for name in (one, *others):
+                if getattr(self, name) is None:
+                    problems.append(f"correlation: {name!r} is correlated but not random here")
+        if not problems:
+            matrix = self.matrix
+            if np.linalg.eigvalsh(matrix)[0] < -DEFINITE:
+                nearest = nearest_correlation(matrix)
+                pairs = ", ".join(
+                    f"{one}/{other} = {nearest[i, j]:.4g}"
+                    for i, one in enumerate(self.names)
+                    for j, other in enumerate(self.names)
+                    if i < j and matrix[i, j] != 0.0
+                )
+                problems.append(
+                    "correlation: these coefficients contradict each other (their matrix is not"
+                    f" positive definite); the nearest that do not are {pairs}"
+                )
+        if problems:
+            raise InputError(problems)
+        return self
+
+    @cached_property
+    def properties(self) -> dict[str, RandomField]:
+        """What is random, by name, in the order of `stiction.sample.PROFILES`."""
+        return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of what is random."""
+        return tuple(self.properties)
+
+    @property
+    def matrix(self) -> Array:
+        """Correlation matrix of the properties, in the order of `names`."""
+        names = self.names
+        matrix = np.eye(len(names))
+        for one, others in (self.correlation or {}).items():
+            for other, rho in others.items():
+                i, j = names.index(one), names.index(other)
+                matrix[i, j] = matrix[j, i] = rho
+        return matrix
+
+    def layout(self, interface: Interface) -> Layout:
+        """How many draws a sample takes and where they stand."""
+        return _layout(self, interface)
+
+    def dimension(self, interface: Interface) -> int:
+        """Number of standard normal draws a sample."""
+        return self.layout(interface).dimension
+
+    def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
+        """Independent standard normal draws of samples first .. first + samples - 1.
+
+        Draw j of a property of sample i depends on (seed, property, i, j) only.
+
+        Returns
+        -------
+        (samples, dimension) array
+            Those of each property side by side, in the order of `names`.
+        """
+        layout = self.layout(interface)
+        parts = [
+            standard_normal(
+                seed, samples, modes, first=first, stream=NAMES.index(name), mean_mode=mean
+            )
+            for name, modes, mean in zip(layout.names, layout.modes, layout.mean_mode, strict=True)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+
+    def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
+        """The map from draws (samples, dimension) to profiles by name, (samples, *shape) each."""
+        layout = self.layout(interface)
+        ends = (*layout.starts[1:], layout.dimension)
+        own = [draws[:, a:b] for a, b in zip(layout.starts, ends, strict=True)]
+        factor = lower_factor(self.matrix) if self.correlation else None
+        found = {}
+        for i, (name, field) in enumerate(self.properties.items()):
+            mixed = own[i]
+            if factor is not None and factor[i, i] != 1.0:
+                mixed = sum((factor[i, j] * own[j] for j in np.flatnonzero(factor[i])), 0.0 * mixed)
+            if layout.mean_mode[i] and not field.mean_mode:
+                mixed = mixed[:, 1:]
+            dimension = field.modes(interface).dimension
+            found[name] = field.profiles(interface, np.ascontiguousarray(mixed[:, :dimension]))
+        return found
+
+    def profiles(
+        self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
+    ) -> dict[str, Array]:
+        """Sampled profiles by name, (samples, *shape) each, in the unit of each property.
+
+        Parameters
+        ----------
+        interface : Interface
+        samples, seed, first : int
+            Sample i depends on (seed, i) only.
+        """
+        return self.from_draws(interface, self.draws(interface, samples, seed, first))
+
+    def warn_if_inaccurate(self, interface: Interface) -> None:
+        """Warn of fields that the grid or the interface cannot do justice to."""
+        for field in self.properties.values():
+            warn_if_inaccurate(field, interface)
+
+
+@lru_cache(maxsize=256)
+def _layout(random: RandomInterface, interface: Interface) -> Layout:
+    names = random.names
+    own = [field.modes(interface).count for field in random.properties.values()]
+    means = [field.mean_mode for field in random.properties.values()]
+    linked = np.linalg.matrix_power(random.matrix != 0.0, max(len(names), 1))
+    modes, mean_mode, starts = [], [], [0]
+    for i in range(len(names)):
+        group = np.flatnonzero(linked[i])
+        modes.append(max(own[j] for j in group))
+        mean_mode.append(any(means[j] for j in group))
+        starts.append(starts[-1] + 2 * modes[-1] + int(mean_mode[-1]))
+    return Layout(names, tuple(starts[:-1]), tuple(modes), tuple(mean_mode), starts[-1])
+
+
+assert {field.name for field in fields(RandomInterface)} == {*NAMES, "correlation"}
+
+
+def as_random_interface(given: Any) -> RandomInterface:
+    """A `RandomInterface`, of a bare `RandomField` that of the strength alone.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if isinstance(given, RandomField):
+        return RandomInterface(strength=given)
+    if not isinstance(given, RandomInterface):
+        raise InputError(
+            f"random: must be a RandomInterface or a RandomField, got {describe(given)}"
+        )
+    return given

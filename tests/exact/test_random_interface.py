@@ -1,0 +1,153 @@
+"""Several random properties of one interface: their draws, correlation, and what they mean."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.random.random_interface import lower_factor, nearest_correlation
+
+
+@pytest.fixture
+def residual(make_strength):
+    return dataclasses.replace(
+        make_strength(1.0), marginal=st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6)
+    )
+
+
+def test_a_property_keeps_its_draws_whatever_else_is_random(problem, make_strength, residual):
+    strength = make_strength(1.0)
+    alone = st.RandomInterface(strength=strength)
+    both = st.RandomInterface(strength=strength, residual_strength=residual)
+    third = st.RandomInterface(
+        strength=strength, residual_strength=residual, initial_stress=residual,
+        correlation={("residual_strength", "initial_stress"): 0.5},
+    )  # fmt: skip
+    where = problem.interface
+    first = alone.profiles(where, samples=5, seed=3)["strength"]
+    assert np.array_equal(first, strength.sample(where, samples=5, seed=3))
+    two = both.profiles(where, samples=5, seed=3)
+    three = third.profiles(where, samples=5, seed=3)
+    assert np.array_equal(first, two["strength"])
+    assert np.array_equal(first, three["strength"])
+    assert np.array_equal(two["residual_strength"], three["residual_strength"])
+
+
+@pytest.mark.parametrize("rho", [0.8, -0.6])
+def test_correlation_of_the_gaussian_fields(problem, make_strength, residual, rho):
+    """Same spectrum: the fields z are correlated as asked, at every node."""
+    random = st.RandomInterface(
+        strength=make_strength(1.0), residual_strength=residual,
+        correlation={("residual_strength", "strength"): rho},
+    )  # fmt: skip
+    where = problem.interface
+    found = random.profiles(where, samples=4000, seed=1)
+    # Ranks of the mapped fields are those of z; of a normal pair, Spearman's rho is known.
+    ranks = [np.argsort(np.argsort(found[name][:, 7])) for name in random.names]
+    spearman = np.corrcoef(ranks)[0, 1]
+    # Sampling error of a correlation of 4,000 pairs is below 1/sqrt(4000) = 0.016.
+    assert spearman == pytest.approx(6.0 / np.pi * np.arcsin(rho / 2.0), abs=0.04)
+
+
+def test_full_correlation_makes_the_residual_proportional(problem, make_strength):
+    """One field is the other, scaled: an affine marginal and correlation 1."""
+    strength = make_strength(1.0)
+    residual = dataclasses.replace(
+        strength, marginal=st.Beta(alpha=1.5, beta=3.0, low=0.33e6, high=0.83e6)
+    )
+    random = st.RandomInterface(
+        strength=strength, residual_strength=residual,
+        correlation={("strength", "residual_strength"): 1.0},
+    )  # fmt: skip
+    found = random.profiles(problem.interface, samples=20, seed=5)
+    # The map from z to the marginal is tabulated to 1e-9.
+    assert np.allclose(found["residual_strength"], 0.5 * found["strength"], rtol=1e-8)
+
+
+def test_residual_ratio_is_the_same_thing(problem, make_strength):
+    tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=2)
+    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_ratio=0.5)
+    ratio = dataclasses.replace(problem, friction=friction)
+    own = st.onset(ratio, tau_p, method=st.Equilibrium())
+    given = {"strength": tau_p, "residual_strength": 0.5 * tau_p}
+    other = st.onset(problem, given, method=st.Equilibrium())
+    assert np.array_equal(own.critical_stress, other.critical_stress)
+
+
+def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(problem, make_strength):
+    """Two spectra of different lengths under full correlation share their draws mode by mode."""
+    short, long = make_strength(0.5), make_strength(4.0)
+    random = st.RandomInterface(
+        strength=long, residual_strength=short,
+        correlation={("strength", "residual_strength"): 1.0},
+    )  # fmt: skip
+    where = problem.interface
+    found = random.profiles(where, samples=2, seed=4)
+    expected = short.profiles(where, short.draws(where, 2, 4))
+    assert np.array_equal(found["residual_strength"], expected)
+
+
+def test_fracture_energy_and_critical_slip_as_random_properties(problem, make_strength):
+    """W follows from tau_p - tau_r and Gamma or d_c, node by node."""
+    tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
+    drop = tau_p
+    energy, slip = 0.8, 1.9e-6
+    by_energy = problem.sample({"strength": tau_p, "fracture_energy": energy})
+    assert np.allclose(by_energy.weakening_rate, drop**2 / (2.0 * energy), rtol=1e-15)
+    by_slip = problem.sample({"strength": tau_p, "critical_slip": slip})
+    assert np.allclose(by_slip.weakening_rate, drop / slip, rtol=1e-15)
+
+
+def test_contradicting_correlations_are_refused_with_the_nearest(make_strength, residual):
+    with pytest.raises(st.InputError, match=r"contradict.*nearest that do not are.*0\.6"):
+        st.RandomInterface(
+            strength=make_strength(1.0), residual_strength=residual, initial_stress=residual,
+            correlation={
+                ("strength", "residual_strength"): 0.9,
+                ("strength", "initial_stress"): 0.9,
+                ("residual_strength", "initial_stress"): -0.9,
+            },
+        )  # fmt: skip
+
+
+def test_nearest_correlation_is_one():
+    """Higham (2002), section 4: his example and his answer to the digits printed."""
+    given = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
+    nearest = nearest_correlation(given)
+    expected = [[1.0, 0.7607, 0.1573], [0.7607, 1.0, 0.7607], [0.1573, 0.7607, 1.0]]
+    assert np.allclose(nearest, expected, atol=5e-5)
+    assert np.linalg.eigvalsh(nearest)[0] > -1e-9
+
+
+def test_factor_of_a_singular_matrix():
+    matrix = np.array([[1.0, 1.0, 0.3], [1.0, 1.0, 0.3], [0.3, 0.3, 1.0]])
+    factor = lower_factor(matrix)
+    assert np.allclose(factor @ factor.T, matrix, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("correlation", "message"),
+    [
+        ({("strength", "residual"): 0.5}, "did you mean 'residual_strength'"),
+        ({("strength", "residual_strength"): 1.5}, r"must be a number in \[-1, 1\], got 1.5"),
+        ({("strength", "critical_slip"): 0.5}, "'critical_slip' is correlated but not random"),
+        ({("strength", "strength"): 0.5}, "not correlated with itself"),
+        (0.5, "must map pairs of names to numbers"),
+        (
+            {("strength", "residual_strength"): 0.5, ("residual_strength", "strength"): 0.4},
+            "given twice, as 0.5 and 0.4",
+        ),
+    ],
+)
+def test_bad_correlations(make_strength, residual, correlation, message):
+    with pytest.raises(st.InputError, match=message):
+        st.RandomInterface(
+            strength=make_strength(1.0), residual_strength=residual, correlation=correlation
+        )
+
+
+def test_two_scales_of_slip_are_refused(make_strength):
+    field = make_strength(1.0)
+    with pytest.raises(st.InputError, match="at most one of weakening_rate"):
+        st.RandomInterface(strength=field, weakening_rate=field, critical_slip=field)

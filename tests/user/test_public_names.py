@@ -1,0 +1,81 @@
+"""What a user and an editor see of the package."""
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import stiction as st
+
+STUB = Path(st.__file__).with_suffix(".pyi")
+
+
+def test_the_stub_names_what_the_package_has():
+    """Lazy table and stub are two lists of the same names, from the same modules."""
+    homes = {}
+    for node in ast.parse(STUB.read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            for name in node.names:
+                homes[name.asname] = f"{node.module}.{name.name}"
+    assert homes.keys() | {"__version__"} == set(st.__all__)
+    for name, path in homes.items():
+        module, _, attribute = path.rpartition(".")
+        value = getattr(importlib.import_module(module), attribute, None)
+        if value is None:
+            value = importlib.import_module(path)
+        assert getattr(st, name) is value
+
+
+def test_completion_lists_public_names_only():
+    assert dir(st) == sorted(st.__all__)
+    code = "import stiction as st, numpy; st.Solid; print(' '.join(dir(st)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == sorted(st.__all__)
+
+
+MISTAKES = """\
+import stiction as st
+
+solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, densty=1170.0)
+interface = st.Interface(length="0.1", nodes=1024)
+law = st.SlipWeakening(weakening_rat=5e11)
+beta = st.Beta(alpha=1.5, beta=3.0, low=0.66e6)
+method = st.Equilibrum()
+problem = st.Problem(interface, solid, law)
+result = st.monte_carlo(problem, "strength", method=st.LocalCriterion(), samples=10)
+run = st.Rupture(loading_rate="fast")
+"""
+
+
+def test_a_type_checker_finds_every_mistake(tmp_path):
+    """Each line but the first holds one mistake; the same lines put right hold none."""
+    pytest.importorskip("basedpyright")
+    import json
+
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text(MISTAKES)
+    right = tmp_path / "right.py"
+    right.write_text(
+        MISTAKES.replace("densty", "density")
+        .replace('"0.1"', "0.1")
+        .replace("weakening_rat=", "weakening_rate=")
+        .replace("low=0.66e6", "low=0.66e6, high=1.66e6")
+        .replace("Equilibrum", "Equilibrium")
+        .replace("interface, solid, law", "solid, interface, law")
+        .replace('"strength"', "st.RandomField(beta, st.PowerLawSpectrum(1e-3))")
+        .replace('"fast"', "2e7")
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "basedpyright", "--level", "error", "--outputjson", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found = json.loads(done.stdout)["generalDiagnostics"]
+    errors = [d for d in found if d["severity"] == "error"]
+    lines = {d["range"]["start"]["line"] for d in errors if d["file"].endswith("wrong.py")}
+    assert lines == {i for i, line in enumerate(MISTAKES.splitlines()) if line and i > 1}
+    assert not [d["message"] for d in errors if d["file"].endswith("right.py")]
