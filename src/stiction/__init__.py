@@ -28,6 +28,7 @@ _HOMES = {
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",
     "open_rupture": "dynamics.stream",
+    "read_profile": "profiles",
     "onset": "methods",
     "monte_carlo": "ensemble.run",
     "nucleation_statistics": "statistics.moments",
@@ -46,8 +47,10 @@ _HOMES = {
     "open_run": "runs",
     "StoredRun": "runs",
     "RunError": "ensemble.trouble",
+    "StoreError": "ensemble.trouble",
     "InputError": "errors",
     "AccuracyWarning": "errors",
+    "UnitWarning": "errors",
 }
 _MODULES = ("paper",)
 

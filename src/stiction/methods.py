@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 
 from stiction._model import describe, to_plain
 from stiction.errors import InputError
+from stiction.gaps import gather, with_gaps
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.profile_nodes import Gaps, check_gaps
 from stiction.results import FRICTION_COEFFICIENT, POSITION, SAMPLE, Variable, to_dataset
 from stiction.rows import Rows
 
@@ -97,6 +100,7 @@ def onset(
     residual_strength: Any = None,
     initial_stress: Any = None,
     weakening_rate: Any = None,
+    gaps: Gaps = "refuse",
 ) -> xr.Dataset:
     """At which load, and where, do interfaces of given strength let go?
 
@@ -104,33 +108,51 @@ def onset(
     ----------
     problem : Problem
     tau_p : (samples, nodes) or (nodes,) array
-        Peak strength, Pa.
+        Peak strength, Pa. Of a DataArray or Dataset the dimension 'x' runs along the interface,
+        its coordinate (m) decides where a value belongs, and `units` that are stated are
+        converted; see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
     residual_strength, initial_stress, weakening_rate : array, optional
         What differs between samples besides the strength, (samples, nodes) or (samples, 1), Pa or
         Pa/m; replaces the problem's own.
+    gaps : {"refuse", "fill"}
+        Whether missing values (NaN) are an error or are filled with straight lines between their
+        ends.
 
     Returns
     -------
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
-        method adds. Every variable has `units` and `long_name`.
+        method adds. Every variable has `units` and `long_name`. Of profiles with gaps that were
+        filled also `in_gap`: whether the onset lies in one.
 
     Raises
     ------
     InputError
         Naming all that does not fit.
+
+    Warns
+    -----
+    AccuracyWarning
+        If gaps are filled, or the onset lies in one.
+    UnitWarning
+        If a value is so far from what solids have that its unit is in doubt.
     """
     check_method(method)
     check_problem(problem)
+    check_gaps(gaps)
     attributes = study_attributes(problem, method)
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
+    given = {
+        "tau_p": tau_p,
+        "residual_strength": residual_strength,
+        "initial_stress": initial_stress,
+        "weakening_rate": weakening_rate,
+    }
+    given, measured = gather(problem, given, gaps)
+    rows = problem.rows(given.pop("tau_p"), **given)
+    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
     values = solve(problem, method, method.prepare(problem), rows)
-    return label(problem, method, values, np.arange(rows.count), attributes)
+    result = label(problem, method, values, np.arange(rows.count), attributes)
+    return result if measured is None else with_gaps(problem, result, measured)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.friction import SlipWeakening
 from stiction.interface import Interface
 from stiction.load import Load
+from stiction.placed import Placed
+from stiction.plausible import MOST_NODES, suspects, warn_of_length
 from stiction.rows import Rows, as_rows
 from stiction.solid import Solid
 
@@ -50,6 +53,7 @@ class Problem:
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
         nodes = self.interface.nodes
+        self._place_profiles()
         arrays = {
             "friction.weakening_rate": self.friction.weakening_rate,
             "friction.critical_slip": self.friction.critical_slip,
@@ -68,7 +72,26 @@ class Problem:
             problems += self._too_few_nodes(float(np.max(rate)))
         if problems:
             raise InputError(problems)
+        if rate is not None:
+            warn_of_length(self, self.nucleation_length_of(float(np.median(rate))))
         return self
+
+    def _place_profiles(self) -> None:
+        """Put profiles with coordinates of their own on the nodes."""
+        problems: list[str] = []
+        for part in ("friction", "load"):
+            owner, placed = getattr(self, part), {}
+            for field in dataclasses.fields(owner):
+                value = getattr(owner, field.name)
+                if isinstance(value, Placed):
+                    try:
+                        placed[field.name] = value.on(self.interface)
+                    except InputError as error:
+                        problems += [f"{part}.{field.name}: {text}" for text in error.problems]
+            if placed and not problems:  # frozen for others; validation is not over yet
+                object.__setattr__(self, part, dataclasses.replace(owner, **placed))
+        if problems:
+            raise InputError(problems)
 
     @property
     def effective_modulus(self) -> float:
@@ -96,16 +119,20 @@ class Problem:
         """h_n, m, of a uniform weakening rate in Pa/m."""
         return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
 
-    def _too_few_nodes(self, steepest_rate: float) -> list[str]:
+    def _too_few_nodes(self, steepest_rate: float, strength: float | None = None) -> list[str]:
         length = self.nucleation_length_of(steepest_rate)
         resolution = length / self.interface.spacing
         if resolution >= FEWEST_NODES:
             return []
         enough = 2.0 * np.ceil(0.5 * FEWEST_NODES * self.interface.length / max(length, 1e-300))
+        doubt = ""
+        if enough > MOST_NODES:
+            likely = suspects(self, self.interface.length / max(length, 1e-300), strength)
+            doubt = f"; so many suggest a wrong unit{', perhaps ' * bool(likely)}{likely}"
         return [
             f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
             f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough:.10g},"
-            f" got {self.interface.nodes}"
+            f" got {self.interface.nodes}{doubt}"
         ]
 
     def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
@@ -145,8 +172,10 @@ class Problem:
         problems: list[str] = []
 
         def checked(name: str, given: Any, own: Any, count: int | None) -> Any:
+            quantity = "strength" if name == "tau_p" else name
+            value = own if given is None else given
             try:
-                return as_rows(name, own if given is None else given, nodes, count)
+                return as_rows(name, value, quantity, self.interface, count)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
@@ -178,7 +207,7 @@ class Problem:
         if rates is None:
             with np.errstate(over="ignore"):  # too short a critical slip is refused just below
                 rates = (strength - residual) / np.asarray(self.friction.critical_slip)
-        too_few = self._too_few_nodes(float(rates.max()))
+        too_few = self._too_few_nodes(float(rates.max()), float(strength.mean()))
         if too_few:
             raise InputError(too_few)
         profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)

@@ -10,6 +10,9 @@ import numpy as np
 from stiction._model import real_array
 from stiction._typing import Array
 from stiction.errors import InputError
+from stiction.interface import Interface
+from stiction.profile_nodes import describe_gaps
+from stiction.profiles import at_nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,20 +57,26 @@ class Rows:
         return mean
 
 
-def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Array:
+def as_rows(
+    name: str, value: Any, quantity: str, interface: Interface, count: int | None = None
+) -> Array:
     """`value` as a (samples, nodes) float64 array, or an `InputError` that names it.
 
-    A single profile (nodes,) is one sample; where `count` is given, a scalar, a (nodes,) profile
-    or a (count, 1) column is broadcast to it.
+    A single profile, (nodes,) or (nodes, 1), is one sample; where `count` is given, a scalar, a
+    (nodes,) profile or a (count, 1) column is broadcast to it. Of labelled arrays the names of
+    dimensions, the coordinate x and the units decide.
     """
+    nodes = interface.nodes
     samples = "samples" if count is None else str(count)
     valid = f"({samples}, {nodes}) or ({nodes},)"
     if count is not None:
         valid += f", ({samples}, 1) or a number"
     try:
-        array = real_array(value)
+        array = real_array(at_nodes(name, value, quantity, interface).values)
     except TypeError as error:
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
+    if array.shape == (nodes, 1) and count != nodes:
+        array = array[:, 0]
     shapes: set[tuple[int, ...]] = {(nodes,)}
     if count is not None:
         shapes |= {(), (count, nodes), (count, 1)}
@@ -77,8 +86,15 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
         raise InputError(f"{name}: has no samples, shape {array.shape}")
     bad = ~np.isfinite(array)
     if bad.any():
-        where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-        raise InputError(f"{name}: must be finite; entry {where} is not")
+        missing = np.isnan(array)
+        if array.shape[-1] == nodes and missing.any():
+            where = describe_gaps(np.atleast_2d(missing), interface)
+            raise InputError(
+                f"{name}: must be finite; there {where}; st.onset(..., gaps='fill') and"
+                " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
+            )
+        entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
+        raise InputError(f"{name}: must be finite; entry {entry} is not")
     if array.ndim < 2 or array.shape[1] != nodes:
         array = np.broadcast_to(array, (count or 1, nodes))
     return array

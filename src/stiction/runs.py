@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._brief import brief
 from stiction._model import describe
 from stiction.ensemble.files import Lock, cannot_write, sync_folder
 from stiction.ensemble.gather import Gathered
@@ -69,6 +70,8 @@ class Status:
     seconds: float
     active: bool
 
+    __repr__ = brief
+
     @property
     def complete(self) -> bool:
         """Whether every sample is stored."""
@@ -104,6 +107,12 @@ class StoredRun:
             self.study = Study.from_dict(self._store.study)
         else:
             self.study = Study.from_result(self._result)
+
+    def __repr__(self) -> str:
+        ensemble = self.study.ensemble
+        points = len(self.study.plans)
+        each = f"{points} points of " if points > 1 else ""
+        return f"<StoredRun {str(self.path)!r}: {each}{ensemble.samples} samples>"
 
     def status(self) -> Status:
         """How far it is; reads every chunk to check it."""

@@ -15,7 +15,17 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
-from stiction._model import Count, Positive, _count, describe, explain, model, to_plain
+from stiction._model import (
+    Count,
+    Positive,
+    _count,
+    describe,
+    explain,
+    model,
+    names_to_keep,
+    to_plain,
+    whole,
+)
 from stiction.criterion.method import LocalCriterion
 from stiction.dynamics.method import Rupture
 from stiction.ensemble.distributed import Cluster
@@ -23,7 +33,7 @@ from stiction.ensemble.gather import GridAxis
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.run import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
 from stiction.equilibrium.method import Equilibrium
-from stiction.errors import InputError
+from stiction.errors import InputError, unknown_name
 from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
 from stiction.sweep import Point, Sweep, grid_axes, name_point, points_of, unknown_keys, with_values
@@ -35,8 +45,9 @@ Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 def _chosen(value: Any) -> Any:
     """A number of samples stands for the first ones."""
-    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
-        return tuple(range(value))
+    count = whole(value)
+    if count is not None and count > 0:
+        return tuple(range(count))
     if not isinstance(value, list | tuple):
         raise InputError(
             "must be a list of sample numbers, or how many of the first samples to keep;"
@@ -57,7 +68,7 @@ class Ensemble:
         Not negative.
     first : int
         Number of the first sample.
-    keep : tuple of str
+    keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
     keep_samples : tuple of int or int, optional
@@ -69,7 +80,7 @@ class Ensemble:
     samples: Count
     seed: Number = 0
     first: Number = 0
-    keep: tuple[str, ...] = ()
+    keep: Annotated[tuple[str, ...], BeforeValidator(names_to_keep)] = ()
     keep_samples: Annotated[tuple[Number, ...], BeforeValidator(_chosen)] | None = None
     keep_limit: Positive | None = None
 
@@ -280,14 +291,7 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        path = Path(path)
-        try:
-            given = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read: {error}") from None
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{path}: is not valid TOML: {error}") from None
-        return cls.from_dict(given, folder=path.parent)
+        return cls.from_dict(_read_toml(Path(path)), folder=Path(path).parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -295,6 +299,45 @@ class Study:
         if "study" not in result.attrs:
             raise InputError(f"result: has no attribute 'study': {describe(type(result))}")
         return cls.from_dict(json.loads(result.attrs["study"]))
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def read_setup(path: Path) -> tuple[Problem, Any]:
+    """The problem of a study file and its method or None; whatever else it holds is not needed.
+
+    Of a sweep, the first values.
+    """
+    given, folder = _read_toml(path), path.parent
+    problems = [
+        unknown_name("study", name, Study.__dataclass_fields__)
+        for name in given
+        if name not in Study.__dataclass_fields__
+    ]
+    sweep, _ = _read_sweep(given, folder)
+    given = _completed(given, sweep)
+    if "problem" not in given:
+        problems.append("problem: missing")
+    found: dict[str, Any] = {}
+    for name, kind in (("problem", Problem), ("method", AnyMethod)):
+        if name not in given:
+            continue
+        try:
+            found[name] = pydantic.TypeAdapter(kind).validate_python(
+                given[name], context={"folder": folder}
+            )
+        except pydantic.ValidationError as error:
+            problems += explain(error, Study, prefix=(name,))
+    if problems:
+        raise InputError(problems)
+    return found["problem"], found.get("method")
 
 
 def _at_points(text: str, points: list[Point]) -> str:

@@ -9,6 +9,15 @@ import typer
 
 from stiction._progress import status_line
 from stiction.cli.common import StudyFile, writable_folder
+from stiction.cli.profile import (
+    FillGaps,
+    Interpolate,
+    Unit,
+    ValueName,
+    XName,
+    XUnit,
+    profile_of,
+)
 
 
 def rupture(
@@ -21,7 +30,8 @@ def rupture(
         Path | None,
         typer.Option(
             metavar="PROFILE",
-            help="Peak strength, Pa, instead of a sample: .npy, .csv or NetCDF.",
+            help="Peak strength instead of a sample, as of `stiction onset`; the study then needs"
+            " a problem only.",
             show_default=False,
         ),
     ] = None,
@@ -30,6 +40,12 @@ def rupture(
     ] = 2e7,
     film: Annotated[bool, typer.Option("--film", help="Also a film, rupture.gif.")] = False,
     every: Annotated[int, typer.Option(help="Explicit steps between frames kept.")] = 5,
+    unit: Unit = None,
+    x_unit: XUnit = None,
+    value: ValueName = None,
+    x: XName = None,
+    interpolate: Interpolate = False,
+    fill_gaps: FillGaps = False,
 ) -> None:
     """Simulate one interface from its first slip to global sliding.
 
@@ -40,23 +56,30 @@ def rupture(
     """
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
-    from stiction.profile_file import read_profile
     from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
-    from stiction.study import Study
+    from stiction.study import Study, read_setup
 
     writable_folder(out)
-    loaded = Study.from_toml(study)
-    plan = loaded.plans[0]
-    problem, method = plan.problem, plan.method
-    if not isinstance(method, Rupture):
-        method = Rupture(loading_rate=loading_rate)
     extras: dict[str, Any] = {}
     if strength is None:
-        profiles = plan.profiles(sample, 1)
-        tau_p = profiles.pop("strength")
-        extras = profiles
+        plan = Study.from_toml(study).plans[0]
+        problem, method = plan.problem, plan.method
+        extras = plan.profiles(sample, 1)
+        tau_p = extras.pop("strength")
     else:
-        tau_p = read_profile(strength, problem.interface)
+        problem, method = read_setup(study)
+        tau_p = profile_of(
+            strength,
+            problem,
+            unit=unit,
+            x_unit=x_unit,
+            value=value,
+            x=x,
+            interpolate=interpolate,
+            fill_gaps=fill_gaps,
+        )
+    if not isinstance(method, Rupture):
+        method = Rupture(loading_rate=loading_rate)
     with status_line("rupture") as say:
         result = simulate_rupture(
             problem,

@@ -32,7 +32,9 @@ from stiction.dynamics.method import (
 from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.errors import InputError, warn_accuracy
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.profiles import at_nodes
 from stiction.results import Variable
 
 Stop = Literal["sliding", "onset", "arrest", "time"]
@@ -241,6 +243,7 @@ def simulate_rupture(
     )
     if rows.count != 1:
         raise InputError(f"tau_p: one profile at a time, got {rows.count}")
+    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
@@ -252,6 +255,8 @@ def simulate_rupture(
     if end_time is not None:
         run.control[track.END_TIME] = end_time
     if restart is None:
+        if initial_slip is not None:
+            initial_slip = at_nodes("initial_slip", initial_slip, "slip", problem.interface).values
         state = _initial(run, initial_slip, initial_load)
     else:
         state = read_checkpoint(restart, run)

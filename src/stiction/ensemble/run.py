@@ -8,18 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from stiction._model import describe, to_plain
+from stiction._model import describe, names_to_keep, to_plain, whole
 from stiction._progress import progress_bar
 from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
-from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.methods import Method, check_method, variables_of
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 
 KEEP_LIMIT = 2.0**30
@@ -50,15 +50,16 @@ def make_plan(
                 field.modes(problem.interface)
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    number = whole(seed)
+    if number is None or number < 0:
         problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
     random = tuple((name, field) for name, field in fields.items() if field is not None)
     if isinstance(problem, Problem):
         method, mistakes = _keep_of_method(problem, method, keep, {name for name, _ in random})
         problems += mistakes
-    if problems:
+    if problems or number is None:
         raise InputError(problems)
-    return Plan(problem, strength, method, int(seed), random, keep, keep_samples)
+    return Plan(problem, strength, method, number, random, keep, keep_samples)
 
 
 def _keep_of_method(
@@ -94,22 +95,24 @@ def _wide(method: Any, name: str) -> bool:
     return name in method.variables and len(method.variables[name].dims) > 1
 
 
-def check_count(name: str, value: Any, smallest: int) -> None:
-    """Refuse what is not a whole number of at least `smallest`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
+def check_count(name: str, value: Any, smallest: int) -> int:
+    """`value` as an int (1e4 too), if it is a whole number of at least `smallest`."""
+    count = whole(value)
+    if count is None or count < smallest:
         raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
+    return count
 
 
-def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> None:
-    """Refuse arguments of a run that make no sense, before any work is done."""
-    check_count("samples", samples, 1)
-    check_count("first", first, 0)
+def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> tuple[int, int, int | None]:
+    """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
+    samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
     if workers is not None:
-        check_count("workers", workers, 1)
+        workers = check_count("workers", workers, 1)
     if executor is not None and not hasattr(executor, "submit"):
         raise InputError(
             f"executor: must be a concurrent.futures executor, got {describe(executor)}"
         )
+    return samples, first, workers
 
 
 def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
@@ -131,7 +134,7 @@ def check_size(needed: float, limit: float) -> None:
 
 
 def warn_of_fields(plans: Sequence[Plan]) -> None:
-    """Warn of fields that the grid or the interface cannot do justice to, once each."""
+    """Warn of fields that do not go with the grid, the interface or their units, once each."""
     found = [
         (field, plan.problem.interface)
         for plan in plans
@@ -142,8 +145,10 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
         warnings.simplefilter("always")
         for field, interface in pairs:
             warn_if_inaccurate(field, interface)
+        for problem, strength in dict.fromkeys((plan.problem, plan.strength) for plan in plans):
+            warn_of_units(problem, strength.mean)
     for warning in caught[:FEW]:
-        warn_accuracy(str(warning.message))
+        warn_user(str(warning.message), warning.category)
     if len(caught) > FEW:
         more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
         warn_accuracy(more)
@@ -180,7 +185,7 @@ def run_plans(
     progress: bool | Callable[[int, int], None] = False,
 ) -> xr.Dataset:
     """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
-    check_run(samples, first, workers, executor)
+    samples, first, workers = check_run(samples, first, workers, executor)
     warn_of_fields(plans)
     workers = usable_cores() if workers is None else workers
     gathered = Gathered(plans, samples, first)
@@ -214,7 +219,7 @@ def monte_carlo(
     residual_strength: RandomField | None = None,
     initial_stress: RandomField | None = None,
     weakening_rate: RandomField | None = None,
-    keep: tuple[str, ...] = (),
+    keep: str | Sequence[str] = (),
     keep_samples: Sequence[int] | None = None,
     keep_limit: float = KEEP_LIMIT,
     workers: int | None = None,
@@ -239,7 +244,7 @@ def monte_carlo(
         Number of the first sample, to continue an ensemble.
     residual_strength, initial_stress, weakening_rate : RandomField, optional
         What is random besides the strength, Pa or Pa/m, independent of it.
-    keep : tuple of str
+    keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"sensitivity"``.
     keep_samples : sequence of int, optional
@@ -273,8 +278,8 @@ def monte_carlo(
     }
     assert fields.keys() == STREAMS.keys()
     chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, strength, method, seed, fields, tuple(keep), chosen)
-    check_run(samples, first, workers, executor)
+    plan = make_plan(problem, strength, method, seed, fields, names_to_keep(keep), chosen)
+    samples, first, workers = check_run(samples, first, workers, executor)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],

@@ -11,7 +11,7 @@ import numpy as np
 import pydantic
 from pydantic import model_validator
 
-from stiction._model import Flag, Positive, describe, model, real_array
+from stiction._model import Flag, Positive, describe, model, real_array, whole
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.fields.draws import standard_normal
@@ -123,11 +123,9 @@ class RandomField:
         (samples, dimension) array
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
-        _check_counts(samples=samples, seed=seed, first=first, stream=stream)
+        counts = _check_counts(samples=samples, seed=seed, first=first, stream=stream)
         modes = self.modes(interface).count
-        return standard_normal(
-            seed, samples, modes, first=first, stream=stream, mean_mode=self.mean_mode
-        )
+        return standard_normal(**counts, modes=modes, mean_mode=self.mean_mode)
 
     def gaussian(self, interface: Interface, draws: Array) -> Array:
         """The underlying Gaussian field z of given draws, shape (samples, nodes), unit variance."""
@@ -267,14 +265,16 @@ def _which(of: str) -> str:
     return of
 
 
-def _check_counts(**counts: Any) -> None:
+def _check_counts(**counts: Any) -> dict[str, int]:
+    numbers = {name: whole(value) for name, value in counts.items()}
     problems = [
-        f"{name}: must be a whole number >= 0, got {value!r}"
-        for name, value in counts.items()
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0
+        f"{name}: must be a whole number >= 0, got {counts[name]!r}"
+        for name, number in numbers.items()
+        if number is None or number < 0
     ]
     if problems:
         raise InputError(problems)
+    return {name: int(counts[name]) for name in numbers}
 
 
 MOST_MODES = 1 << 22

@@ -10,13 +10,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stiction._model import describe
+from stiction._model import describe, whole
 from stiction._typing import Array
 from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.run import make_plan
 from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 
 Event = Literal["critical_stress", "first_instability"]
@@ -27,9 +28,8 @@ PIECE = 16
 
 def whole_number(value: Any, least: int) -> bool:
     """Whether a value is a whole number, and not less than `least`."""
-    return (
-        isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(value >= least)
-    )
+    number = whole(value)
+    return number is not None and number >= least
 
 
 def real_number(value: Any) -> bool:
@@ -217,4 +217,5 @@ def make_limit_state(
         raise InputError(found)
     for _, field in state.fields:
         warn_if_inaccurate(field, problem.interface)
+    warn_of_units(problem, strength.mean)
     return replace(state, workers=usable_cores() if workers is None else int(workers))

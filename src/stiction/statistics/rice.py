@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._brief import brief
 from stiction._jit import jit
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
@@ -57,6 +58,8 @@ class RiceDistribution:
     relative_error: Array
     trusted: NDArray[np.bool_]
     profiles: int
+
+    __repr__ = brief
 
     def failure_probability(self, stress: Any) -> Any:
         """P(tau_cr <= stress) by interpolation, for a number or an array, Pa.
