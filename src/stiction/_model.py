@@ -38,7 +38,10 @@ def whole(value: Any) -> int | None:
     """`value` as an int if it is a whole number (1e4 too), None otherwise."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         return None
-    return int(value) if np.isfinite(value) and value == int(value) else None
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    number = float(value)
+    return int(number) if number.is_integer() else None
 
 
 def _count(value: Any) -> Any:
@@ -262,6 +265,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    bare = cls.__repr__ is object.__repr__
     wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
     validated_init = wrapped.__init__
 
@@ -278,7 +282,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
     wrapped.__init__ = init
     wrapped.__eq__ = _equal
-    if cls.__repr__ is object.__repr__:
+    if bare:
         wrapped.__repr__ = brief
     wrapped.__hash__ = _hash
     return wrapped

@@ -53,7 +53,7 @@ def warn_accuracy(message: str) -> None:
     warn_user(message, AccuracyWarning)
 
 
-def warn_user(message: str, category: type[UserWarning]) -> None:
+def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the caller's own line, outside this package."""
     level = 1
     frame = sys._getframe(1)

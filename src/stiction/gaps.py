@@ -62,9 +62,19 @@ def gather(
 
 def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Dataset:
     """A result that says where its profiles have gaps, and which onsets lie in one."""
+    position = result["critical_position"]
+    inside = _inside(problem, np.atleast_1d(position.values), measured)
+    attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
+    result[IN_GAP] = (position.dims, inside.reshape(position.shape), attributes)
+    if np.all(measured == measured[:1]):
+        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], problem.interface))
+    return result
+
+
+def _inside(problem: Problem, position: NDArray[np.float64], measured: Mask) -> Mask:
+    """Which onsets lie in a gap; warns of them, and of critical patches that reach into one."""
     nodes, spacing = problem.interface.nodes, problem.interface.spacing
-    measured = np.broadcast_to(measured, (result.sizes["sample"], nodes))
-    position = result["critical_position"].values
+    measured = np.broadcast_to(measured, (position.size, nodes))
     known = np.isfinite(position)
     place = np.where(known, position, 0.0) / spacing
     rows = np.arange(position.size)
@@ -72,14 +82,7 @@ def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Datase
     def unknown(at: Any) -> Any:
         return known & ~measured[rows, np.mod(at.astype(np.int64), nodes)]
 
-    inside = unknown(np.floor(place)) | unknown(np.ceil(place))
-    result[IN_GAP] = (
-        "sample",
-        inside,
-        {"units": "1", "long_name": "whether the onset lies in a gap of the profile"},
-    )
-    if np.all(measured == measured[:1]):
-        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], problem.interface))
+    inside: Mask = unknown(np.floor(place)) | unknown(np.ceil(place))
     rate = problem.friction.weakening_rate
     near = inside.copy()
     if rate is not None and np.ptp(rate) == 0.0:
@@ -95,7 +98,7 @@ def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Datase
                 f"{subject} at x = {position[first]:.6g} m {what} of the profile{also}: the"
                 " strength there was filled in, not measured"
             )
-    return result
+    return inside
 
 
 def listed(result: xr.Dataset) -> list[tuple[float, float]]:

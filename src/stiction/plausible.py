@@ -6,6 +6,7 @@ follows from several of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,8 @@ SLOWEST = 0.3
 """m/s; shear waves of the softest gels run at 1."""
 WEAKEST = 1e-8
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
+USUAL = 1e-3
+"""Strength over shear modulus of polymers in the laboratory; of rock a tenth of that."""
 SLIPPERIEST = 1e-4
 """Friction coefficient; structural superlubricity has 1e-4 or less."""
 ROUGHEST = 50.0
@@ -66,7 +69,7 @@ def suspects(problem: Problem, ratio: float, strength: float | None = None) -> s
         typical = float(np.median(value))
         for unit, factor in units.items():
             fits = _SANE[0] < ratio * factor**power < _SANE[1]
-            if fits and low <= typical * factor <= high:
+            if fits and low <= typical * factor <= high and 0.5 <= typical <= 1e7:
                 si = "m" if units is _LENGTHS else "Pa/m" if units is _RATES else "Pa"
                 found.append(f"{name.removeprefix('problem.')} = {typical:g} {si} in {unit}")
                 break
@@ -136,16 +139,19 @@ def _unit_of_strength(strength: float, modulus: float, pressure: float | None) -
     guesses = []
     if pressure is not None and 0.01 <= strength <= 5.0:
         guesses.append("strength is a friction coefficient (multiply it by the normal pressure)")
-    for unit, factor in {**_STRESSES, "mPa": 1e-3}.items():
+    fits = {}
+    for unit, factor in _STRESSES.items():
         value = strength * factor
         usual = pressure is None or 0.02 <= value / pressure <= 5.0
         if usual and 1e-6 <= value / modulus <= 0.03:
-            guesses.append(f"strength is in {unit}")
-            break
+            fits[unit] = abs(math.log(value / modulus / USUAL))
+    if fits:
+        guesses.append(f"strength is in {min(fits, key=lambda unit: fits[unit])}")
     if pressure is None and 0.05 <= strength <= 1.5:
         guesses.append("strength is a friction coefficient (multiply it by the normal pressure)")
     return " or ".join(guesses)
 
 
 def _warn(text: str, guess: str) -> None:
-    warn_user(text + (f"; perhaps {guess}" if guess else "; check the units"), UnitWarning)
+    advice = f"perhaps {guess}" if guess else "check the units if that is not meant"
+    warn_user(f"{text}; {advice}", UnitWarning)

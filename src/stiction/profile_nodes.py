@@ -126,7 +126,8 @@ def _without_closing_point(x: Array, values: Array, interface: Interface) -> tup
     if not np.array_equal(values[..., 0], values[..., -1], equal_nan=True):
         raise InputError(
             f"x = {x[0]:g} and {x[-1]:g} m are one place of an interface with the period"
-            f" {interface.length:g} m (interface.length), with two values; leave out one end"
+            f" {interface.length:g} m (interface.length), with two values;"
+            " leave out one end, as np.linspace(0, L, n, endpoint=False) does"
         )
     return x[:-1], values[..., :-1]
 

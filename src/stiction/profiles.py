@@ -448,8 +448,10 @@ def at_nodes(
     try:
         if is_labelled(value):
             points = labelled(value, quantity)
-            if points.x is None and points.values.shape[-1:] == (1,) and quantity != "strength":
-                return AtNodes(points.values, None)  # one value a sample
+            if points.x is None and points.values.shape[1:] == (1,):  # one value a sample
+                if quantity == "strength":
+                    raise InputError("has no dimension along the interface; call it 'x'")
+                return AtNodes(points.values, None)
             return points.on(interface, interpolate=False, gaps=gaps)
         value = _magnitude(value, UNITS[quantity])
         if gaps == "fill":

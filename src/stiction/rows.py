@@ -90,7 +90,7 @@ def as_rows(
         if array.shape[-1] == nodes and missing.any():
             where = describe_gaps(np.atleast_2d(missing), interface)
             raise InputError(
-                f"{name}: must be finite; there {where}; st.onset(..., gaps='fill') and"
+                f"{name}: must be finite: there {where}; st.onset(..., gaps='fill') and"
                 " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
             )
         entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])

@@ -326,7 +326,8 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
     if "problem" not in given:
         problems.append("problem: missing")
     found: dict[str, Any] = {}
-    for name, kind in (("problem", Problem), ("method", AnyMethod)):
+    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod}
+    for name, kind in kinds.items():
         if name not in given:
             continue
         try:

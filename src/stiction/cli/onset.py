@@ -163,7 +163,9 @@ def _print_gaps(results: dict[str, Any]) -> None:
     if not spans:
         return
     places = ", ".join(f"{a * 1e3:.4f} to {b * 1e3:.4f} mm" for a, b in spans)
-    typer.echo(f"not measured, filled with straight lines: x = {places}")
+    typer.echo(
+        f"not measured, filled with straight lines: x = {places}; a weaker place there is not seen"
+    )
     inside = [name for name, (result, _) in results.items() if _in_gap(result)]
     if inside:
         typer.echo(

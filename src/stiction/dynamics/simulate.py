@@ -32,6 +32,7 @@ from stiction.dynamics.method import (
 from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.errors import InputError, warn_accuracy
+from stiction.gaps import gather, with_gaps
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profiles import at_nodes
@@ -235,12 +236,14 @@ def simulate_rupture(
     """
     _check(dict(locals()))
     check_variables(variables)
-    rows = problem.rows(
-        tau_p,
-        residual_strength=residual_strength,
-        initial_stress=initial_stress,
-        weakening_rate=weakening_rate,
-    )
+    given = {
+        "tau_p": tau_p,
+        "residual_strength": residual_strength,
+        "initial_stress": initial_stress,
+        "weakening_rate": weakening_rate,
+    }
+    given, measured = gather(problem, given, "refuse")
+    rows = problem.rows(given.pop("tau_p"), **given)
     if rows.count != 1:
         raise InputError(f"tau_p: one profile at a time, got {rows.count}")
     warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
@@ -332,7 +335,8 @@ def simulate_rupture(
         dataset.attrs["store"] = str(stream.folder)
     else:
         dataset = chunk_dataset(frames.take(), x, attributes)
-    return _complete(dataset, problem, method, run, state)
+    result = _complete(dataset, problem, method, run, state)
+    return result if measured is None else with_gaps(problem, result, measured)
 
 
 def _quietly(action: Callable[[], None]) -> None:

@@ -113,9 +113,8 @@ def _chosen(request: Request) -> tuple[str, str, Count | None]:
     draws = state.draws(request.seed, 0, request.pilot)
     values = state(draws)
     pilot = tally(values, request.stress)
-    seen = (
-        f"{pilot.failures} failure{'s' * (pilot.failures != 1)} among {pilot.samples} plain samples"
-    )
+    plural = "s" * (pilot.failures != 1)
+    seen = f"{pilot.failures} failure{plural} among {pilot.samples} plain samples"
     if pilot.probability >= FREQUENT:
         return "plain", f"{seen}: frequent enough to count", pilot
     if usable_first_stage(state) is None:

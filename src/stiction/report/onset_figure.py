@@ -94,7 +94,7 @@ def _shade(axes: Any, problem: Problem, begin: float, end: float) -> None:
 
 
 def _remark(result: xr.Dataset) -> str:
-    return " (in a gap!)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
+    return " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
 
 
 def write_onset_figure(
