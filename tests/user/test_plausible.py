@@ -34,7 +34,7 @@ def ask(strength, **changes):
     ("call", "words"),
     [
         (lambda: problem(rho=1.17), "density = 1.17 in g/cm3"),
-        (lambda: problem(G=1.0, rho=1170.0), "shear_modulus = 1 in GPa"),
+        (lambda: st.Solid(1.0, 0.33, 1170.0), "shear_modulus = 1 in GPa"),
         (lambda: problem(G=1e3, rho=1.17e-9, W=5e5), "density = 1.17e-09 in t/mm3"),
         (lambda: problem(W=0.5e6), r"fills the interface.*weakening_rate = 500000 Pa/m in MPa/m"),
         (lambda: ask(1.0), "strength is in MPa"),
