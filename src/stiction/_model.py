@@ -79,10 +79,12 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
     In TOML also a path to a profile, or a table {file, ...} with the options of `read_profile`.
     """
-    from stiction.placed import Placed, placed_profile
+    from stiction.placed import Placed, placed_profile, quantity_of
+    from stiction.profiles import simplified
 
     if isinstance(value, Placed):
         return value
+    value = simplified(value, quantity_of(str(info.field_name)))
     if isinstance(value, str | Path | dict) or hasattr(value, "dims"):
         folder = (info.context or {}).get("folder")
         value = placed_profile(value, str(info.field_name), folder)

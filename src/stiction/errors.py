@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-_OURS = ("stiction", "pydantic")
+_OURS = ("stiction", "pydantic", "dataclasses")
 
 
 class InputError(ValueError):

@@ -71,7 +71,7 @@ def placed_profile(given: Any, field: str, folder: Any) -> Any:
     folder : path or None
         What paths are relative to; None where none are taken, outside study files.
     """
-    quantity = "load_profile" if field == "profile" else field
+    quantity = quantity_of(field)
     options: dict[str, Any] = {}
     if isinstance(given, dict):
         options = dict(given)
@@ -119,7 +119,11 @@ def _row(given: Any) -> Array:
         raise InputError("x and values must be lists of numbers") from None
 
 
+def quantity_of(field: str) -> str:
+    """What the parameter of this name holds."""
+    return "load_profile" if field == "profile" else field
+
+
 def is_profile(key: str) -> bool:
     """Whether a dotted key of a study takes a profile."""
-    name = key.rsplit(".", 1)[-1]
-    return ("load_profile" if name == "profile" else name) in UNITS
+    return quantity_of(key.rsplit(".", 1)[-1]) in UNITS

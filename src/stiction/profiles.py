@@ -332,6 +332,28 @@ def is_labelled(value: Any) -> bool:
     return hasattr(value, "dims") and hasattr(value, "coords")
 
 
+def simplified(value: Any, quantity: str) -> Any:
+    """`value` as one of the kinds that are told apart here: labelled, or plain numbers in SI.
+
+    A pandas Series over numbers that are no count is labelled; a quantity of pint or astropy and
+    a labelled number are plain.
+    """
+    try:
+        if is_labelled(value):
+            plain = not value.dims and not hasattr(value, "data_vars")
+            factor = _factor(None, _unit_of(value), quantity) if plain else 1.0
+            return _magnitude(value.data, UNITS[quantity]) * factor if plain else value
+        index = getattr(value, "index", None)
+        if (
+            hasattr(value, "to_xarray")
+            and getattr(getattr(index, "dtype", None), "kind", "") == "f"
+        ):
+            return value.to_xarray()
+    except TypeError as error:
+        raise InputError(f"must be numbers; {error}") from None
+    return _magnitude(value, UNITS[quantity])
+
+
 def labelled(
     source: Any,
     quantity: str,
@@ -446,6 +468,7 @@ def at_nodes(
     Numbers and plain arrays without gaps pass as they are, for whoever checks their shape.
     """
     try:
+        value = simplified(value, quantity)
         if is_labelled(value):
             points = labelled(value, quantity)
             if points.x is None and points.values.shape[1:] == (1,):  # one value a sample
@@ -453,7 +476,6 @@ def at_nodes(
                     raise InputError("has no dimension along the interface; call it 'x'")
                 return AtNodes(points.values, None)
             return points.on(interface, interpolate=False, gaps=gaps)
-        value = _magnitude(value, UNITS[quantity])
         if gaps == "fill":
             array = real_array(value)
             if array.shape[-1:] == (interface.nodes,) and np.isnan(array).any():

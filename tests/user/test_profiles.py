@@ -342,6 +342,13 @@ class Quantity:
 
 def test_quantities_are_converted(system, strength):
     assert found(system, Quantity(strength * 1e-6, 1e6)) == pytest.approx(found(system, strength))
+    assert st.Load(initial_stress=Quantity(0.1, 1e6)).initial_stress == pytest.approx(1e5)
+    number = xr.DataArray(0.1, attrs={"units": "MPa"})
+    rows = system.rows(strength, initial_stress=number)
+    np.testing.assert_allclose(rows.initial_stress, 1e5)
+    series = labelled(strength[::-1], system.interface.x[::-1]).to_series()
+    assert found(system, series) == found(system, strength)
+    assert found(system, series[::-1].reset_index(drop=True)) == found(system, strength)
 
 
 def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):
