@@ -281,3 +281,54 @@ def test_a_marginal_that_the_forty_terms_cannot_follow_has_correlation_one_at_ze
     )
     interface = st.Interface(length=0.1, nodes=256)
     assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)
+
+
+def _mapped(distribution, rho):
+    from stiction.fields.hermite import correlation_of_mapped, hermite_coefficients
+
+    field = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=2e-3)
+    )
+    return correlation_of_mapped(rho, hermite_coefficients(field.marginal))
+
+
+def test_correlation_of_a_heavy_lognormal():
+    """(exp(s^2 rho) - 1)/(exp(s^2) - 1): most of the variance lies beyond |z| = 5."""
+    rho, s2 = np.linspace(-1.0, 1.0, 21), 3.5**2
+    expected = np.expm1(s2 * rho) / np.expm1(s2)
+    np.testing.assert_allclose(_mapped(scipy.stats.lognorm(3.5), rho), expected, atol=1e-9)
+
+
+def test_correlation_of_a_pareto_by_double_integral():
+    """E[X1 X2] of X = Phi(-Z)^(-1/a) for correlated normals, by the trapezoidal rule."""
+    from scipy.special import log_ndtr
+
+    a, rho = 2.05, 0.5
+    z = np.linspace(-20.0, 20.0, 2001)
+    log_x = -log_ndtr(-z) / a
+    one, two = z[:, None], z[None, :]
+    exponent = -(one**2 - 2.0 * rho * one * two + two**2) / (2.0 * (1.0 - rho**2))
+    total = np.sum(np.exp(exponent + log_x[:, None] + log_x[None, :]))
+    product = total * 0.02**2 / (2.0 * np.pi * np.sqrt(1.0 - rho**2))
+    distribution = scipy.stats.pareto(a)
+    expected = (product - distribution.mean() ** 2) / distribution.var()
+    # A millionth of the variance is left to the last coefficient.
+    assert _mapped(distribution, np.array([rho]))[0] == pytest.approx(expected, abs=2e-6)
+
+
+@pytest.mark.parametrize("width", [1e2, 1.0, 1e-2])
+def test_narrow_marginals_have_the_correlation_of_wide_ones(width):
+    rho = np.linspace(-1.0, 1.0, 21)
+    wide = _mapped(scipy.stats.beta(2.0, 2.0), rho)
+    narrow = _mapped(scipy.stats.beta(2.0, 2.0, loc=1e6, scale=width), rho)
+    # Values of 1e6 have 1e-10 of round-off, that is 1e-8 of the narrowest width.
+    np.testing.assert_allclose(narrow, wide, atol=1e-7)
+
+
+@pytest.mark.parametrize("distribution", [scipy.stats.t(2.01), scipy.stats.pareto(2.01)])
+def test_tails_too_heavy_for_a_correlation_are_said(distribution):
+    field = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=0.1)
+    )
+    with pytest.warns(st.AccuracyWarning, match=r"uncertain by up to 0\.\d"):
+        field.correlation(st.Interface(length=1.0, nodes=64))

@@ -18,6 +18,7 @@ from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.fields.overlap import check_residual
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.methods import Method, check_method, variables_of
 from stiction.problem import Problem
@@ -142,10 +143,13 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
         warnings.simplefilter("always")
         for field, interface in pairs:
             warn_if_inaccurate(field, interface)
-    for warning in caught[:FEW]:
-        warn_accuracy(str(warning.message))
-    if len(caught) > FEW:
-        more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
+        for plan in plans:
+            check_residual(plan.problem, {"strength": plan.strength, **dict(plan.fields)})
+    texts = list(dict.fromkeys(str(warning.message) for warning in caught))
+    for text in texts[:FEW]:
+        warn_accuracy(text)
+    if len(texts) > FEW:
+        more = f"{len(texts) - FEW} more warnings like these, at other points of the sweep"
         warn_accuracy(more)
 
 

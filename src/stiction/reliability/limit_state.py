@@ -16,6 +16,7 @@ from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.run import make_plan
 from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
+from stiction.fields.overlap import check_residual
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.problem import Problem
 
@@ -217,4 +218,5 @@ def make_limit_state(
         raise InputError(found)
     for _, field in state.fields:
         warn_if_inaccurate(field, problem.interface)
+    check_residual(problem, dict(state.fields))
     return replace(state, workers=usable_cores() if workers is None else int(workers))
