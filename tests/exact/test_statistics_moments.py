@@ -25,7 +25,7 @@ def test_variance_is_the_double_integral(problem, make_strength, ratio):
     s, measure = np.cos(t), np.sin(t) * np.pi / 1500
     share = exact_weight().at(s) * measure
     lags = np.abs(s[:, None] - s[None, :]) * problem.nucleation_length / 2.0
-    rho = strength.spectrum.correlation(lags)
+    rho = strength.spectrum.untruncated_correlation(lags)
     c = correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
     found = nucleation_statistics(problem, strength, infinite=True)
     # The midpoint rule in the angle converges as fast as the integrand is smooth; C has a kink in

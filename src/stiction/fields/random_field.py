@@ -242,7 +242,7 @@ class RandomField:
         return coefficients
 
     def efolding_length(self, *, of: str = "strength") -> float:
-        """Distance at which the correlation falls to 1/e, m, on an infinite line.
+        """Distance at which the correlation falls to 1/e, m, truncation included, infinite line.
 
         Parameters
         ----------
@@ -344,6 +344,8 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
             f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
             f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
         )
+    if isinstance(field.spectrum, CustomSpectrum):
+        _warn_of_lines(field.spectrum, modes.count, interface)
     if field.mean_mode:
         return
     ratio = interface.length / field.spectrum.efolding_length
@@ -355,3 +357,19 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
                 f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
                 " RandomField(mean_mode=True) restores the mean's variability"
             )
+
+
+def _warn_of_lines(spectrum: CustomSpectrum, count: int, interface: Interface) -> None:
+    """Warn where the modes of an interface fall beside or upon something narrow."""
+    apart = 2.0 * math.pi / interface.length
+    if count < 1:
+        return
+    seen = apart * float(spectrum.density(apart * np.arange(1, count + 1)).sum())
+    ends = [spectrum.power_integral(k) for k in (0.5 * apart, (count + 0.5) * apart)]
+    ratio = seen / (ends[1] - ends[0]) if ends[1] > ends[0] else np.inf
+    if abs(ratio - 1.0) > 0.1:
+        warn_accuracy(
+            f"the modes of this interface, {apart:.3g} rad/m apart, carry {ratio:.3g} times the"
+            " power of the spectrum: it has lines or steps narrower than that, which a longer"
+            " interface would resolve"
+        )
