@@ -105,7 +105,7 @@ class LimitState:
         return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
 
     def _stress(self, draws: Array) -> Array:
-        # On a coarse grid the local criterion rings, up to a little below the bound.
+        # Rounding may leave a stress a hair below the bound.
         found = self.onset(self.profiles(draws))[self.event]
         result: Array = np.maximum(found, self.bounds[0])
         return result
