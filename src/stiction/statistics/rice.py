@@ -49,7 +49,7 @@ class RiceDistribution:
         its start is counted for that, and on a circle, unless it is below everywhere, once more
         for the crossing that brought it there; so P is too high by up to (1 - point_survival)/P.
         That matters where xi_0 is not short against the interface: +9 to +17 % at L/h_n = 10,
-        xi_0/L = 0.3 and 0.5 with a mean mode. Above P = 0.1, and without a mean mode, it is too
+        xi_0/L = 0.3 and 0.5 with a mean mode. Above P = 0.1 without a mean mode it is too
         low instead, by 4 to 9 % at the median: profiles of equal mean cross more evenly than
         a Poisson process does.
     profiles : int
