@@ -17,6 +17,7 @@ from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
+from stiction.fields.overlap import check_residual
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.methods import Method, check_method, variables_of
 from stiction.plausible import warn_of_units
@@ -147,10 +148,13 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
             warn_if_inaccurate(field, interface)
         for problem, strength in dict.fromkeys((plan.problem, plan.strength) for plan in plans):
             warn_of_units(problem, strength.mean)
-    for warning in caught[:FEW]:
-        warn_user(str(warning.message), warning.category)
-    if len(caught) > FEW:
-        more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
+        for plan in plans:
+            check_residual(plan.problem, {"strength": plan.strength, **dict(plan.fields)})
+    found_warnings = list(dict.fromkeys((str(w.message), w.category) for w in caught))
+    for text, category in found_warnings[:FEW]:
+        warn_user(text, category)
+    if len(found_warnings) > FEW:
+        more = f"{len(found_warnings) - FEW} more warnings like these, at other points of the sweep"
         warn_accuracy(more)
 
 

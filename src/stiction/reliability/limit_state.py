@@ -16,6 +16,7 @@ from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.run import make_plan
 from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
+from stiction.fields.overlap import check_residual
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
@@ -104,7 +105,7 @@ class LimitState:
         return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
 
     def _stress(self, draws: Array) -> Array:
-        # On a coarse grid the local criterion rings, up to a little below the bound.
+        # Rounding may leave a stress a hair below the bound.
         found = self.onset(self.profiles(draws))[self.event]
         result: Array = np.maximum(found, self.bounds[0])
         return result
@@ -218,4 +219,5 @@ def make_limit_state(
     for _, field in state.fields:
         warn_if_inaccurate(field, problem.interface)
     warn_of_units(problem, strength.mean)
+    check_residual(problem, dict(state.fields))
     return replace(state, workers=usable_cores() if workers is None else int(workers))
