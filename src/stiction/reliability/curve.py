@@ -30,7 +30,7 @@ from stiction.reliability.limit_state import (
 )
 from stiction.reliability.plain import BATCH
 from stiction.reliability.result import say
-from stiction.reliability.sampled import short_of
+from stiction.reliability.sampled import advice, ran_out, short_of
 from stiction.reliability.uncertainty import binomial_interval, lognormal_interval
 from stiction.results import Variable, to_dataset
 from stiction.statistics.rice import rice_distribution
@@ -199,15 +199,18 @@ def failure_curve(
     doubts = []
     if not tail.runs[0].complete:
         deepest = tail.probability(float(np.nextafter(tail.runs[0].levels[-1].threshold, np.inf)))
-        doubts = [f"P = {smallest:g} is not reached, the curve ends at {deepest:.2g}"]
+        doubts = [
+            f"{ran_out(state, spent)} do not reach P = {smallest:g}: the curve ends at"
+            f" {deepest:.2g}; {advice(state)}"
+        ]
     short = (
         float(tail.coefficient_of_variation(tail.quantile(deepest))) > target_cov
         or onsets.size < plain_samples
     )
     cut = meter.over and (bool(doubts) or short)
     if cut and not doubts:
-        doubts = ["the curve is less precise than asked for, or has fewer plain samples"]
-    doubts = [f"{text}: {short_of(state, spent)}" for text in doubts]
+        lacking = "the curve is less precise than asked for, or has fewer plain samples"
+        doubts = [f"{lacking}: {short_of(state, spent)}"]
     say(doubts)
     decades = max(np.log10(COMMONEST / deepest), 0.0)
     count = int(np.ceil(decades * points_per_decade)) + 1

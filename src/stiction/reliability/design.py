@@ -31,7 +31,9 @@ from stiction.reliability.sampled import (
     BRIDGE_MOST,
     SUBSET,
     SUBSET_MOST,
+    advice,
     first_size,
+    ran_out,
     short_of,
 )
 from stiction.reliability.subset import Descent, descend
@@ -254,8 +256,10 @@ def _finish(
         elif not math.isfinite(seen):
             stress, interval = math.nan, state.bounds
             place = "the method itself was not asked"
-        why = short_of(state, evaluations)
-        doubts.append(f"P = {probability:g} is not reached, {place}: {why}")
+        doubts.append(
+            f"{ran_out(state, evaluations)} do not reach P = {probability:g}: {place};"
+            f" {advice(state)}"
+        )
     return DesignStress(
         stress=stress,
         interval=interval,

@@ -72,17 +72,25 @@ def first_size(usual: int, budget: int) -> int:
 
 
 def short_of(state: LimitState, evaluations: int) -> str:
-    """Why there was no more, and what to do."""
-    if state.meter.over:
-        limit = duration(state.meter.time_limit or 0.0)
-        return f"the time limit of {limit} ended it; raise time_limit"
-    return f"{evaluations} evaluations do not suffice; raise max_evaluations"
+    """That there were too few evaluations, and what to do."""
+    return f"{ran_out(state, evaluations)} do not suffice; {advice(state)}"
 
 
-def _missed(request: Request, cov: float) -> list[str]:
+def ran_out(state: LimitState, evaluations: int) -> str:
+    """What was not enough, in words."""
+    limit = duration(state.meter.time_limit or 0.0)
+    return f"{evaluations} evaluations" + (f" in {limit}" if state.meter.over else "")
+
+
+def advice(state: LimitState) -> str:
+    """How to get more evaluations."""
+    return "raise time_limit" if state.meter.over else "raise max_evaluations"
+
+
+def _missed(request: Request, cov: float, evaluations: int) -> list[str]:
     if cov <= request.target_cov:
         return []
-    why = short_of(request.state, request.budget + request.spent)
+    why = short_of(request.state, evaluations)
     return [f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}: {why}"]
 
 
@@ -91,14 +99,14 @@ def _cut(request: Request, cov: float) -> bool:
     return request.state.meter.over and cov > request.target_cov
 
 
-def unknown(request: Request, reason: str, spent: int) -> FailureProbability:
+def unknown(request: Request, reason: str, evaluations: int) -> FailureProbability:
     """The answer where the time was over before anything could be told."""
-    text = f"nothing is known of the probability: {short_of(request.state, spent)}"
+    text = f"nothing is known of the probability: {short_of(request.state, evaluations)}"
     return FailureProbability(
         probability=math.nan,
         coefficient_of_variation=math.inf,
         interval=(0.0, 1.0),
-        evaluations=spent,
+        evaluations=evaluations,
         stress=request.stress,
         lower_bound=request.state.bounds[0],
         algorithm="none",
@@ -141,7 +149,7 @@ def counted(request: Request, count: Count, evaluations: int, reason: str) -> Fa
         failing_profiles=profiles_of(state, draws),
         diagnostics={"failures": count.failures, "samples": count.samples},
         cut_short=_cut(request, cov),
-        warnings=say(_missed(request, cov)),
+        warnings=say(_missed(request, cov, evaluations)),
     )
 
 
@@ -217,26 +225,25 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
     )
     tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
+    evaluations = request.spent + sum(run.evaluations for run in runs)
     diagnostics = subset_diagnostics(tail, stress)
     interval = lognormal_interval(probability, cov, request.confidence)
     if all(len(run.levels) == 1 for run in runs) and runs[0].complete:
         # So likely that there was nothing to go down to: the samples are independent.
         count = tally(np.concatenate([run.populations[0].values for run in runs]), stress)
         cov, interval = count.coefficient_of_variation, count.interval(request.confidence)
-    doubts = _missed(request, cov)
+    doubts = _missed(request, cov, evaluations)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
         deep = len(runs[0].levels) >= MOST_LEVELS
-        advice = "raise time_limit" if state.meter.over else "raise max_evaluations"
-        if deep:
-            advice = f"it stops after {MOST_LEVELS} levels"
+        rest = f"it stops after {MOST_LEVELS} levels" if deep else advice(state)
         reached = tail.probability(np.nextafter(lowest, math.inf))
         error = tail.coefficient_of_variation(np.nextafter(lowest, math.inf))
         interval = (0.0, lognormal_interval(reached, error, request.confidence)[1])
         doubts = [
             f"after {runs[0].evaluations} evaluations subset simulation had come down to"
             f" {lowest:.7g} Pa (P = {reached:.2g}) and not to {stress:.7g} Pa: the probability is"
-            f" below that of the last level, which is all that the interval says; {advice}"
+            f" below that of the last level, which is all that the interval says; {rest}"
         ]
     else:
         doubts += subset_doubts(tail, diagnostics)
@@ -247,7 +254,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         probability=probability,
         coefficient_of_variation=cov,
         interval=interval,
-        evaluations=request.spent + sum(run.evaluations for run in runs),
+        evaluations=evaluations,
         stress=stress,
         lower_bound=state.bounds[0],
         algorithm="subset",
@@ -291,7 +298,8 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
     )
     tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
-    doubts = _missed(request, cov)
+    evaluations = request.spent + sum(run.evaluations for run in runs)
+    doubts = _missed(request, cov, evaluations)
     interval = lognormal_interval(probability, cov, request.confidence)
     if probability == 0.0:
         descent = runs[0].descent
@@ -299,8 +307,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         interval = (0.0, reached)
         doubts = [
             "no failure was found by the exact limit state; the interval says only that it is"
-            " rarer than the last level by the local criterion: "
-            + short_of(state, request.budget + request.spent)
+            " rarer than the last level by the local criterion: " + short_of(state, evaluations)
         ]
     last = min(run.last for run in runs)
     failures = sum(int(np.sum(run.values < stress)) for run in runs)
@@ -330,7 +337,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         probability=probability,
         coefficient_of_variation=cov,
         interval=interval,
-        evaluations=request.spent + sum(run.evaluations for run in runs),
+        evaluations=evaluations,
         first_stage_evaluations=sum(run.first_stage_evaluations for run in runs),
         stress=stress,
         lower_bound=state.bounds[0],
@@ -390,7 +397,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
     total = float(sample.sum())
     share = float(sample.max()) / total if total > 0.0 else 1.0
     size_of = effective_size(sample)
-    doubts = _missed(request, cov)
+    doubts = _missed(request, cov, count)
     if cov > 0.0 and (size_of < FEWEST_WEIGHTS or share > LARGEST_SHARE):
         doubts.append(
             f"the weights are worth {size_of:.0f} equal ones only, and the largest is"
