@@ -11,12 +11,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe, to_plain
+from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.results import FRICTION_COEFFICIENT, POSITION, SAMPLE, Variable, to_dataset
 from stiction.rows import Rows
 
 Values = dict[str, NDArray[Any]]
+
+FIRST = 16
+"""Rows that `onset` solves before it knows how long one takes."""
 
 
 class Method(Protocol):
@@ -89,6 +93,21 @@ def label(
     return to_dataset(values, variables, coordinates, attributes)
 
 
+def _in_portions(problem: Problem, method: Method, rows: Rows, progress: Show) -> Values:
+    """All rows, some at a time: a row's numbers do not depend on those beside it."""
+    solver = method.prepare(problem)
+    name = getattr(method, "type", type(method).__name__)
+    parts: list[Values] = []
+    with Meter(f"onset by {name}", rows.count, progress) as meter:
+        first = min(FIRST, int(getattr(method, "chunk_size", FIRST)))
+        for some in Portions(first)(rows.count):
+            parts.append(solve(problem, method, solver, rows.part(some)))
+            meter.advance(some.stop - some.start)
+    if len(parts) == 1:
+        return parts[0]
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
 def onset(
     problem: Problem,
     tau_p: Any,
@@ -97,6 +116,7 @@ def onset(
     residual_strength: Any = None,
     initial_stress: Any = None,
     weakening_rate: Any = None,
+    progress: Show = True,
 ) -> xr.Dataset:
     """At which load, and where, do interfaces of given strength let go?
 
@@ -110,6 +130,9 @@ def onset(
     residual_strength, initial_stress, weakening_rate : array, optional
         What differs between samples besides the strength, (samples, nodes) or (samples, 1), Pa or
         Pa/m; replaces the problem's own.
+    progress : bool or callable
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
 
     Returns
     -------
@@ -132,5 +155,5 @@ def onset(
         initial_stress=initial_stress,
         weakening_rate=weakening_rate,
     )
-    values = solve(problem, method, method.prepare(problem), rows)
+    values = _in_portions(problem, method, rows, progress)
     return label(problem, method, values, np.arange(rows.count), attributes)

@@ -174,14 +174,19 @@ class StoredRun:
         return gathered.dataset(attributes, study.axes)
 
     def export(self, path: str | Path) -> None:
-        """Write `dataset` as one NetCDF file, whole or not at all.
+        """Write `dataset` as the suffix says (.nc, .csv, .parquet, .zarr), whole or not at all.
 
         Raises
         ------
+        InputError
+            If the suffix is another one, or its library is not installed.
         StoreError
             If it cannot be written.
         """
-        write_result(self.dataset(), Path(path))
+        from stiction.export import check_suffix, export
+
+        check_suffix(Path(path))
+        export(self.dataset(), path)
 
 
 def _is_active(folder: Path) -> bool:

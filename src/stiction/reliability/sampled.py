@@ -393,7 +393,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             break
         factor = min((cov / request.target_cov) ** 2, 4.0)
         wanted = 1.05 * count * factor
-        state.meter.expect(wanted - count)
+        state.meter.expect(min(count * (cov / request.target_cov) ** 2, request.budget) - count)
     total = float(sample.sum())
     share = float(sample.max()) / total if total > 0.0 else 1.0
     size_of = effective_size(sample)
