@@ -163,6 +163,8 @@ class Meter:
         """The clock starts; `stop` must follow, come what may."""
         self._begun = self._stage = time.monotonic()
         if self._show is True:
+            with _floor:
+                _live.append(self)
             self._thread = threading.Thread(target=self._watch, daemon=True)
             self._thread.start()
         return self
@@ -172,6 +174,8 @@ class Meter:
         self._ended.set()
         if self._thread is not None:
             self._thread.join()
+            with _floor:
+                _live.remove(self)
 
     def _watch(self) -> None:
         """Wait until it is worth a word, then show it until it ends; runs in a thread."""
@@ -194,17 +198,19 @@ class Meter:
 
 
 _floor = threading.Lock()
+_live: list[Meter] = []
 _speakers: list[Meter] = []
 _displays: dict[Meter, Display] = {}
 
 
 def _take_the_floor(meter: Meter) -> Display | None:
-    """A display, unless another piece of work that knows its end is telling already.
+    """A display, unless this is a part of work that knows its end.
 
     Work that does not know its end falls silent while a part of it has more to tell.
     """
     with _floor:
-        if any(speaker.total and not speaker.at_most for speaker in _speakers):
+        earlier = _live[: _live.index(meter)]
+        if any(other.total and not other.at_most for other in earlier):
             return None
         for speaker in _speakers:
             _displays[speaker].pause()
