@@ -259,9 +259,10 @@ def test_simulations_and_onsets_speak_too(hasty, system, capsys):
         st.onset(problem, profiles[150:], method=st.LocalCriterion())["critical_stress"],
     )
     capsys.readouterr()
-    st.simulate_rupture(problem, profiles[0], method=st.Rupture(loading_rate=2e7))
+    method = st.Rupture(loading_rate=2e7)
+    st.simulate_rupture(problem, profiles[0], method=method, stop="onset")
     assert "rupture: " in capsys.readouterr().err
-    st.simulate_rupture(problem, profiles[0], method=st.Rupture(loading_rate=2e7), progress=False)
+    st.simulate_rupture(problem, profiles[0], method=method, stop="onset", progress=False)
     assert "rupture: " not in capsys.readouterr().err
 
 
