@@ -41,15 +41,17 @@ def _one_interface(study: Any, path: Path) -> None:
 def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
     """Print an answer for the interface as a whole and, where it differs, for its first patch."""
     whole, first = answers["critical_stress"], answers.get("first_instability")
-    if first is None or value(first) == value(whole):
+    if first is None:
         typer.echo(str(whole))
+        return
+    if f"{value(first):.3g}" == f"{value(whole):.3g}":
+        typer.echo(f"{whole}\n  to three digits the same for the first instability")
         return
     typer.echo(f"as a whole:        {whole}")
     typer.echo(f"first instability: {first}")
     typer.echo(
-        "  first instability: the first patch runs away, whether or not it is arrested. It is never"
-        " later than letting\n  go as a whole, so its probability is the conservative one"
-        " (differences within both intervals are noise)"
+        "  the first patch runs away, arrested or not, before the interface lets go as a whole or"
+        " just then:\n  the first instability is the conservative answer"
     )
 
 
