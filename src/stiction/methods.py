@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe, to_plain
+from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps
 from stiction.plausible import warn_of_units
@@ -20,6 +21,9 @@ from stiction.results import FRICTION_COEFFICIENT, POSITION, SAMPLE, Variable, t
 from stiction.rows import Rows
 
 Values = dict[str, NDArray[Any]]
+
+FIRST = 16
+"""Rows that `onset` solves before it knows how long one takes."""
 
 
 class Method(Protocol):
@@ -92,6 +96,21 @@ def label(
     return to_dataset(values, variables, coordinates, attributes)
 
 
+def _in_portions(problem: Problem, method: Method, rows: Rows, progress: Show) -> Values:
+    """All rows, some at a time: a row's numbers do not depend on those beside it."""
+    solver = method.prepare(problem)
+    name = getattr(method, "type", type(method).__name__)
+    parts: list[Values] = []
+    with Meter(f"onset by {name}", rows.count, progress) as meter:
+        first = min(FIRST, int(getattr(method, "chunk_size", FIRST)))
+        for some in Portions(first)(rows.count):
+            parts.append(solve(problem, method, solver, rows.part(some)))
+            meter.advance(some.stop - some.start)
+    if len(parts) == 1:
+        return parts[0]
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
 def onset(
     problem: Problem,
     tau_p: Any,
@@ -101,6 +120,7 @@ def onset(
     initial_stress: Any = None,
     weakening_rate: Any = None,
     gaps: Gaps = "refuse",
+    progress: Show = True,
 ) -> xr.Dataset:
     """At which load, and where, do interfaces of given strength let go?
 
@@ -119,6 +139,9 @@ def onset(
     gaps : {"refuse", "fill"}
         Whether missing values (NaN) are an error or are filled with straight lines between their
         ends.
+    progress : bool or callable
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
 
     Returns
     -------
@@ -153,6 +176,6 @@ def onset(
     given, measured = gather(problem, given, gaps)
     rows = problem.rows(given.pop("tau_p"), **given)
     warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
-    values = solve(problem, method, method.prepare(problem), rows)
+    values = _in_portions(problem, method, rows, progress)
     result = label(problem, method, values, np.arange(rows.count), attributes)
     return result if measured is None else with_gaps(problem, result, measured)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,16 @@ class Rows:
     def nodes(self) -> int:
         """Number of nodes."""
         return int(self.strength.shape[1])
+
+    def part(self, some: slice) -> Rows:
+        """Some of the samples."""
+        return replace(
+            self,
+            strength=self.strength[some],
+            residual_strength=self.residual_strength[some],
+            weakening_rate=self.weakening_rate[some],
+            initial_stress=self.initial_stress[some],
+        )
 
     @property
     def uniform_weakening(self) -> bool:

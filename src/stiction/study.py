@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +25,7 @@ from stiction._model import (
     to_plain,
     whole,
 )
+from stiction._progress import Show
 from stiction.criterion.method import LocalCriterion
 from stiction.dynamics.method import Rupture
 from stiction.ensemble.distributed import Cluster
@@ -205,8 +205,9 @@ class Study:
         out: str | Path | None = None,
         workers: int | None = None,
         executor: Executor | None = None,
-        progress: bool | Callable[[int, int], None] = False,
+        progress: Show = True,
         retry: bool = False,
+        time_limit: float | None = None,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -216,8 +217,9 @@ class Study:
             A folder in which results are stored as they are done, or a file ending in ``.nc`` with
             such a folder beside it until it is complete. The same call goes on where a run was
             interrupted, and computes only what is new if `samples` was raised.
-        workers, executor, progress
-            See `stiction.monte_carlo`.
+        workers, executor, progress, time_limit
+            See `stiction.monte_carlo`. With `out`, what is missing when the time is over is NaN,
+            and the same call goes on.
         retry : bool
             Compute stored samples that failed again.
 
@@ -237,9 +239,16 @@ class Study:
         if out is not None:
             from stiction.runs import run_into
 
-            return run_into(
-                self, out, workers=workers, executor=executor, progress=progress, retry=retry
-            ).dataset()
+            stored = run_into(
+                self,
+                out,
+                workers=workers,
+                executor=executor,
+                progress=progress,
+                retry=retry,
+                time_limit=time_limit,
+            )
+            return stored.dataset()
         return run_plans(
             self.plans,
             self.ensemble.samples,
@@ -249,6 +258,7 @@ class Study:
             workers=workers,
             executor=executor,
             progress=progress,
+            time_limit=time_limit,
         )
 
     def to_dict(self) -> dict[str, Any]:

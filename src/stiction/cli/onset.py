@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, duration, writable
+from stiction._progress import Meter, duration
+from stiction.cli.common import StudyFile, writable
 from stiction.cli.profile import (
     FillGaps,
     Interpolate,
@@ -80,7 +81,8 @@ def onset(
     refused: list[tuple[str, str]] = []
     for one in methods:
         try:
-            results[one.type] = _ask(problem, profile, one)
+            with Meter(f"onset by {one.type}"):
+                results[one.type] = _ask(problem, profile, one)
         except InputError as error:
             refused.append((one.type, str(error)))
     _print_table(results, problem.load.normal_pressure is not None)
@@ -92,7 +94,10 @@ def onset(
     if out is not None:
         from stiction.report.onset_figure import write_onset_figure
 
-        write_onset_figure(problem, profile.values, {n: r for n, (r, _) in results.items()}, out)
+        with Meter("drawing the figure"):
+            write_onset_figure(
+                problem, profile.values, {n: r for n, (r, _) in results.items()}, out
+            )
         typer.echo(f"figure: {out}")
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._progress import status_line
+from stiction._progress import Meter
 from stiction.cli.common import StudyFile, writable_folder
 from stiction.cli.profile import (
     FillGaps,
@@ -80,18 +80,7 @@ def rupture(
         )
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
-    with status_line("rupture") as say:
-        result = simulate_rupture(
-            problem,
-            tau_p,
-            method=method,
-            every=every,
-            progress=lambda now: say(
-                f"step {now.steps}, t = {now.time:.6g} s, mean stress"
-                f" {now.mean_stress * 1e-6:.4f} MPa, {now.weakened_fraction:.0%} weakened"
-            ),
-            **extras,
-        )
+    result = simulate_rupture(problem, tau_p, method=method, every=every, **extras)
     result.to_netcdf(out / "rupture.nc")
     typer.echo(
         f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
@@ -101,10 +90,13 @@ def rupture(
         f" (c_R {problem.solid.rayleigh_wave_speed:.0f}, c_s {problem.solid.shear_wave_speed:.0f},"
         f" c_d {problem.solid.dilatational_wave_speed:.0f}); ended by: {result.attrs['stopped']}"
     )
-    for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
-        figure = draw(result, problem)
-        for ending in ("png", "pdf"):
-            figure.savefig(out / f"{name}.{ending}")
+    with Meter("drawing the figures"):
+        for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
+            figure = draw(result, problem)
+            for ending in ("png", "pdf"):
+                figure.savefig(out / f"{name}.{ending}")
     if film:
-        typer.echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+        with Meter("drawing the film"):
+            path = rupture_film(result, problem, out / "rupture.gif")
+        typer.echo(f"film: {path}")
     typer.echo(f"written to {out}")

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from stiction._model import describe, names_to_keep, to_plain, whole
-from stiction._progress import progress_bar
+from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
 from stiction.ensemble.share import Span, share_out, usable_cores
@@ -104,7 +106,9 @@ def check_count(name: str, value: Any, smallest: int) -> int:
     return count
 
 
-def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> tuple[int, int, int | None]:
+def check_run(
+    samples: Any, first: Any, workers: Any, executor: Any, time_limit: Any = None
+) -> tuple[int, int, int | None]:
     """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
     samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
     if workers is not None:
@@ -113,6 +117,9 @@ def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> tuple[in
         raise InputError(
             f"executor: must be a concurrent.futures executor, got {describe(executor)}"
         )
+    problems = check_time_limit(time_limit)
+    if problems:
+        raise InputError(problems)
     return samples, first, workers
 
 
@@ -186,24 +193,48 @@ def run_plans(
     attributes: Mapping[str, Any],
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
+    time_limit: float | None = None,
 ) -> xr.Dataset:
     """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
-    samples, first, workers = check_run(samples, first, workers, executor)
+    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
     warn_of_fields(plans)
     workers = usable_cores() if workers is None else workers
     gathered = Gathered(plans, samples, first)
     total = len(plans) * samples
-    with progress_bar(total, method_name(plans), progress) as report:
+    done = np.zeros((len(plans), samples), dtype=np.bool_)
+    with Meter(method_name(plans), total, progress, time_limit=time_limit) as meter:
         spans = [Span(point, first, samples) for point in range(len(plans))]
-        for outcome in share_out(plans, spans, executor=executor, workers=workers):
-            if outcome is None:
-                continue
-            if outcome.failures:
-                raise_failure(outcome.failures[0])
-            gathered.add(outcome)
-            report(outcome.count)
-    return gathered.dataset(attributes, axes)
+        work = share_out(plans, spans, executor=executor, workers=workers)
+        for outcome in work:
+            if outcome is not None:
+                if outcome.failures:
+                    raise_failure(outcome.failures[0])
+                gathered.add(outcome)
+                done[outcome.point, outcome.samples - first] = True
+                meter.advance(outcome.count)
+            if meter.over:
+                work.close()
+                break
+    result = gathered.dataset(attributes, axes)
+    return result if done.all() else _cut_short(result, done)
+
+
+def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
+    """What there is when the time was over: the first samples, up to one that no point has."""
+    count = int(np.argmin(np.append(done.any(axis=0), False)))
+    if not count:
+        raise TimeoutError(
+            "time_limit: not one sample was done in this time; raise time_limit, or give out= to"
+            " keep what is done and go on later"
+        )
+    result = result.isel(sample=slice(0, count))
+    if "kept_sample" in result.dims:
+        there = np.isin(result["kept_sample"].values, result["sample"].values)
+        result = result.isel(kept_sample=there)
+    text = f"{done[:, :count].sum()} of {done.size} samples were done when the time was over"
+    warn_accuracy(text)
+    return result.assign_attrs(cut_short=text)
 
 
 def method_name(plans: Sequence[Plan]) -> str:
@@ -228,7 +259,8 @@ def monte_carlo(
     keep_limit: float = KEEP_LIMIT,
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
+    time_limit: float | None = None,
 ) -> xr.Dataset:
     """Onset of many random interfaces.
 
@@ -260,7 +292,11 @@ def monte_carlo(
     executor : concurrent.futures.Executor, optional
         Anything that has `submit`: processes, a Dask client's executor, ... instead of threads.
     progress : bool or callable
-        True shows a bar on a terminal; a callable gets (done, total).
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
+    time_limit : float, optional
+        Seconds. When they are over, the result holds the samples that are done, with the
+        attribute 'cut_short'; they are the first ones, to which `first` adds the rest later.
 
     Returns
     -------
@@ -274,6 +310,13 @@ def monte_carlo(
         Naming all that does not fit; a sample that does not fit is named with its seed.
     RuntimeError
         Naming the sample and the seed, if a solver fails.
+    TimeoutError
+        If not one sample was done within `time_limit`.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the time limit was reached.
     """
     fields = {
         "residual_strength": residual_strength,
@@ -283,7 +326,7 @@ def monte_carlo(
     assert fields.keys() == STREAMS.keys()
     chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
     plan = make_plan(problem, strength, method, seed, fields, names_to_keep(keep), chosen)
-    samples, first, workers = check_run(samples, first, workers, executor)
+    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],
@@ -293,4 +336,5 @@ def monte_carlo(
         workers=workers,
         executor=executor,
         progress=progress,
+        time_limit=time_limit,
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from stiction._model import describe
+from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction.criterion.method import LocalCriterion
 from stiction.fields.random_field import RandomField
 from stiction.methods import Method
@@ -24,8 +25,17 @@ from stiction.reliability.estimate import (
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state, real_number
 from stiction.reliability.pooled import AnyTailRun, Tail, run_until_precise
-from stiction.reliability.result import say
-from stiction.reliability.sampled import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
+from stiction.reliability.result import above_bound, say
+from stiction.reliability.sampled import (
+    BRIDGE,
+    BRIDGE_MOST,
+    SUBSET,
+    SUBSET_MOST,
+    advice,
+    first_size,
+    ran_out,
+    short_of,
+)
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
@@ -58,6 +68,8 @@ class DesignStress:
     confidence : float
         Of `interval`.
     diagnostics : dict
+    cut_short : bool
+        Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the result is not to be trusted; empty if it is.
     """
@@ -73,6 +85,7 @@ class DesignStress:
     confidence: float
     first_stage_evaluations: int = 0
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
+    cut_short: bool = False
     warnings: tuple[str, ...] = ()
 
     @property
@@ -84,8 +97,9 @@ class DesignStress:
         low, high = self.interval
         return (
             f"{self.stress / 1e6:.7g} MPa ({100 * self.confidence:g} %: {low / 1e6:.7g} to"
-            f" {high / 1e6:.7g}), {self.stress_above_bound / 1e3:.4g} kPa above the bound, at"
+            f" {high / 1e6:.7g}){above_bound(self.stress, self.lower_bound)}, at"
             f" P = {self.probability:g}; {self.algorithm}, {self.evaluations} evaluations"
+            f"{', cut short' if self.cut_short else ''}"
         )
 
 
@@ -148,6 +162,7 @@ class TailRequest:
                 first=first_size(first, self.budget),
                 largest=largest,
                 max_evaluations=self.budget,
+                meter=self.state.meter,
             )
         )
 
@@ -163,6 +178,7 @@ def subset_tail(request: TailRequest) -> Tail[Descent]:
             rng=generator(request.seed, 5, number),
             samples=samples,
             probability=DEEPER * request.probability,
+            floor=state.bounds[0],
             max_evaluations=left,
         )
 
@@ -182,6 +198,7 @@ def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
             rng=generator(request.seed, 6, number),
             max_evaluations=left,
             probability=request.probability,
+            floor=state.bounds[0],
         )
 
     return request.pooled(make, BRIDGE, BRIDGE_MOST)
@@ -214,19 +231,34 @@ def _finish(
     if tail.runs[0].complete:
         stress = tail.quantile(probability)
         cov = tail.coefficient_of_variation(stress)
+        least = math.nextafter(lowest, math.inf)
+        on_it = tail.probability(least)
+        if on_it >= probability:
+            stress, cov = lowest, tail.coefficient_of_variation(least)
+            doubts.append(
+                f"{on_it:.2g} of all samples let go at the bound of {lowest:.7g} Pa, as far as the"
+                f" method can tell: the stress at P = {probability:g} is the bound itself"
+            )
         interval = stress_interval(tail, probability, cov, confidence, lowest)
         if cov > target_cov:
             doubts.append(
                 f"the coefficient of variation of the probability is {cov:.3g}, not"
-                f" {target_cov:g}: {evaluations} evaluations do not suffice; raise max_evaluations"
+                f" {target_cov:g}: {short_of(state, evaluations)}"
             )
     else:
-        asked = tail.runs[0].evaluations > 0
-        seen = tail.runs[0].extent[0] if asked else state.bounds[1]
+        # What was seen of the tail bounds the stress: below its lowest value nothing is known.
+        seen = tail.runs[0].extent[0]
         stress, cov, interval = seen, math.inf, (lowest, seen)
+        place = f"the stress lies below {seen:.7g} Pa, the lowest seen"
+        if not seen > lowest:
+            stress, interval = lowest, (lowest, state.bounds[1])
+            place = f"some samples let go at the bound of {lowest:.7g} Pa, too few to tell more"
+        elif not math.isfinite(seen):
+            stress, interval = math.nan, state.bounds
+            place = "the method itself was not asked"
         doubts.append(
-            f"{evaluations} evaluations do not reach P = {probability:g}: the stress lies below"
-            f" {seen:.7g} Pa, the lowest seen; raise max_evaluations"
+            f"{ran_out(state, evaluations)} do not reach P = {probability:g}: {place};"
+            f" {advice(state)}"
         )
     return DesignStress(
         stress=stress,
@@ -243,6 +275,7 @@ def _finish(
             "runs": len(tail.runs),
             "effective_families": 1.0 / cov**2 if cov > 0.0 else math.inf,
         },
+        cut_short=state.meter.over and cov > target_cov,
         warnings=say(doubts),
     )
 
@@ -263,6 +296,8 @@ def design_stress(
     initial_stress: RandomField | None = None,
     weakening_rate: RandomField | None = None,
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> DesignStress:
     """Below which stress does the interface let go with a given probability?
 
@@ -282,7 +317,7 @@ def design_stress(
         method itself.
     target_cov : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    seed, max_evaluations, confidence, event, workers
+    seed, max_evaluations, confidence, event, workers, time_limit, progress
         As in `failure_probability`.
     residual_strength, initial_stress, weakening_rate : RandomField, optional
         What is random besides the strength.
@@ -300,7 +335,7 @@ def design_stress(
     Warns
     -----
     AccuracyWarning
-        If the evaluations allowed do not suffice.
+        If the evaluations or the time allowed do not suffice, or the onset piles up on the bound.
     """
     fields = {
         "residual_strength": residual_strength,
@@ -308,7 +343,8 @@ def design_stress(
         "weakening_rate": weakening_rate,
     }
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_probability("probability", probability)
+    problems += check_probability("probability", probability) + check_time_limit(time_limit)
+    meter = Meter("design_stress", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
         strength,
@@ -317,22 +353,51 @@ def design_stress(
         fields,
         event,
         workers,
+        meter=meter,
         problems=problems,
         check=lambda state: (
             check_sampling(state)
             or check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
         ),
     )
-    budget, spent = budget_of(state, max_evaluations), 0
-    chosen, reason = str(algorithm), "as asked"
-    if algorithm == "auto":
-        chosen, reason, spent = _chosen(state, float(probability), int(seed), budget)
-    request = TailRequest(state, float(probability), target_cov, int(seed), budget - spent, spent)
-    if chosen == "two_level":
-        bridges = _two_level_tail(request)
-        cheap = sum(run.first_stage_evaluations for run in bridges.runs)
-        return _finish(request, bridges, confidence, chosen, reason, cheap)
-    return _finish(request, subset_tail(request), confidence, chosen, reason, 0)
+    request = TailRequest(
+        state, float(probability), target_cov, int(seed), budget_of(state, max_evaluations)
+    )
+    with meter:
+        meter.expect(request.budget, at_most=True)
+        return _sampled(request, algorithm, confidence)
+
+
+def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignStress:
+    """The answer by an algorithm, as far as there is time."""
+    chosen, reason = algorithm, "as asked"
+    try:
+        if algorithm == "auto":
+            chosen, reason, spent = _chosen(
+                request.state, request.probability, request.seed, request.budget
+            )
+            request = replace(request, budget=request.budget - spent, spent=spent)
+        if chosen == "two_level":
+            bridges = _two_level_tail(request)
+            cheap = sum(run.first_stage_evaluations for run in bridges.runs)
+            return _finish(request, bridges, confidence, chosen, reason, cheap)
+        return _finish(request, subset_tail(request), confidence, chosen, reason, 0)
+    except TimeUp as up:
+        spent = request.spent + up.spent
+        text = f"nothing is known of the stress: {short_of(request.state, spent)}"
+        return DesignStress(
+            stress=math.nan,
+            interval=request.state.bounds,
+            probability=request.probability,
+            coefficient_of_variation=math.inf,
+            evaluations=spent,
+            lower_bound=request.state.bounds[0],
+            algorithm="none",
+            reason=reason,
+            confidence=confidence,
+            cut_short=True,
+            warnings=say([text]),
+        )
 
 
 def check_sampling(state: LimitState) -> list[str]:

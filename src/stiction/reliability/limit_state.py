@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stiction._model import describe, whole
+from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
 from stiction.ensemble.plan import STREAMS
 from stiction.ensemble.run import make_plan
@@ -52,6 +54,8 @@ class LimitState:
         Which of the method's stresses.
     workers : int
         Threads. Rows do not depend on their batch, so the numbers do not depend on this.
+    meter : Meter
+        Told of every sample; says when the time is over.
     """
 
     problem: Problem
@@ -59,6 +63,11 @@ class LimitState:
     method: Any
     event: Event = "critical_stress"
     workers: int = 1
+    meter: Meter = dataclasses.field(default=SILENT, compare=False, repr=False)
+
+    @cached_property
+    def _portions(self) -> Portions:
+        return Portions(self.workers)
 
     @cached_property
     def _sizes(self) -> tuple[int, ...]:
@@ -111,8 +120,24 @@ class LimitState:
         return result
 
     def __call__(self, draws: Array) -> Array:
-        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,)."""
-        pieces = min(self.workers, max(1, draws.shape[0] // PIECE))
+        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,).
+
+        Raises
+        ------
+        TimeUp
+            With the stresses of the first draws, if the time allowed is over before the last.
+        """
+        found = np.empty(draws.shape[0])
+        for rows in self._portions(draws.shape[0]):
+            if self.meter.over:
+                raise TimeUp(found[: rows.start])
+            found[rows] = self._shared_out(draws[rows])
+            self.meter.advance(rows.stop - rows.start)
+        return found
+
+    def _shared_out(self, draws: Array) -> Array:
+        fewest = 1 if self._portions.slow else PIECE
+        pieces = min(self.workers, max(1, draws.shape[0] // fewest))
         if pieces == 1:
             return self._stress(draws)
         _ = self._solver, self.bounds  # prepared before the threads need them
@@ -184,6 +209,7 @@ def make_limit_state(
     event: str,
     workers: int | None,
     *,
+    meter: Meter = SILENT,
     problems: Sequence[str] = (),
     check: Callable[[LimitState], list[str]] | None = None,
 ) -> LimitState:
@@ -195,6 +221,8 @@ def make_limit_state(
         As in `failure_probability`.
     fields : mapping
         What else is random, by name, or None.
+    meter : Meter
+        Told of every sample; says when the time is over.
     problems : sequence of str
         What is wrong with other arguments; reported with the rest.
     check : callable, optional
@@ -220,4 +248,4 @@ def make_limit_state(
         warn_if_inaccurate(field, problem.interface)
     warn_of_units(problem, strength.mean)
     check_residual(problem, dict(state.fields))
-    return replace(state, workers=usable_cores() if workers is None else int(workers))
+    return replace(state, workers=usable_cores() if workers is None else int(workers), meter=meter)

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.stats
 import xarray as xr
 
+from stiction._progress import Meter, Show
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.fields.marginals import Beta
@@ -19,6 +20,7 @@ from stiction.interface import Interface
 from stiction.methods import Method
 from stiction.problem import Problem
 from stiction.reliability.curve import failure_curve
+from stiction.reliability.limit_state import Event
 
 CORRELATION_RATIOS = (0.25, 0.5, 1.0, 2.0)
 LONGER = 4
@@ -116,7 +118,10 @@ def tail_study(
     residual_strength: RandomField | None = None,
     initial_stress: RandomField | None = None,
     weakening_rate: RandomField | None = None,
+    event: Event = "critical_stress",
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> TailStudy:
     """Failure curves for several correlation lengths, two lengths and three lower ends.
 
@@ -127,8 +132,10 @@ def tail_study(
     strength : RandomField
         Its spectrum must have a correlation length.
     method : LocalCriterion or Equilibrium
-    smallest, target_cov, plain_samples, seed, workers
+    smallest, target_cov, plain_samples, seed, event, workers, progress
         As in `failure_curve`.
+    time_limit : float, optional
+        Seconds for each curve.
     residual_strength, initial_stress, weakening_rate : RandomField, optional
         What is random besides the strength; the same in all curves.
 
@@ -152,7 +159,10 @@ def tail_study(
         "residual_strength": residual_strength,
         "initial_stress": initial_stress,
         "weakening_rate": weakening_rate,
+        "event": event,
         "workers": workers,
+        "time_limit": time_limit,
+        "progress": progress is True,
     }
     long = longer(problem, LONGER)
 
@@ -162,17 +172,23 @@ def tail_study(
         spectrum = own_spectrum.with_correlation_length(ratio * problem.nucleation_length)
         return RandomField(strength.marginal, spectrum, strength.mean_mode)
 
-    own = failure_curve(problem, strength, **options)
     others = list(alike_marginals(strength).items())
-    ends = {others[0][0]: own}
-    for name, marginal in others[1:]:
-        ends[name] = failure_curve(
-            problem, RandomField(marginal, strength.spectrum, strength.mean_mode), **options
+    total = len(others) + len(CORRELATION_RATIOS) + 1
+    with Meter("tail_study", total, progress, unit="curves") as meter:
+
+        def curve(system: Problem, random: RandomField) -> xr.Dataset:
+            found = failure_curve(system, random, **options)
+            meter.advance()
+            return found
+
+        own = curve(problem, strength)
+        ends = {others[0][0]: own}
+        for name, marginal in others[1:]:
+            ends[name] = curve(
+                problem, RandomField(marginal, strength.spectrum, strength.mean_mode)
+            )
+        return TailStudy(
+            correlation={ratio: curve(problem, field(ratio)) for ratio in CORRELATION_RATIOS},
+            length={1: own, LONGER: curve(long, strength)},
+            lower_end=ends,
         )
-    return TailStudy(
-        correlation={
-            ratio: failure_curve(problem, field(ratio), **options) for ratio in CORRELATION_RATIOS
-        },
-        length={1: own, LONGER: failure_curve(long, strength, **options)},
-        lower_end=ends,
-    )
