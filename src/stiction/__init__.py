@@ -31,6 +31,7 @@ _HOMES = {
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",
     "open_rupture": "dynamics.stream",
+    "read_profile": "profiles",
     "onset": "evaluation",
     "monte_carlo": "ensemble.monte_carlo",
     "nucleation_statistics": "statistics.moments",
@@ -49,8 +50,10 @@ _HOMES = {
     "open_run": "stored_run",
     "StoredRun": "stored_run",
     "RunError": "ensemble.trouble",
+    "StoreError": "ensemble.trouble",
     "InputError": "errors",
     "AccuracyWarning": "errors",
+    "UnitWarning": "errors",
 }
 _MODULES = {"paper": "papers.albertini2020"}
 

@@ -8,7 +8,12 @@ from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.distributed import Cluster as Cluster
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
-from stiction.ensemble.trouble import RunError as RunError
+from stiction.ensemble.trouble import (
+    RunError as RunError,
+)
+from stiction.ensemble.trouble import (
+    StoreError as StoreError,
+)
 from stiction.equilibrium.events import equilibrium_events as equilibrium_events
 from stiction.equilibrium.method import Equilibrium as Equilibrium
 from stiction.equilibrium.path import equilibrium_path as equilibrium_path
@@ -18,6 +23,9 @@ from stiction.errors import (
 from stiction.errors import (
     InputError as InputError,
 )
+from stiction.errors import (
+    UnitWarning as UnitWarning,
+)
 from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
 from stiction.friction.linear import SlipWeakening as SlipWeakening
@@ -25,6 +33,7 @@ from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.interface import Interface as Interface
 from stiction.load import Load as Load
 from stiction.problem import Problem as Problem
+from stiction.profiles import read_profile as read_profile
 from stiction.random.marginals import Beta as Beta
 from stiction.random.random_field import RandomField as RandomField
 from stiction.random.random_interface import RandomInterface as RandomInterface

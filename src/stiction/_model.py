@@ -16,6 +16,7 @@ import pydantic_core
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
+from stiction._brief import brief
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 
@@ -34,10 +35,30 @@ def _number(value: Any) -> Any:
         raise ValueError("must be finite") from None
 
 
+def whole(value: Any) -> int | None:
+    """`value` as an int if it is a whole number (1e4 too), None otherwise."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        return None
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    number = float(value)
+    return int(number) if number.is_integer() else None
+
+
 def _count(value: Any) -> Any:
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+    count = whole(value)
+    if count is None:
         raise ValueError("must be a whole number")
-    return int(value)
+    return count
+
+
+def names_to_keep(value: Any) -> tuple[str, ...]:
+    """One name or several, as a tuple."""
+    several = isinstance(value, list | tuple | set | frozenset)
+    names = tuple(value) if several else (value,)
+    if not all(isinstance(name, str) for name in names):
+        raise InputError(f"keep: must be a name or a list of names, got {describe(value)}")
+    return names
 
 
 def real_array(value: Any) -> Array:
@@ -54,24 +75,22 @@ def real_array(value: Any) -> Array:
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
 
 
-def _read_profile(path: Path) -> Any:
-    if path.suffix not in (".npy", ".csv"):
-        raise ValueError("a profile file must end in .npy or .csv")
-    try:
-        if path.suffix == ".npy":
-            return np.load(path, allow_pickle=False)
-        return np.loadtxt(path, delimiter=",", ndmin=1)
-    except (OSError, EOFError, ValueError) as error:
-        raise ValueError(f"cannot read the file: {error}") from None
-
-
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
-    """A number, or a read-only float64 array of shape (nodes,); in TOML also a path to one."""
-    if isinstance(value, str | Path):
+    """A number, a read-only float64 array of shape (nodes,), or points that a problem will place.
+
+    In TOML also a path to a profile, or a table {file, ...} with the options of `read_profile`.
+    """
+    from stiction.placed import Placed, placed_profile, quantity_of
+    from stiction.profiles import simplified
+
+    if isinstance(value, Placed):
+        return value
+    value = simplified(value, quantity_of(str(info.field_name)))
+    if isinstance(value, str | Path | dict) or hasattr(value, "dims"):
         folder = (info.context or {}).get("folder")
-        if folder is None:
-            raise ValueError("must be a number or an array (file names belong in a study file)")
-        value = _read_profile(Path(folder) / value)
+        value = placed_profile(value, str(info.field_name), folder)
+        if isinstance(value, Placed):
+            return value
     if isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
         number = _number(value)
         if not np.isfinite(number):
@@ -81,6 +100,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         array = np.array(real_array(value))
     except TypeError as error:
         raise ValueError(f"must be a number or an array of numbers, {error}") from None
+    if array.ndim == 2 and 1 in array.shape:  # a column, as out of a table
+        array = array.reshape(-1)
     if array.ndim not in (1, 2) or array.size == 0:
         raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
     if not np.all(np.isfinite(array)):
@@ -90,6 +111,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
 
 def _plain(value: Any) -> Any:
+    if hasattr(value, "plain"):
+        return value.plain()
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
@@ -99,7 +122,8 @@ Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
 _PROFILE_SCHEMA = [
     {"type": "number"},
     {"type": "array", "items": {"type": "number"}},
-    {"type": "string", "description": "path to a .npy or .csv file"},
+    {"type": "string", "description": "path to a .npy, text or NetCDF file"},
+    {"type": "object", "description": "file, and options of read_profile: unit, x_unit, ..."},
 ]
 Profile: TypeAlias = Annotated[
     Any,
@@ -172,15 +196,20 @@ def _walk(cls: type, location: tuple[int | str, ...]) -> tuple[list[str], list[s
     return path, valid
 
 
-def explain(error: pydantic.ValidationError, cls: type, root: str = "") -> list[str]:
-    """The mistakes that pydantic found in a `cls`, one text each, with the path to the key."""
+def explain(
+    error: pydantic.ValidationError, cls: type, root: str = "", prefix: tuple[str, ...] = ()
+) -> list[str]:
+    """The mistakes that pydantic found in a `cls`, one text each, with the path to the key.
+
+    `prefix` says which part of the `cls` was validated, if not all of it.
+    """
     texts = []
     items = error.errors()
     if any(item["type"] == "unexpected_positional_argument" for item in items):
         names = [field.name for field in dataclasses.fields(cls) if field.init]
         return [f"{cls.__name__}: give its arguments by name (valid: {', '.join(names)})"]
     for item in items:
-        steps, valid = _walk(cls, item["loc"])
+        steps, valid = _walk(cls, (*prefix, *item["loc"]))
         path = ".".join([root, *steps] if root else steps)
         kind, message, given = item["type"], item["msg"], item.get("input")
         message = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
@@ -245,6 +274,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    bare = cls.__repr__ is object.__repr__
     wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
     validated_init = wrapped.__init__
 
@@ -261,6 +291,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
     wrapped.__init__ = init
     wrapped.__eq__ = _equal
+    if bare:
+        wrapped.__repr__ = brief
     wrapped.__hash__ = _hash
     return wrapped
 

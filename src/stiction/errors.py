@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_OURS = ("stiction", "pydantic", "dataclasses")
+
 
 class InputError(ValueError):
     """Everything wrong with what was given, in one message.
@@ -34,6 +36,10 @@ class AccuracyWarning(UserWarning):
     """A result is valid but less accurate than it could be; the message says by how much."""
 
 
+class UnitWarning(UserWarning):
+    """A value that no solid has: probably it is in another unit than it is taken to be."""
+
+
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
     """Text that refuses a name and offers the nearest valid one."""
     names = list(valid)
@@ -44,8 +50,14 @@ def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
 
 def warn_accuracy(message: str) -> None:
     """Issue an `AccuracyWarning` that points at the caller's own line, outside this package."""
+    warn_user(message, AccuracyWarning)
+
+
+def warn_user(message: str, category: type[Warning]) -> None:
+    """Issue a warning that points at the caller's own line, outside this package."""
     level = 1
     frame = sys._getframe(1)
-    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] == "stiction":
+    # Objects are validated by pydantic, whose frames lie between ours.
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _OURS:
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, AccuracyWarning, stacklevel=level + 1)
+    warnings.warn(message, category, stacklevel=level + 1)

@@ -14,10 +14,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe, to_plain
+from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
+from stiction.gaps import gather, with_gaps
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.profile_nodes import Gaps, check_gaps
 from stiction.results import FRICTION_COEFFICIENT, SAMPLE, Variable, coordinate, to_dataset
-from stiction.sample import Sample
+from stiction.sample import Sample, named_profiles
+
+FIRST = 16
+"""Samples that `onset` solves before it knows how long one takes."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -136,6 +143,19 @@ def solve(solver: Solver, sample: Sample) -> Values:
     return values
 
 
+def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
+    """All samples, some at a time: the numbers of one do not depend on those beside it."""
+    solver = method.prepare(problem)
+    parts: list[Values] = []
+    with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
+        for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
+            parts.append(solve(solver, sample.part(some)))
+            meter.advance(some.stop - some.start)
+    if len(parts) == 1:
+        return parts[0]
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
 def variables_of(problem: Problem, method: Method, pressure: bool = False) -> dict[str, Variable]:
     """All that `solve` returns; `pressure` says that the normal pressure differs by sample."""
     variables = dict(method.variables(problem))
@@ -162,7 +182,14 @@ def label(
     return to_dataset(values, variables, coordinates, attributes)
 
 
-def onset(problem: Problem, profiles: Any, *, method: Method) -> xr.Dataset:
+def onset(
+    problem: Problem,
+    profiles: Any,
+    *,
+    method: Method,
+    gaps: Gaps = "refuse",
+    progress: Show = True,
+) -> xr.Dataset:
     """At which load, and where, do interfaces of given strength let go?
 
     Parameters
@@ -171,21 +198,38 @@ def onset(problem: Problem, profiles: Any, *, method: Method) -> xr.Dataset:
     profiles : array, mapping of arrays, xarray.Dataset or Sample
         Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane (samples, nx,
         ny) or (nx, ny); or several profiles by name, such as ``{"strength": ...,
-        "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`.
+        "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`. Of a
+        DataArray or Dataset the dimension 'x' runs along the interface, its coordinate (m) decides
+        where a value belongs, and `units` that are stated are converted; see
+        `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
+    gaps : {"refuse", "fill"}
+        Whether missing values (NaN) are an error or are filled with straight lines between their
+        ends.
+    progress : bool or callable
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
 
     Returns
     -------
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
-        method adds. Every variable has `units` and `long_name`.
+        method adds. Every variable has `units` and `long_name`. Of profiles with gaps that were
+        filled also `in_gap`: whether the onset lies in one.
 
     Raises
     ------
     InputError
         Naming all that does not fit.
+
+    Warns
+    -----
+    AccuracyWarning
+        If gaps are filled, or the onset lies in one.
+    UnitWarning
+        If a value is so far from what solids have that its unit is in doubt.
 
     Examples
     --------
@@ -199,7 +243,13 @@ def onset(problem: Problem, profiles: Any, *, method: Method) -> xr.Dataset:
     check_method(method)
     check_problem(problem)
     check_support(problem, method)
+    check_gaps(gaps)
     attributes = study_attributes(problem, method)
+    measured = None
+    if not isinstance(profiles, Sample):
+        profiles, measured = gather(problem, named_profiles(profiles), gaps)
     sample = problem.sample(profiles)
-    values = solve(method.prepare(problem), sample)
-    return label(problem, method, values, np.arange(sample.samples), attributes)
+    warn_of_units(problem, float(sample.strength.mean()), float(sample.residual_strength.mean()))
+    values = _in_portions(problem, method, sample, progress)
+    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    return result if measured is None else with_gaps(problem, result, measured)

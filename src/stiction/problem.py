@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from stiction.friction import Friction
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.load import Load
+from stiction.placed import Placed
+from stiction.plausible import MOST_NODES, suspects, warn_of_length
 from stiction.sample import PROFILES, Sample, named_profiles, profiles_of
 from stiction.solid import Solid
 
@@ -50,6 +53,7 @@ class Problem:
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
+        self._place_profiles()
         shape = self.interface.shape
         friction, load = self.friction, self.load
         arrays = {
@@ -84,7 +88,26 @@ class Problem:
             problems += self._too_few_nodes(float(np.max(rate)))
         if problems:
             raise InputError(problems)
+        if rate is not None:
+            warn_of_length(self, self.nucleation_length_of(float(np.median(rate))))
         return self
+
+    def _place_profiles(self) -> None:
+        """Put profiles with coordinates of their own on the nodes."""
+        problems: list[str] = []
+        for part in ("friction", "load"):
+            owner, placed = getattr(self, part), {}
+            for field in dataclasses.fields(owner):
+                value = getattr(owner, field.name)
+                if isinstance(value, Placed):
+                    try:
+                        placed[field.name] = value.on(self.interface)
+                    except InputError as error:
+                        problems += [f"{part}.{field.name}: {text}" for text in error.problems]
+            if placed and not problems:  # frozen for others; validation is not over yet
+                object.__setattr__(self, part, dataclasses.replace(owner, **placed))
+        if problems:
+            raise InputError(problems)
 
     @property
     def effective_modulus(self) -> float:
@@ -136,7 +159,7 @@ class Problem:
             for modulus, spacing in zip(moduli, interface.spacings, strict=True)
         )
 
-    def _too_few_nodes(self, highest_rate: float) -> list[str]:
+    def _too_few_nodes(self, highest_rate: float, strength: float | None = None) -> list[str]:
         resolution = self.nodes_in_nucleation_length(highest_rate)
         if resolution >= FEWEST_NODES:
             return []
@@ -144,10 +167,14 @@ class Problem:
         shape = self.interface.shape
         finer = [2.0 * np.ceil(0.5 * FEWEST_NODES * n / max(resolution, 1e-300)) for n in shape]
         enough = " x ".join(f"{n:.10g}" for n in finer)
+        doubt = ""
+        if max(finer) > MOST_NODES:
+            likely = suspects(self, self.interface.lengths[0] / max(length, 1e-300), strength)
+            doubt = f"; so many suggest a wrong unit{', perhaps ' * bool(likely)}{likely}"
         return [
             f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
             f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough},"
-            f" got {' x '.join(map(str, shape))}"
+            f" got {' x '.join(map(str, shape))}{doubt}"
         ]
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
@@ -189,7 +216,7 @@ class Problem:
 
         def checked(name: str, own: Any, samples: int | None) -> Any:
             try:
-                return profiles_of(name, given.get(name, own), shape, samples)
+                return profiles_of(name, given.get(name, own), self.interface, samples)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
@@ -230,7 +257,7 @@ class Problem:
         rates = (
             value if scale == "weakening_rate" else friction.rate(strength - residual, scale, value)
         )
-        too_few = self._too_few_nodes(float(rates.max()))
+        too_few = self._too_few_nodes(float(rates.max()), float(strength.mean()))
         if too_few:
             raise InputError(too_few)
         profile = np.array(np.broadcast_to(load.profile, shape), dtype=np.float64)

@@ -10,6 +10,9 @@ import numpy as np
 from stiction._model import real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
+from stiction.interface import Interface
+from stiction.profile_nodes import describe_gaps
+from stiction.profiles import at_nodes
 from stiction.results import Variable
 
 
@@ -51,6 +54,11 @@ class Sample(NamedTuple):
         """Axes of the nodes, counted from the last."""
         return tuple(range(-self.load_profile.ndim, 0))
 
+    def part(self, some: slice) -> Sample:
+        """Some samples of the batch."""
+        own = (getattr(self, name)[some] for name in BY_SAMPLE)
+        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
+
     def one(self, number: int) -> Sample:
         """Sample `number` by itself, its arrays of shape (*shape) and contiguous."""
         own = (np.ascontiguousarray(getattr(self, name)[number]) for name in BY_SAMPLE)
@@ -86,21 +94,25 @@ PROFILES: dict[str, Variable] = {
 of random draws and never changes."""
 
 
-def profiles_of(name: str, value: Any, shape: tuple[int, ...], samples: int | None = None) -> Array:
+def profiles_of(name: str, value: Any, interface: Interface, samples: int | None = None) -> Array:
     """`value` as a (samples, *shape) float64 array, or an `InputError` that names it.
 
     A single profile (*shape) is one sample; where `samples` is given, a number, a profile or one
-    number a sample, of shape (samples, 1), is broadcast to all.
+    number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays the names of
+    dimensions, the coordinates and the units decide.
     """
+    shape = interface.shape
     nodes = ", ".join(map(str, shape))
     first = "samples" if samples is None else str(samples)
     valid = f"({first}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
     if samples is not None:
         valid += f", ({samples}, 1) or a number"
     try:
-        array = real_array(value)
+        array = real_array(at_nodes(name, value, name, interface).values)
     except TypeError as error:
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
+    if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
+        array = array[..., 0]
     allowed: set[tuple[int, ...]] = {shape}
     if samples is not None:
         column = (samples, *(1 for _ in shape))
@@ -114,13 +126,25 @@ def profiles_of(name: str, value: Any, shape: tuple[int, ...], samples: int | No
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{turned}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
-    bad = ~np.isfinite(array)
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-        raise InputError(f"{name}: must be finite; entry {where} is not")
+    _check_finite(name, array, interface)
     if samples is not None:
         return np.broadcast_to(array, (samples, *shape))
     return array[None] if array.shape == shape else array
+
+
+def _check_finite(name: str, array: Array, interface: Interface) -> None:
+    bad = ~np.isfinite(array)
+    if not bad.any():
+        return
+    missing = np.isnan(array)
+    if len(interface.shape) == 1 and array.shape[-1:] == interface.shape and missing.any():
+        where = describe_gaps(np.atleast_2d(missing), interface)
+        raise InputError(
+            f"{name}: must be finite: there {where}; st.onset(..., gaps='fill') and"
+            " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
+        )
+    entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
+    raise InputError(f"{name}: must be finite; entry {entry} is not")
 
 
 def named_profiles(given: Any) -> dict[str, Any]:

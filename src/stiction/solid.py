@@ -6,10 +6,11 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from stiction._model import Mode, Positive, _number, model
 from stiction.errors import InputError
+from stiction.plausible import warn_of_waves
 
 
 @model
@@ -39,6 +40,11 @@ class Solid:
     ]
     density: Positive
     plane: Literal["strain", "stress"] = "strain"
+
+    @model_validator(mode="after")
+    def _plausible(self) -> Solid:
+        warn_of_waves(self)
+        return self
 
     @property
     def shear_wave_speed(self) -> float:

@@ -7,7 +7,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._brief import brief
 from stiction._model import describe
+from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.files import Lock, cannot_write, sync_folder
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
@@ -69,6 +71,8 @@ class Status:
     seconds: float
     active: bool
 
+    __repr__ = brief
+
     @property
     def complete(self) -> bool:
         """Whether every sample is stored."""
@@ -104,6 +108,12 @@ class StoredRun:
             self.study = Study.from_dict(self._store.study)
         else:
             self.study = Study.from_result(self._result)
+
+    def __repr__(self) -> str:
+        ensemble = self.study.ensemble
+        points = len(self.study.plans)
+        each = f"{points} points of " if points > 1 else ""
+        return f"<StoredRun {str(self.path)!r}: {each}{ensemble.samples} samples>"
 
     def status(self) -> Status:
         """How far it is; reads every chunk to check it."""
@@ -164,17 +174,28 @@ class StoredRun:
         attributes = study.attributes
         if self.failures:
             attributes[FAILED] = [list(failure) for failure in self.failures]
+        ensemble = study.ensemble
+        spans = self._store.missing(len(study.plans), ensemble.samples, ensemble.first)
+        missing = sum(span.samples for span in spans)
+        if missing:
+            total = len(study.plans) * ensemble.samples
+            attributes["cut_short"] = f"{total - missing} of {total} samples are done"
         return gathered.dataset(attributes, study.axes)
 
     def export(self, path: str | Path) -> None:
-        """Write `dataset` as one NetCDF file, whole or not at all.
+        """Write `dataset` as the suffix says (.nc, .csv, .parquet, .zarr), whole or not at all.
 
         Raises
         ------
+        InputError
+            If the suffix is another one, or its library is not installed.
         StoreError
             If it cannot be written.
         """
-        write_result(self.dataset(), Path(path))
+        from stiction.export import check_suffix, export
+
+        check_suffix(Path(path))
+        export(self.dataset(), path)
 
 
 def _is_active(folder: Path) -> bool:
@@ -250,15 +271,16 @@ def run_into(
     *,
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
     retry: bool = False,
+    time_limit: float | None = None,
 ) -> StoredRun:
     """Run a study, or what is missing of it, into a folder or a file; see `Study.run`."""
     from stiction import __version__
 
     path = Path(out)
     ensemble, plans = study.ensemble, study.plans
-    check_run(ensemble.samples, ensemble.first, workers, executor)
+    check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
     check_target(path)
     warn_of_fields(plans)
@@ -284,7 +306,10 @@ def run_into(
             executor=executor,
             progress=progress,
             retry=retry,
+            time_limit=time_limit,
         )
+        if store.missing(len(plans), ensemble.samples, ensemble.first):  # the time was over
+            return StoredRun(path)
         if to_file:
             StoredRun(path).export(path)
             if not store.failures:

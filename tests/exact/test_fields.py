@@ -42,15 +42,19 @@ def test_power_law_of_exponent_four_is_matern_seven_halves():
     x = np.linspace(0.0, 3.0, 50)
     a = np.pi * x  # lambda |x|
     expected = np.exp(-a) * (1.0 + a + 0.4 * a**2 + a**3 / 15.0)
-    np.testing.assert_allclose(spectrum.correlation(x), expected, rtol=1e-12, atol=1e-15)
+    found = spectrum.untruncated_correlation(x)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
+    far = st.PowerLawSpectrum(correlation_length=2.0, exponent=4.0, truncation=1e3)
+    # Beyond a thousand lambda lie 1e-21 of the power; pieces are good to 1e-11 each.
+    np.testing.assert_allclose(far.correlation(x), expected, atol=1e-11)
 
 
 def test_efolding_lengths():
-    for spectrum in (
-        st.SquaredExponentialSpectrum(correlation_length=0.7),
-        st.ExponentialSpectrum(correlation_length=0.7),
-    ):
-        assert spectrum.efolding_length == pytest.approx(0.7, rel=1e-12)
+    whole = st.SquaredExponentialSpectrum(correlation_length=0.7, truncation=3.0)
+    assert whole.efolding_length == pytest.approx(0.7, rel=1e-12)
+    # The power left out by truncation at 1 - 1e-6 lengthens it by about as much.
+    rough = st.ExponentialSpectrum(correlation_length=0.7, power_kept=1.0 - 1e-6)
+    assert rough.efolding_length == pytest.approx(0.7, rel=3e-6)
     power = st.PowerLawSpectrum(correlation_length=0.7, exponent=2.0)
     again = power.with_efolding_length(0.2)
     assert float(again.correlation(np.array([0.2]))[0]) == pytest.approx(np.exp(-1.0), rel=1e-12)
@@ -203,8 +207,9 @@ def test_custom_spectrum_agrees_with_the_named_one():
         function=lambda k: 7.0 * np.exp(-((0.01 * k) ** 2)), max_wavenumber=named.cutoff * 3.0
     )
     lags = np.linspace(0.0, 0.06, 30)
-    # Both leave out next to nothing: at three times the cutoff less than 1e-20 of the power.
-    np.testing.assert_allclose(custom.correlation(lags), named.correlation(lags), atol=1e-9)
+    # At three times the cutoff less than 1e-20 of the power is left out.
+    expected = named.untruncated_correlation(lags)
+    np.testing.assert_allclose(custom.correlation(lags), expected, atol=1e-9)
     assert custom.efolding_length == pytest.approx(0.02, rel=1e-9)
     interface = st.Interface(length=1.0, nodes=256)
     fields = [st.RandomField(marginal=scipy.stats.norm(), spectrum=s) for s in (named, custom)]
@@ -281,3 +286,130 @@ def test_a_marginal_that_the_forty_terms_cannot_follow_has_correlation_one_at_ze
     )
     interface = st.Interface(length=0.1, nodes=256)
     assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)
+
+
+def _mapped(distribution, rho):
+    from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+
+    field = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=2e-3)
+    )
+    return correlation_of_mapped(rho, hermite_coefficients(field.marginal))
+
+
+def test_correlation_of_a_heavy_lognormal():
+    """(exp(s^2 rho) - 1)/(exp(s^2) - 1): most of the variance lies beyond |z| = 5."""
+    rho, s2 = np.linspace(-1.0, 1.0, 21), 3.5**2
+    expected = np.expm1(s2 * rho) / np.expm1(s2)
+    np.testing.assert_allclose(_mapped(scipy.stats.lognorm(3.5), rho), expected, atol=1e-9)
+
+
+def test_correlation_of_a_pareto_by_double_integral():
+    """E[X1 X2] of X = Phi(-Z)^(-1/a) for correlated normals, by the trapezoidal rule."""
+    from scipy.special import log_ndtr
+
+    a, rho = 2.05, 0.5
+    z = np.linspace(-20.0, 20.0, 2001)
+    log_x = -log_ndtr(-z) / a
+    one, two = z[:, None], z[None, :]
+    exponent = -(one**2 - 2.0 * rho * one * two + two**2) / (2.0 * (1.0 - rho**2))
+    total = np.sum(np.exp(exponent + log_x[:, None] + log_x[None, :]))
+    product = total * 0.02**2 / (2.0 * np.pi * np.sqrt(1.0 - rho**2))
+    distribution = scipy.stats.pareto(a)
+    expected = (product - distribution.mean() ** 2) / distribution.var()
+    # A millionth of the variance is left to the last coefficient.
+    assert _mapped(distribution, np.array([rho]))[0] == pytest.approx(expected, abs=2e-6)
+
+
+@pytest.mark.parametrize("width", [1e2, 1.0, 1e-2])
+def test_narrow_marginals_have_the_correlation_of_wide_ones(width):
+    rho = np.linspace(-1.0, 1.0, 21)
+    wide = _mapped(scipy.stats.beta(2.0, 2.0), rho)
+    narrow = _mapped(scipy.stats.beta(2.0, 2.0, loc=1e6, scale=width), rho)
+    # Values of 1e6 have 1e-10 of round-off, that is 1e-8 of the narrowest width.
+    np.testing.assert_allclose(narrow, wide, atol=1e-7)
+
+
+@pytest.mark.parametrize("distribution", [scipy.stats.t(2.01), scipy.stats.pareto(2.01)])
+def test_tails_too_heavy_for_a_correlation_are_said(distribution):
+    field = st.RandomField(
+        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=0.1)
+    )
+    with pytest.warns(st.AccuracyWarning, match=r"uncertain by up to 0\.\d"):
+        field.correlation(st.Interface(length=1.0, nodes=64))
+
+
+@pytest.mark.parametrize("exponent", [0.7, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("of", ["z", "strength"])
+def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent, of):
+    """On an interface of a thousand lengths, by its modes."""
+    field = st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        spectrum=st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent),
+        mean_mode=True,
+    ).with_efolding_length(0.05, of=of)
+    interface = st.Interface(length=50.0, nodes=1000 * 64)
+    correlation = field.correlation(interface, of=of)
+    # Without truncation the length was .0665 for exponent 1. Left over: the sum over modes, which
+    # at exponent 0.7 meets a density that is sharp at k = 0, and the line between two nodes.
+    assert np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200]) == pytest.approx(
+        0.05, rel=2e-3
+    )
+
+
+def test_truncated_correlation_is_the_sum_of_cosines():
+    """Against the midpoint rule on a million wavenumbers."""
+    spectrum = st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.95)
+    k = (np.arange(1_000_000) + 0.5) * spectrum.cutoff / 1e6
+    g = spectrum.density(k)
+    for lag in (0.0, 1e-3, 0.3, 5.0, 300.0):
+        expected = np.sum(g * np.cos(k * lag)) / g.sum()
+        # The midpoint rule: (lag dk)^2/24 with dk = 4e-5.
+        assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(
+            expected, abs=1e-9 + (lag * k[0] * 2.0) ** 2 / 24.0
+        )
+
+
+def _top_hat(k):
+    return 1.0 * (k < 3000.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_custom_spectra_with_steps_and_lines():
+    whole = st.CustomSpectrum(function=_top_hat)
+    assert whole.cutoff == pytest.approx(0.9997 * 3000.0, rel=1e-9)
+    lag = np.array([0.0, 1e-3, 1e-2, 10.0])
+    found = st.CustomSpectrum(function=_top_hat, max_wavenumber=1e4).correlation(lag)
+    np.testing.assert_allclose(found, np.sinc(3000.0 / np.pi * lag), atol=1e-10)
+
+    def line(k):
+        return np.exp(-((k / 500.0) ** 2)) + 50.0 * ((k > 20000.0) & (k < 20010.0))
+
+    spectrum = st.CustomSpectrum(function=line)
+    wide = 250.0 * np.sqrt(np.pi)
+    share = wide / (wide + 500.0)  # the line itself has 10 x 50
+    assert spectrum.power_within(15000.0) == pytest.approx(share, rel=1e-9)
+    assert 20000.0 < spectrum.cutoff < 20010.0
+    assert spectrum.power_kept_by_truncation == pytest.approx(0.9997, rel=1e-9)
+
+    def narrow(k):
+        return np.exp(-((k / 500.0) ** 2)) + 5e4 * ((k > 20000.0) & (k < 20000.01))
+
+    ends = st.CustomSpectrum(function=narrow, break_points=(20000.0, 20000.01))
+    assert ends.power_within(15000.0) == pytest.approx(share, rel=1e-9)
+
+
+def test_a_line_between_the_modes_is_not_missed_silently():
+    def line(k):
+        return np.exp(-((k / 500.0) ** 2)) + 50.0 * ((k > 20000.0) & (k < 20010.0))
+
+    field = st.RandomField(marginal=scipy.stats.norm(), spectrum=st.CustomSpectrum(function=line))
+    # Modes 62.8 rad/m apart: none falls on the line.
+    with pytest.warns(st.AccuracyWarning, match=r"carry 0\.45\d times the power"):
+        field.sample(st.Interface(length=0.1, nodes=1024), samples=1)
+
+
+def test_a_density_whose_integral_does_not_converge_is_refused():
+    with pytest.raises(st.InputError, match=r"does not converge; give max_wavenumber"):
+        st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k))
+    assert st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k), max_wavenumber=1e3).cutoff == 1e3

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, nbinom
 
 import stiction as st
+from stiction._progress import SILENT
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.plain_monte_carlo import Count, tally
+from stiction.reliability.plain_monte_carlo import Count, count_failures, tally
 from stiction.reliability.pooling import Tail
 from stiction.reliability.tails import weakest_link
 from stiction.reliability.uncertainty import (
@@ -125,11 +126,87 @@ def test_effective_size():
     assert effective_size(np.zeros(4)) == 0.0
 
 
-def test_tally_numbers_the_failures_of_all_batches():
-    count = tally(np.array([3.0, 1.0, 2.0]), 1.5)
-    count = tally(np.array([1.0, 2.0, 0.5]), 1.5, count)
+def test_tally_numbers_the_failures_from_the_first_sample_on():
+    count = tally(np.array([3.0, 1.0, 2.0, 1.0, 2.0, 0.5]), 1.5, 1000)
     assert (count.failures, count.samples) == (3, 6)
-    np.testing.assert_array_equal(count.numbers, [1, 3, 5])
+    np.testing.assert_array_equal(count.numbers, [1001, 1003, 1005])
+
+
+class Uniform:
+    """A limit state whose stress is uniform between 0 and 1: P(stress < p) = p."""
+
+    meter = SILENT
+
+    def __init__(self, number):
+        self.rng = generator(number, 40)
+
+    def draws(self, seed, first, samples):
+        return self.rng.random(samples)
+
+    def __call__(self, draws):
+        return draws
+
+
+@pytest.mark.parametrize(
+    ("chance", "target_cov", "least", "most"),
+    [
+        (0.01, 0.3, 1000, 10**6),
+        (0.03, 0.3, 100, 10**6),
+        (0.012, 0.3, 1000, 1500),
+        (0.5, 0.2, 10, 99),
+    ],
+)
+def test_counting_is_unbiased_whenever_it_stops(chance, target_cov, least, most):
+    repeats = 2000
+    counts = [
+        count_failures(
+            Uniform(i), 0, chance, target_cov=target_cov, least=least, max_evaluations=most
+        )
+        for i in range(repeats)
+    ]
+    found = np.array([count.probability for count, _ in counts]) / chance
+    # Three standard errors of two thousand runs: 2 %. Counting until the estimate looks precise
+    # enough is 9 % high in the first case.
+    assert abs(found.mean() - 1.0) < 3.0 * found.std() / math.sqrt(repeats)
+    reported = np.array([count.coefficient_of_variation for count, _ in counts])
+    assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
+    if most == 10**6:
+        assert reported.max() <= target_cov
+    inside = [low <= chance <= high for low, high in (count.interval(0.95) for count, _ in counts)]
+    # Clopper and Pearson hold at least 95 %; three standard errors less.
+    assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
+    assert all(count.samples <= evaluations <= most for count, evaluations in counts)
+
+
+def test_counting_until_a_failure_has_the_interval_of_the_negative_binomial_law():
+    count = Count(5, 200, until_failure=True)
+    low, high = count.interval(0.9)
+    # So many or fewer samples until the fifth failure; so many or more.
+    assert nbinom.cdf(195, 5, low) == pytest.approx(0.05)
+    assert nbinom.sf(194, 5, high) == pytest.approx(0.05)
+    assert count.probability == 4 / 199
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["auto", "plain"])
+def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
+    """Near P = 1e-2, where 'auto' takes now one algorithm and now another."""
+    problem = st.paper.problem(nodes=136)
+    field = st.paper.strength(problem, 0.5)
+    method = st.LocalCriterion()
+    onset = st.monte_carlo(problem, field, method=method, samples=40_000, seed=10**6)
+    stress = float(np.quantile(onset["critical_stress"], 0.01))
+    found = np.array(
+        [
+            failure_probability(
+                problem, field, stress, method=method, algorithm=algorithm, target_cov=0.3, seed=i
+            ).probability
+            for i in range(150)
+        ]
+    )
+    # The mean of 150 runs is known to 2.5 %, the reference to 5 % (two standard errors).
+    error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.05)
+    assert abs(found.mean() / 0.01 - 1.0) < error
 
 
 def test_every_key_has_its_own_generator():

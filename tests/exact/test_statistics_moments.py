@@ -25,7 +25,7 @@ def test_variance_is_the_double_integral(problem, make_strength, ratio):
     s, measure = np.cos(t), np.sin(t) * np.pi / 1500
     share = exact_weight().at(s) * measure
     lags = np.abs(s[:, None] - s[None, :]) * problem.nucleation_length / 2.0
-    rho = strength.spectrum.correlation(lags)
+    rho = strength.spectrum.untruncated_correlation(lags)
     c = correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
     found = nucleation_statistics(problem, strength, infinite=True)
     # The midpoint rule in the angle converges as fast as the integrand is smooth; C has a kink in
@@ -86,7 +86,8 @@ def test_long_correlation_at_fixed_length(problem):
     assert strength.modes(problem.interface).count == 1
     limit = nucleation_limits(problem, strength).long_ratio_fixed_length
     found = nucleation_statistics(problem, strength).variance_ratio
-    assert found == pytest.approx(limit, rel=1e-10)
+    # Twice the error of the weights on a grid of 9 nodes in h_n, |k| h_n/2 = 0.14 and multiples.
+    assert found == pytest.approx(limit, rel=1e-6)
     uniform = st.RandomField(
         marginal=marginal,
         spectrum=st.PowerLawSpectrum(correlation_length=1e3 * xi, truncation=1e4),

@@ -12,6 +12,7 @@ import xarray as xr
 
 import stiction as st
 from stiction.cli import app as room
+from stiction.study.study import read_setup
 
 TEXT = """
 title = "a small sweep"
@@ -160,7 +161,7 @@ def test_growing_from_the_command_line(command, study, tmp_path):
         (["report", "STUDY"], 1, "no NetCDF file"),
         (["plot", "nothing"], 1, "there is no run here"),
         (["onset", "STUDY", "--strength", "missing.npy"], 2, "missing.npy"),
-        (["onset", "STUDY", "--strength", "missing.txt"], 2, ".npy"),
+        (["onset", "STUDY", "--strength", "missing.tif"], 2, ".npy"),
         (["onset", "STUDY", "--strength", "p.npy", "--method", "local"], 2, "local_criterion"),
         (["onset", "STUDY", "--strength", "p.npy", "--out", "figure.gif"], 2, ".png"),
         (["nothing"], 2, "nothing"),
@@ -259,30 +260,58 @@ def test_onset_of_ones_own_profile(command, study, tmp_path, form):
     assert f"{float(expected['friction_coefficient'][0]):.6f}" in line
 
 
-def test_onset_interpolates_points_elsewhere(study, tmp_path):
-    from stiction.profile_file import read_profile
+PROBLEM = TEXT[: TEXT.index("[strength.marginal]")]
 
-    interface = st.Study.from_toml(study).problem.interface
-    x = np.linspace(0.0, 0.1, 41)[:-1] + 1e-3
-    np.savetxt(
-        tmp_path / "p.csv", np.column_stack([x, 1e6 + 1e7 * np.minimum(x, 0.1 - x)]), delimiter=","
-    )
-    with pytest.warns(st.AccuracyWarning, match="40 points are interpolated linearly to 128 nodes"):
-        found = read_profile(tmp_path / "p.csv", interface)
-    inside = (interface.x > 1e-3) & (interface.x < 0.045)
-    np.testing.assert_allclose(found[inside], 1e6 + 1e7 * interface.x[inside], rtol=1e-14)
+
+def test_onset_needs_a_problem_only(command, study, tmp_path):
+    _, profile = profile_of(study)
+    np.savetxt(tmp_path / "p.txt", profile * 1e-3)
+    study.write_text(PROBLEM)
+    ask = ("onset", study, "--strength", tmp_path / "p.txt", "--method", "local_criterion")
+    code, out, _ = command(*ask, "--unit", "kPa")
+    assert code == 0
+    expected = st.onset(read_setup(study)[0], profile, method=st.LocalCriterion())
+    assert f"{float(expected['critical_stress'][0]) * 1e-6:.6f} MPa" in out
+    study.write_text(PROBLEM.replace("nodes = 128", "nodes = 127") + "[strenght]\na = 1\n")
+    code, _, err = command(*ask)
+    assert code == 2
+    assert "problem.interface.nodes: must be a multiple of 2, got 127" in err
+    assert "unknown 'strenght'; did you mean 'strength'?" in err
+    study.write_text("title = 'nothing'")
+    assert "problem: missing" in command(*ask)[2]
+
+
+def test_onset_marks_gaps(command, study, tmp_path):
+    interface, profile = profile_of(study)
+    weakest = int(np.argmin(profile))
+    profile[weakest + 1 : weakest + 12] = np.nan
+    profile[weakest + 12] = 1.001 * profile[weakest]
+    lines = [f"{x * 1e3:.9g};{'' if np.isnan(v) else v * 1e-6}" for x, v in zip(
+        interface.x, profile, strict=True)]  # fmt: skip
+    (tmp_path / "p.csv").write_text("\n".join(["x (mm);strength (MPa)", *lines]))
+    ask = ("onset", study, "--strength", tmp_path / "p.csv", "--method", "local_criterion")
+    code, _, err = command(*ask)
+    assert code == 2
+    assert "(11 of 128 nodes)" in err
+    assert "--fill-gaps" in err
+    figure = tmp_path / "p.svg"
+    code, out, _ = command(*ask, "--fill-gaps", "--out", figure)
+    assert code == 0
+    assert "mm *" in out
+    assert "not measured, filled with straight lines: x = " in out
+    assert "* the onset lies in a gap of the profile (local_criterion)" in out
+    assert figure.stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("1e6\n2e6\n", "has 2 values, the interface has 128 nodes"),
-        ("1,2,3\n1,2,3\n", "one column"),
-        ("0.0,1e6\n0.5,1e6\n", "must lie in [0, 0.1]"),
-        ("0.02,1e6\n0.01,1e6\n", "increase"),
-        ("0.0,1e6\n0.01,inf\n", "finite; entry 1"),
-        ("x,tau\n0.0,1e6\n0.01,strong\n", "entry 1 is no number"),
-        ("", "one column"),
+        ("1,2,3\n1,2,3\n", "has 3 columns (without names); say which"),
+        ("0.0,1e6\n0.5,1e6\n", "the interface is 0.1 m long"),
+        ("0.02,1e6\n0.01,1e6\n", "--interpolate"),
+        ("x,tau\n0.0,1e6\n0.01,strong\n", "line 3: 'strong' is no number"),
+        ("", "holds no numbers"),
     ],
 )
 def test_profiles_that_do_not_fit(command, study, tmp_path, text, words):

@@ -241,6 +241,99 @@ def test_first_instability_is_never_later_than_letting_go(system):
     assert np.all(first(draws) <= state(draws))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_small_runs_whose_states_tie(seed):
+    """Of twenty samples two go on, and chains repeat them."""
+    problem = st.paper.problem(nodes=136)
+    field = st.paper.strength(problem, 0.5)
+    with pytest.warns(st.AccuracyWarning):
+        found = failure_probability(
+            problem,
+            field,
+            0.66001e6,
+            method=LOCAL,
+            algorithm="subset",
+            max_evaluations=100 + 50 * (seed % 2),
+            seed=seed // 2,
+        )
+    assert found.interval[0] < 1e-12 < found.interval[1]
+
+
+@dataclass(frozen=True)
+class Piled:
+    """Weak samples let go at the bound itself, as by rounding."""
+
+    type: str = "equilibrium"
+
+    @property
+    def variables(self):
+        return LOCAL.variables
+
+    def prepare(self, problem):
+        def solver(rows):
+            values = dict(LOCAL.prepare(problem)(rows))
+            low = values["critical_stress"] < 0.675e6
+            values["critical_stress"] = np.where(low, 0.66e6, values["critical_stress"])
+            return values
+
+        return solver
+
+
+@pytest.mark.parametrize("algorithm", ["auto", "subset", "two_level"])
+def test_onsets_that_pile_up_on_the_bound(system, algorithm):
+    with pytest.warns(st.AccuracyWarning, match="is the bound itself"):
+        answer = design_stress(
+            *system, probability=1e-5, method=Piled(), algorithm=algorithm, target_cov=0.3
+        )
+    assert (answer.stress, answer.stress_above_bound) == (0.66e6, 0.0)
+    assert not any("lies below" in text for text in answer.warnings)
+    # Too few evaluations: what was seen is the bound, below which nothing lies.
+    with pytest.warns(st.AccuracyWarning) as caught:
+        few = design_stress(
+            *system,
+            probability=1e-12,
+            method=Piled(),
+            algorithm=algorithm,
+            target_cov=0.3,
+            max_evaluations=100,
+        )
+    assert few.interval[0] == 0.66e6 <= few.interval[1]
+    assert not any("lies below 660000 Pa" in str(warning.message) for warning in caught)
+
+
+@pytest.fixture(scope="module")
+def unbounded():
+    """Log-normal strength: there is no least strength, and first instabilities are arrested."""
+    problem = st.paper.problem(nodes=256)
+    spectrum = st.PowerLawSpectrum(correlation_length=0.5 * problem.nucleation_length)
+    return problem, st.RandomField(scipy.stats.lognorm(0.15, scale=1e6), spectrum)
+
+
+def test_without_a_bound_nothing_is_said_of_one(unbounded):
+    found = failure_probability(*unbounded, 0.6e6, method=LOCAL, target_cov=0.3)
+    assert found.lower_bound == 0.0
+    assert "bound" not in str(found)
+    answer = design_stress(*unbounded, probability=1e-3, method=LOCAL, target_cov=0.3)
+    assert "bound" not in str(answer)
+
+
+def test_arrest_makes_the_first_instability_likelier(unbounded):
+    """By importance sampling to 5 %: 3.8e-6 and 2.4e-6 below 571.9 kPa."""
+    first, whole = (
+        failure_probability(
+            *unbounded,
+            571.89e3,
+            method=Equilibrium(),
+            algorithm="importance",
+            target_cov=0.15,
+            event=event,
+        )
+        for event in ("first_instability", "critical_stress")
+    )
+    # The same draws and weights fail by both, but for those that are arrested.
+    assert 1.2 < first.probability / whole.probability < 2.2
+
+
 @pytest.fixture(scope="module")
 def app():
     command = typer.Typer()
@@ -274,6 +367,44 @@ def test_command_writes_table_data_and_figures(app, system, tmp_path):
         np.testing.assert_array_equal(curve["probability"], again["probability"])
     assert "0.68 MPa" in done.output
     assert "at P = 0.001" in done.output
+
+
+def test_command_says_both_events_where_they_differ(app, unbounded, tmp_path):
+    study = st.Study(
+        problem=unbounded[0],
+        random=unbounded[1],
+        method=Equilibrium(),
+        ensemble=st.Ensemble(samples=10),
+    )
+    study.to_toml(tmp_path / "study.toml")
+    arguments = [str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")]
+    arguments += ["--smallest", "1e-2", "--plain-samples", "0", "--stress", "0.6e6"]
+    done = CliRunner().invoke(
+        app, [*arguments, "--event", "first_instability"], catch_exceptions=False
+    )
+    assert done.exit_code == 0
+    for words in ("as a whole:        P = ", "first instability: P = ", "conservative"):
+        assert words in done.output
+    assert "evaluations; equilibrium, first_instability" in done.output
+    assert "bound" not in done.output
+
+
+def test_command_refuses_a_sweep(app, system, tmp_path):
+    study = st.Study(
+        problem=system[0],
+        random=system[1],
+        method=LOCAL,
+        ensemble=st.Ensemble(samples=10),
+        sweep=[{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}],
+    )
+    study.to_toml(tmp_path / "study.toml")
+    with pytest.raises(st.InputError, match="correlation_length over 2 points"):
+        CliRunner().invoke(
+            app,
+            [str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")],
+            catch_exceptions=False,
+        )
+    assert not (tmp_path / "out").exists()
 
 
 def test_command_names_mistakes(app, tmp_path):

@@ -90,6 +90,6 @@ def main() -> None:
         for text in error.problems:
             typer.echo(f"error: {text}", err=True)
         sys.exit(2)
-    except RunError as error:
+    except (RunError, TimeoutError) as error:
         typer.echo(f"error: {error}", err=True)
         sys.exit(1)

@@ -19,6 +19,12 @@ RunPath = Annotated[
 Workers = Annotated[
     int | None, typer.Option(help="Threads; all cores by default.", show_default=False)
 ]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        help="Seconds; what there is by then is the result, and says so.", show_default=False
+    ),
+]
 
 
 def writable(path: Path, what: str) -> Path:
@@ -60,19 +66,6 @@ def summary(result: Any) -> str:
                 f" 5/50/95 % {low * scale:.5g} / {middle * scale:.5g} / {high * scale:.5g}"
             )
     return "\n".join(lines)
-
-
-def duration(seconds: float) -> str:
-    """Seconds for people."""
-    if seconds < 1.0:
-        return f"{seconds * 1e3:.3g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.3g} us"
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    if seconds < 7200.0:
-        return f"{seconds / 60.0:.3g} min"
-    if seconds < 48 * 3600.0:
-        return f"{seconds / 3600.0:.3g} h"
-    return f"{seconds / 86400.0:.3g} days"
 
 
 def size(count: float) -> str:

@@ -8,7 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, duration, writable
+from stiction._progress import Meter, duration
+from stiction.cli.common import StudyFile, writable
+from stiction.cli.profile import (
+    FillGaps,
+    Interpolate,
+    Unit,
+    ValueName,
+    XName,
+    XUnit,
+    profile_of,
+)
 from stiction.errors import InputError
 
 COLUMNS = ("method", "critical stress", "critical load", "first instability", "position", "time")
@@ -20,7 +30,8 @@ def onset(
         Path,
         typer.Option(
             metavar="PROFILE",
-            help="Peak strength, Pa: .npy, .csv (with or without x in m) or NetCDF.",
+            help="Peak strength: .npy, text (.csv, .txt, ...) or NetCDF, with or without x; in Pa"
+            " and m unless it states units, as in 'x (mm); strength (MPa)'.",
         ),
     ],
     method: Annotated[
@@ -33,30 +44,45 @@ def onset(
     out: Annotated[
         Path | None, typer.Option(help="Figure to write (.png, .pdf or .svg).", show_default=False)
     ] = None,
+    unit: Unit = None,
+    x_unit: XUnit = None,
+    value: ValueName = None,
+    x: XName = None,
+    interpolate: Interpolate = False,
+    fill_gaps: FillGaps = False,
 ) -> None:
     """At which load, and where, does one interface of given strength let go?
 
-    Takes the problem from a study file and the strength from PROFILE, asks every method that
-    applies, and prints a table; with --out also draws the profile and where each method sees it
-    let go. The method of the study keeps its options, the others take their defaults.
+    Takes the problem (and the method, if it has one) from a study file, which needs nothing else,
+    and the strength from PROFILE, asks every method that applies, and prints a table; with --out
+    also draws the profile and where each method sees it let go. The method of the study keeps its
+    options, the others take their defaults.
     """
-    from stiction.profile_file import read_profile
-    from stiction.study.study import Study
+    from stiction.study.study import read_setup
 
     if out is not None:
         if out.suffix not in (".png", ".pdf", ".svg"):
             raise InputError(f"--out: a figure must end in .png, .pdf or .svg, got {out}")
         writable(out, "the figure")
-    loaded = Study.from_toml(study)
-    problem = loaded.problem
-    methods = _methods(loaded.method, method, loading_rate)
-    profile = read_profile(strength, problem.interface)
+    problem, own = read_setup(study)
+    methods = _methods(own, method, loading_rate)
+    profile = profile_of(
+        strength,
+        problem,
+        unit=unit,
+        x_unit=x_unit,
+        value=value,
+        x=x,
+        interpolate=interpolate,
+        fill_gaps=fill_gaps,
+    )
     problem.sample(profile)
     results: dict[str, Any] = {}
     refused: list[tuple[str, str]] = []
     for one in methods:
         try:
-            results[one.type] = _ask(problem, profile, one)
+            with Meter(f"onset by {one.type}"):
+                results[one.type] = _ask(problem, profile, one)
         except InputError as error:
             refused.append((one.type, str(error)))
     _print_table(results, problem.load.normal_pressure is not None)
@@ -64,10 +90,14 @@ def onset(
         typer.echo(f"{name} does not apply: {text}")
     if not results:
         raise typer.Exit(1)
+    _print_gaps(results)
     if out is not None:
         from stiction.report.onset_figure import write_onset_figure
 
-        write_onset_figure(problem, profile, {n: r for n, (r, _) in results.items()}, out)
+        with Meter("drawing the figure"):
+            write_onset_figure(
+                problem, profile.values, {n: r for n, (r, _) in results.items()}, out
+            )
         typer.echo(f"figure: {out}")
 
 
@@ -86,7 +116,7 @@ def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any
     for name, cls in classes.items():
         if names and name not in names:
             continue
-        if name == own.type:
+        if own is not None and name == own.type:
             found.append(own)
         elif name == "rupture":
             found.append(cls(loading_rate=loading_rate))
@@ -110,7 +140,8 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
             f"{float(result[key][0]) * 1e-6:.6f} MPa"
             for key in ("critical_stress", "critical_load", "first_instability")
         )
-        place = f"{float(result['critical_position'][0]) * 1e3:.4f} mm"
+        mark = " *" if _in_gap(result) else ""
+        place = f"{float(result['critical_position'][0]) * 1e3:.4f} mm{mark}"
         row = [name, stress, load, first, place, duration(seconds)]
         if with_coefficient:
             row.insert(2, f"{float(result['friction_coefficient'][0]):.6f}")
@@ -122,3 +153,27 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
     for line in [head, *rows]:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
         typer.echo("  ".join(cells).rstrip())
+
+
+def _in_gap(result: Any) -> bool:
+    return "in_gap" in result and bool(result["in_gap"][0])
+
+
+def _print_gaps(results: dict[str, Any]) -> None:
+    """Where the profile was not measured, and whose onset lies there."""
+    from stiction.gaps import listed
+
+    first, _ = next(iter(results.values()))
+    spans = listed(first)
+    if not spans:
+        return
+    places = ", ".join(f"{a * 1e3:.4f} to {b * 1e3:.4f} mm" for a, b in spans)
+    typer.echo(
+        f"not measured, filled with straight lines: x = {places}; a weaker place there is not seen"
+    )
+    inside = [name for name, (result, _) in results.items() if _in_gap(result)]
+    if inside:
+        typer.echo(
+            f"* the onset lies in a gap of the profile ({', '.join(inside)}): the strength there"
+            " was filled in, not measured"
+        )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
-from stiction.cli.common import StudyFile, Workers
+from stiction._progress import Meter
+from stiction.cli.common import StudyFile, TimeLimit, Workers
 from stiction.errors import InputError
+
+Event = Literal["critical_stress", "first_instability"]
 
 
 def _folder(path: Path) -> Path:
@@ -23,10 +26,33 @@ def _folder(path: Path) -> Path:
     return path
 
 
-def _say(text: str) -> None:
-    """What is being done, for who watches a terminal."""
-    if sys.stderr.isatty():
-        typer.echo(text, err=True)
+def _one_interface(study: Any, path: Path) -> None:
+    """Refuse a sweep: which of its points is meant cannot be guessed."""
+    if not study.sweep:
+        return
+    keys = ", ".join(key for axis in study.sweep for key in axis.keys)
+    raise InputError(
+        f"sweep: `stiction reliability` takes one interface, and {path} sweeps {keys} over"
+        f" {len(study.points)} points; give the point you mean its values in the study and take"
+        " [[sweep]] out, or call st.failure_curve for each point in Python"
+    )
+
+
+def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
+    """Print an answer for the interface as a whole and, where it differs, for its first patch."""
+    whole, first = answers["critical_stress"], answers.get("first_instability")
+    if first is None:
+        typer.echo(str(whole))
+        return
+    if f"{value(first):.3g}" == f"{value(whole):.3g}":
+        typer.echo(f"{whole}\n  to three digits the same for the first instability")
+        return
+    typer.echo(f"as a whole:        {whole}")
+    typer.echo(f"first instability: {first}")
+    typer.echo(
+        "  the first patch runs away, arrested or not, before the interface lets go as a whole or"
+        " just then:\n  the first instability is the conservative answer"
+    )
 
 
 def reliability(
@@ -53,7 +79,15 @@ def reliability(
         bool,
         typer.Option("--tails", help="Also: other correlation lengths, lengths, distributions."),
     ] = False,
+    event: Annotated[
+        Event,
+        typer.Option(
+            help="What the curve counts: 'critical_stress', letting go as a whole, or"
+            " 'first_instability'. --stress and --probability say both."
+        ),
+    ] = "critical_stress",
     workers: Workers = None,
+    time_limit: TimeLimit = None,
 ) -> None:
     """Failure probability of a study's interface, decade by decade.
 
@@ -62,18 +96,26 @@ def reliability(
     figures (PNG and PDF) into a folder.
 
     The stress is the mean shear stress on the interface, and failure means that the interface as
-    a whole lets go below it.
+    a whole lets go below it; with --event first_instability, that its first patch runs away,
+    arrested or not, which is never later. The time limit holds for the curve and each answer.
     """
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import check_probability, design_stress
     from stiction.reliability.estimate import check_stress, failure_probability
+    from stiction.reliability.result import bounded
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
+    _one_interface(loaded, study)
     problem, random, method = loaded.problem, loaded.random, loaded.method
     seed = loaded.ensemble.seed
+    others: dict[str, Any] = {"workers": workers, "time_limit": time_limit}
+    # By the local criterion the first patch to run away is the whole interface.
+    events: list[Event] = ["critical_stress"]
+    if method.type != "local_criterion":
+        events.append("first_instability")
     # What is asked for last is refused first: the curve may take minutes.
     mistakes = [] if stress is None else check_stress("--stress", stress)
     mistakes += [] if probability is None else check_probability("--probability", probability)
@@ -82,10 +124,10 @@ def reliability(
     _folder(out)
 
     def save(figure: Any, name: str) -> None:
-        for ending in ("png", "pdf"):
-            figure.savefig(out / f"{name}.{ending}")
+        with Meter(f"drawing {name}"):
+            for ending in ("png", "pdf"):
+                figure.savefig(out / f"{name}.{ending}")
 
-    _say(f"the curve down to P = {smallest:g}, by {method.label} ...")
     curve = failure_curve(
         problem,
         random,
@@ -94,7 +136,8 @@ def reliability(
         target_cov=target_cov,
         plain_samples=plain_samples,
         seed=seed,
-        workers=workers,
+        event=event,
+        **others,
     )
     aside = out / "failure_curve.nc.part"
     curve.to_netcdf(aside)
@@ -104,39 +147,46 @@ def reliability(
     save(figures.curve_figure(curve), "failure_curve")
     cells = [list(table.columns), *table.cells()]
     for row, value in zip(cells[1:], curve["stress"].values, strict=True):
-        row[0] = f"{value:.7g}"  # near the bound five digits do not tell the points apart
+        row[0] = f"{value:.7g}"  # near a bound five digits do not tell the points apart
     widths = [max(len(row[i]) for row in cells) for i in range(len(table.columns))]
     for row in cells:
         line = "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
         typer.echo(line)
+    lowest = curve.attrs["lower_bound"]
+    bound = f"bound {lowest:.7g} Pa; " if bounded(lowest) else ""
     typer.echo(
-        f"bound {curve.attrs['lower_bound']:.7g} Pa; {curve.attrs['evaluations']} evaluations;"
-        f" {method.label}, {curve.attrs['event']}"
+        f"{bound}{curve.attrs['evaluations']} evaluations; {method.label}, {curve.attrs['event']}"
     )
     if stress is not None:
-        _say(f"the probability below {stress:g} Pa ...")
-        found = failure_probability(
-            problem, random, stress, method=method, seed=seed, workers=workers
-        )
-        typer.echo(f"{found}\n  {found.algorithm}: {found.reason}")
+        probabilities = {
+            event: failure_probability(
+                problem, random, stress, method=method, seed=seed, event=event, **others
+            )
+            for event in events
+        }
+        _both(probabilities, lambda answer: answer.probability)
+        found = probabilities["critical_stress"]
+        typer.echo(f"  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
             spot = figures.weak_spot_figure(
                 found.failing_profiles, problem.nucleation_length, stress
             )
             save(spot, "weak_spots")
     if probability is not None:
-        _say(f"the stress with P = {probability:g} ...")
-        answer = design_stress(
-            problem,
-            random,
-            probability=probability,
-            method=method,
-            seed=seed,
-            workers=workers,
-        )
-        typer.echo(str(answer))
+        stresses = {
+            event: design_stress(
+                problem,
+                random,
+                probability=probability,
+                method=method,
+                seed=seed,
+                event=event,
+                **others,
+            )
+            for event in events
+        }
+        _both(stresses, lambda answer: answer.stress)
     if tails:
-        _say("seven more curves: correlation lengths, interface lengths, distributions ...")
         several = tail_study(
             problem,
             random,
@@ -145,7 +195,8 @@ def reliability(
             target_cov=target_cov,
             plain_samples=plain_samples,
             seed=seed,
-            workers=workers,
+            event=event,
+            **others,
         )
         figures.tail_table(several).write_csv(out)
         save(figures.tail_figure(several), "failure_tails")

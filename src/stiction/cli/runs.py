@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from stiction.cli.common import RunPath, duration, size, writable, writable_folder
+from stiction._progress import Meter, duration
+from stiction.cli.common import RunPath, size, writable, writable_folder
 
 SHOWN = 20
 
@@ -21,7 +22,8 @@ def status(run: RunPath) -> None:
     from stiction.study.sweep import name_point
 
     stored = StoredRun(run)
-    state, study = stored.status(), stored.study
+    with Meter(f"checking {run}"):
+        state, study = stored.status(), stored.study
     share = 100.0 * state.done / state.samples
     typer.echo(f"{run}" + (f": {study.title}" if study.title else ""))
     typer.echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
@@ -49,15 +51,30 @@ def status(run: RunPath) -> None:
 
 def export(
     run: RunPath,
-    out: Annotated[Path, typer.Argument(metavar="RESULT.nc", help="NetCDF file to write.")],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT",
+            help="What to write: .nc (NetCDF), .csv, .parquet (needs pyarrow) or .zarr (needs"
+            " zarr).",
+        ),
+    ],
 ) -> None:
-    """Write a run as one NetCDF file over the sweep and the samples; missing samples are NaN."""
+    """Write a run as one file over the sweep and the samples; missing samples are NaN.
+
+    The suffix says which kind. A table (.csv, .parquet) has a row a sample and columns named
+    `name (unit)`; profiles along the interface do not fit into it.
+    """
+    from stiction.export import check_suffix
     from stiction.stored_run import StoredRun
 
-    writable(out, "the result")
+    check_suffix(out)
+    if not (out.suffix == ".zarr" and out.is_dir()):
+        writable(out, "the result")
     stored = StoredRun(run)
-    stored.export(out)
-    state = stored.status()
+    with Meter(f"exporting {run}"):
+        stored.export(out)
+        state = stored.status()
     missing = state.samples - state.done
     if missing:
         typer.echo(f"warning: {missing} of {state.samples} samples are missing (NaN)", err=True)
@@ -76,7 +93,9 @@ def plot(
 
     stored = StoredRun(run)
     folder = writable_folder(out or _beside(run, "figures"))
-    for path in write_figures(stored, folder):
+    with Meter("drawing the figures"):
+        paths = list(write_figures(stored, folder))
+    for path in paths:
         typer.echo(str(path))
 
 
@@ -92,7 +111,8 @@ def report(
 
     stored = StoredRun(run)
     path = writable(out or _beside(run, "report.html"), "the report")
-    write_report(stored, path)
+    with Meter("writing the report"):
+        write_report(stored, path)
     typer.echo(f"report: {path}")
 
 

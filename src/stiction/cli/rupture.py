@@ -7,8 +7,17 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._progress import status_line
+from stiction._progress import Meter
 from stiction.cli.common import StudyFile, writable_folder
+from stiction.cli.profile import (
+    FillGaps,
+    Interpolate,
+    Unit,
+    ValueName,
+    XName,
+    XUnit,
+    profile_of,
+)
 
 
 def rupture(
@@ -21,7 +30,8 @@ def rupture(
         Path | None,
         typer.Option(
             metavar="PROFILE",
-            help="Peak strength, Pa, instead of a sample: .npy, .csv or NetCDF.",
+            help="Peak strength instead of a sample, as of `stiction onset`; the study then needs"
+            " a problem only.",
             show_default=False,
         ),
     ] = None,
@@ -30,6 +40,12 @@ def rupture(
     ] = 2e7,
     film: Annotated[bool, typer.Option("--film", help="Also a film, rupture.gif.")] = False,
     every: Annotated[int, typer.Option(help="Explicit steps between frames kept.")] = 5,
+    unit: Unit = None,
+    x_unit: XUnit = None,
+    value: ValueName = None,
+    x: XName = None,
+    interpolate: Interpolate = False,
+    fill_gaps: FillGaps = False,
 ) -> None:
     """Simulate one interface from its first slip to global sliding.
 
@@ -40,32 +56,30 @@ def rupture(
     """
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
-    from stiction.profile_file import read_profile
     from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
-    from stiction.study.study import Study
+    from stiction.study.study import Study, read_setup
 
     writable_folder(out)
-    loaded = Study.from_toml(study)
-    plan = loaded.plans[0]
-    problem, method = plan.problem, plan.method
-    if not isinstance(method, Rupture):
-        method = Rupture(loading_rate=loading_rate)
     profiles: Any
     if strength is None:
+        plan = Study.from_toml(study).plans[0]
+        problem, method = plan.problem, plan.method
         profiles = plan.profiles(sample, 1)
     else:
-        profiles = read_profile(strength, problem.interface)
-    with status_line("rupture") as say:
-        result = simulate_rupture(
+        problem, method = read_setup(study)
+        profiles = profile_of(
+            strength,
             problem,
-            profiles,
-            method=method,
-            every=every,
-            progress=lambda now: say(
-                f"step {now.steps}, t = {now.time:.6g} s, mean stress"
-                f" {now.mean_stress * 1e-6:.4f} MPa, {now.weakened_fraction:.0%} weakened"
-            ),
+            unit=unit,
+            x_unit=x_unit,
+            value=value,
+            x=x,
+            interpolate=interpolate,
+            fill_gaps=fill_gaps,
         )
+    if not isinstance(method, Rupture):
+        method = Rupture(loading_rate=loading_rate)
+    result = simulate_rupture(problem, profiles, method=method, every=every)
     result.to_netcdf(out / "rupture.nc")
     typer.echo(
         f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
@@ -75,10 +89,13 @@ def rupture(
         f" (c_R {problem.solid.rayleigh_wave_speed:.0f}, c_s {problem.solid.shear_wave_speed:.0f},"
         f" c_d {problem.solid.dilatational_wave_speed:.0f}); ended by: {result.attrs['stopped']}"
     )
-    for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
-        figure = draw(result, problem)
-        for ending in ("png", "pdf"):
-            figure.savefig(out / f"{name}.{ending}")
+    with Meter("drawing the figures"):
+        for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
+            figure = draw(result, problem)
+            for ending in ("png", "pdf"):
+                figure.savefig(out / f"{name}.{ending}")
     if film:
-        typer.echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+        with Meter("drawing the film"):
+            path = rupture_film(result, problem, out / "rupture.gif")
+        typer.echo(f"film: {path}")
     typer.echo(f"written to {out}")

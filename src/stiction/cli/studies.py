@@ -11,7 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, Workers, duration, size, summary
+from stiction._progress import Meter, duration
+from stiction.cli.common import StudyFile, TimeLimit, Workers, size, summary
 from stiction.errors import InputError
 
 SHOWN = 12
@@ -57,6 +58,7 @@ def run(
     retry: Annotated[
         bool, typer.Option("--retry", help="Compute stored samples that failed again.")
     ] = False,
+    time_limit: TimeLimit = None,
 ) -> None:
     """Run the study of a file, or what is missing of it.
 
@@ -65,7 +67,7 @@ def run(
     machines or interruptions.
 
     Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
-    or the command; 130: interrupted.
+    or the command; 3: the time limit was reached; 130: interrupted.
     """
     from stiction.stored_run import StoredRun, check_target, run_into
     from stiction.study.study import Study
@@ -78,7 +80,12 @@ def run(
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
-                loaded, out, workers=workers, executor=executor, progress=True, retry=retry
+                loaded,
+                out,
+                workers=workers,
+                executor=executor,
+                retry=retry,
+                time_limit=time_limit,
             )
     except KeyboardInterrupt:
         try:
@@ -89,7 +96,12 @@ def run(
         typer.echo(f"interrupted: {done}; the same command goes on", err=True)
         raise typer.Exit(130) from None
     names = ["critical_stress", "friction_coefficient"]
-    _show_results(loaded, stored.dataset(only=names))
+    result = stored.dataset(only=names)
+    _show_results(loaded, result)
+    if "cut_short" in result.attrs:
+        text = f"time limit reached: {result.attrs['cut_short']}, stored in {out}"
+        typer.echo(f"{text}; the same command goes on", err=True)
+        raise typer.Exit(3)
     samples = len(loaded.plans) * loaded.ensemble.samples
     typer.echo(f"{samples - len(stored.failures)} samples in {out}")
     if stored.failures:
@@ -142,7 +154,9 @@ def check(
     for name, text in _description(loaded):
         typer.echo(f"  {name:20s} {text}")
     if probe:
-        for name, text in _cost(loaded):
+        with Meter("timing a few samples"):
+            cost = _cost(loaded)
+        for name, text in cost:
             typer.echo(f"  {name:20s} {text}")
 
 

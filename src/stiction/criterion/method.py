@@ -13,7 +13,7 @@ from stiction._typing import Array
 from stiction.criterion.moving_average import minimum_rows
 from stiction.criterion.nucleation import (
     Weights,
-    averaged_load,
+    excess_of,
     multiplier_of,
     uniform_rates,
     warn_if_coarse,
@@ -21,8 +21,6 @@ from stiction.criterion.nucleation import (
 from stiction.problem import Problem
 from stiction.results import Variable, onset_variables
 from stiction.sample import Sample
-
-ENOUGH_POINTS = 16
 
 
 @model(kw_only=True)
@@ -40,9 +38,8 @@ class LocalCriterion:
 
     Notes
     -----
-    The minimum is taken between the nodes, on the trigonometric interpolant of the profile. A
-    measured profile that jumps from node to node rings there, and the minimum may fall somewhat
-    below its lowest value; a grid that resolves the jumps cures it.
+    The weights of the average are never negative, so the result lies between the least and the
+    greatest strength also where the strength jumps. The minimum is taken between the nodes.
     """
 
     weights: Weights = "exact"
@@ -94,9 +91,8 @@ class LocalCriterion:
             found = multipliers.get(rate)
             if found is None:
                 length = problem.nucleation_length_of(rate)
-                # Enough points in h_n for a parabola to find every minimum between them.
-                factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / length)
-                found = multiplier_of(problem, length, self.weights), factor
+                reach = math.ceil(0.5 * length / problem.interface.spacing) + 2
+                found = multiplier_of(problem, length, self.weights), reach
                 if len(multipliers) < 64:  # random rates: every sample has its own
                     multipliers[rate] = found
             return found
@@ -104,15 +100,14 @@ class LocalCriterion:
         def solve(rows: Sample) -> dict[str, Array]:
             warn_if_coarse(problem, rows)
             rates = uniform_rates(rows)
-            excess = np.ascontiguousarray(rows.strength - rows.initial_stress)
+            excess = excess_of(rows)
             load, place = np.empty(rows.samples), np.empty(rows.samples)
             for rate in np.unique(rates):
                 same = rates == rate
-                table, factor = multiplier(float(rate))
-                averaged_load(rows, table)  # refuses a load that is too sharp for the grid
+                table, reach = multiplier(float(rate))
                 lowest, where = np.empty(np.sum(same)), np.empty(np.sum(same))
                 some = excess if same.all() else excess[same]
-                minimum_rows(some, rows.load_profile, table, factor, lowest, where)
+                minimum_rows(some, rows.load_profile, table, reach, lowest, where)
                 load[same], place[same] = lowest, where
             stress = rows.mean_stress(load)
             return {

@@ -16,86 +16,118 @@ def average_rows(profiles: Array, multiplier: Array, out: Array) -> None:
         out[row] = np.fft.irfft(np.fft.rfft(profiles[row]) * multiplier, nodes)
 
 
-@jit
-def _interpolant(spectrum: Array, nodes: int, theta: float) -> tuple[float, float, float]:
-    """Value, first and second derivative in theta = 2 pi x/L of the trigonometric interpolant."""
-    half = nodes // 2
-    step = complex(np.cos(theta), np.sin(theta))
-    power = complex(1.0, 0.0)
-    value, slope, curvature = spectrum[0].real, 0.0, 0.0
-    for m in range(1, half + 1):
-        power *= step
-        term = spectrum[m] * power
-        weight = 1.0 if m == half else 2.0
-        value += weight * term.real
-        slope -= weight * m * term.imag
-        curvature -= weight * m * m * term.real
-    return value / nodes, slope / nodes, curvature / nodes
+STENCIL = 10
+# Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
+_FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
 
 @jit
-def _quotient(
-    spectrum: Array, scale: Array, nodes: int, theta: float
-) -> tuple[float, float, float]:
-    """Value and two derivatives of the interpolant of `spectrum` over that of `scale`.
+def _slope(power: Array, u: float) -> tuple[float, float]:
+    """First and second derivative of a polynomial."""
+    slope, curvature = 0.0, 0.0
+    for p in range(STENCIL - 1, 0, -1):
+        curvature = curvature * u + slope
+        slope = slope * u + p * power[p]
+    return slope, curvature
 
-    A uniform scale comes as a spectrum of its mean alone, and costs nothing.
+
+@jit
+def _fit(values: Array, cell: int, power: Array) -> None:
+    """The polynomial through the ten nodes around the cell from node `cell` to the next."""
+    power[:] = 0.0
+    for j in range(STENCIL):
+        value = values[(cell - STENCIL // 2 + 1 + j) % values.size] - values[cell]
+        for p in range(STENCIL):
+            power[p] += _FIT[p, j] * value
+
+
+@jit
+def _between(values: Array, node: int, side: int, power: Array) -> tuple[float, float]:
+    """The minimum between the lowest `node` and the one beside it: its value and place, in nodes.
+
+    Newton's method on the slope of the local polynomial, kept between the points where the slope
+    is known to change sign; it bisects where the function is not convex.
     """
-    value, slope, curvature = _interpolant(spectrum, nodes, theta)
-    if scale.size == 1:
-        factor = nodes / scale[0].real
-        return value * factor, slope * factor, curvature * factor
-    below, slope_below, curvature_below = _interpolant(scale, nodes, theta)
-    value /= below
-    slope = (slope - value * slope_below) / below
-    curvature = (curvature - 2.0 * slope * slope_below - value * curvature_below) / below
-    return value, slope, curvature
-
-
-@jit
-def _newton(
-    spectrum: Array, scale: Array, nodes: int, node: int, start: float
-) -> tuple[float, float]:
-    """The quotient's minimum within one spacing of `node`: its value and place, in nodes.
-
-    Newton's method on the slope, from `start`, kept between the points where the slope is known
-    to change sign; it bisects where the function is not convex.
-    """
-    angle = 2.0 * np.pi / nodes
-    low, high = node - 1.0, node + 1.0
-    place = start
+    cell = node if side > 0 else (node - 1) % values.size
+    _fit(values, cell, power)
+    u = -0.5 * side
+    if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
+        return values[node], float(node)
+    low, high = -0.5, 0.5
     for _ in range(50):
-        value, slope, curvature = _quotient(spectrum, scale, nodes, place * angle)
+        slope, curvature = _slope(power, u)
         if slope > 0.0:
-            high = place
+            high = u
         else:
-            low = place
-        move = -slope / (curvature * angle) if curvature > 0.0 else np.inf
-        if abs(move) < 1e-4:  # what is left of Newton's series is below round-off
-            return value + 0.5 * slope * move * angle, place + move
-        place = place + move if low < place + move < high else 0.5 * (low + high)
-    return value, place
+            low = u
+        move = -slope / curvature if curvature > 0.0 else np.inf
+        if abs(move) < 1e-11:
+            break
+        u = u + move if low < u + move < high else 0.5 * (low + high)
+    value = 0.0
+    for p in range(STENCIL - 1, -1, -1):
+        value = value * u + power[p]
+    return values[cell] + value, node + 0.5 * side + u
 
 
 @jit
-def refine_minimum(values: Array, spectrum: Array, scale: Array) -> tuple[float, float]:
-    """Minimum of the interpolant of `spectrum` over that of `scale`, and its place in nodes.
+def _above_secants(values: Array, node: int, side: int) -> float:
+    """What a convex function of these values cannot fall below between a node and the next.
 
-    A parabola through each local minimum of the nodes' `values` estimates how low the function
-    falls there; Newton's method takes the lowest to round-off, and any other that might be lower.
+    It lies above the lines through the two values on either side, extended until they meet. Where
+    the values are not convex there is no such bound.
     """
     nodes = values.size
-    lows, starts = np.empty(nodes // 2 + 1), np.empty(nodes // 2 + 1)
+    here, following = values[node], values[(node + side) % nodes]
+    before = here - values[(node - side) % nodes]
+    after = values[(node + 2 * side) % nodes] - following
+    rise = following - here
+    if not before <= rise <= after:
+        return -np.inf
+    if before == after:
+        return min(here, following)
+    return here + before * (after - rise) / (after - before)
+
+
+@jit
+def _limited(
+    values: Array, ratio: Array, reach: int, node: int, power: Array
+) -> tuple[float, float]:
+    """The minimum near `node`, kept to what weights that are not negative allow.
+
+    The polynomial rings where the strength jumps. It may not fall below the least ratio of
+    strength to load under the patch, nor below the secants of the values around.
+    """
+    least = np.inf
+    for j in range(node - reach, node + reach + 1):
+        least = min(least, ratio[j % ratio.size])
+    lowest, where = values[node], float(node)
+    for side in (-1, 1):
+        value, place = _between(values, node, side, power)
+        value = max(value, least, _above_secants(values, node, side))
+        if value < lowest:
+            lowest, where = value, place
+    return lowest, where
+
+
+@jit
+def refine_minimum(values: Array, ratio: Array, reach: int) -> tuple[float, float]:
+    """Minimum of a smooth function between the nodes of its `values`, and its place in nodes.
+
+    A parabola through each local minimum of the nodes estimates how low the function falls there;
+    a polynomial through ten nodes takes the lowest, and any other that might be lower.
+    """
+    nodes = values.size
+    lows = np.empty(nodes // 2 + 1)
     lowest = np.empty(nodes // 2 + 1, dtype=np.int64)
+    power = np.empty(STENCIL)
     count, best = 0, 0
     left, middle = values[nodes - 1], values[0]
     for i in range(nodes):
         right = values[i + 1] if i + 1 < nodes else values[0]
         if middle <= left and middle < right:
-            bend = left - 2.0 * middle + right
-            shift = 0.5 * (left - right) / bend
+            shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
             lows[count] = middle - 0.25 * (left - right) * shift
-            starts[count] = i + shift
             lowest[count] = i
             if lows[count] < lows[best]:
                 best = count
@@ -103,7 +135,7 @@ def refine_minimum(values: Array, spectrum: Array, scale: Array) -> tuple[float,
         left, middle = middle, right
     if count == 0:  # constant
         return values[0], 0.0
-    value, place = _newton(spectrum, scale, nodes, lowest[best], starts[best])
+    value, place = _limited(values, ratio, reach, lowest[best], power)
     for i in range(count):
         if i == best:
             continue
@@ -113,7 +145,7 @@ def refine_minimum(values: Array, spectrum: Array, scale: Array) -> tuple[float,
         before = abs(right - 3.0 * middle + 3.0 * left - values[node - 2])
         after = abs(values[(node + 2) % nodes] - 3.0 * right + 3.0 * middle - left)
         if lows[i] - 0.065 * max(before, after) < value:
-            other, elsewhere = _newton(spectrum, scale, nodes, node, starts[i])
+            other, elsewhere = _limited(values, ratio, reach, node, power)
             if other < value:
                 value, place = other, elsewhere
     place %= nodes
@@ -122,28 +154,19 @@ def refine_minimum(values: Array, spectrum: Array, scale: Array) -> tuple[float,
 
 @jit
 def minimum_rows(
-    excess: Array, load: Array, multiplier: Array, factor: int, minimum: Array, place: Array
+    excess: Array, load: Array, multiplier: Array, reach: int, minimum: Array, place: Array
 ) -> None:
     """Minimum over x of <g, excess>/<g, load> for every row, and where, in units of nodes.
 
-    Both averages are trigonometric interpolants; the weight of the load has unit integral. The
-    minimum is sought on a grid `factor` times finer and then between its nodes.
+    The weight of the load has unit integral; a patch reaches `reach` nodes to either side.
     """
     rows, nodes = excess.shape
-    fine = factor * nodes
-    half = nodes // 2
-    below = np.zeros(fine // 2 + 1, dtype=np.complex128)
-    below[: half + 1] = np.fft.rfft(load) * (multiplier * (factor / multiplier[0]))
-    if factor > 1:  # the highest mode of the coarse grid stands for both of its signs
-        below[half] *= 0.5
-    scale = np.fft.irfft(below, fine)
-    if np.ptp(load) <= 1e-14 * load[0]:
-        below = below[:1].copy()
-    spectrum = np.zeros(fine // 2 + 1, dtype=np.complex128)
+    scale = np.fft.irfft(np.fft.rfft(load) * (multiplier / multiplier[0]), nodes)
     for row in range(rows):
-        spectrum[: half + 1] = np.fft.rfft(excess[row]) * (multiplier * factor)
-        if factor > 1:
-            spectrum[half] *= 0.5
-        quotient = np.fft.irfft(spectrum, fine) / scale
-        minimum[row], where = refine_minimum(quotient, spectrum, below)
-        place[row] = where / factor
+        ratio = multiplier[0] * excess[row] / load
+        values = np.fft.irfft(np.fft.rfft(excess[row]) * multiplier, nodes) / scale
+        # The weights keep to this bound; only the rounding of the transforms may not.
+        least = ratio.min()
+        for i in range(nodes):
+            values[i] = max(values[i], least)
+        minimum[row], place[row] = refine_minimum(values, ratio, reach)

@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._model import describe, real_array, to_plain
+from stiction._progress import Meter
 from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.frames import Frames, check_variables
@@ -32,8 +33,12 @@ from stiction.dynamics.method import (
 )
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.errors import InputError, warn_accuracy
+from stiction.gaps import gather, with_gaps
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.profiles import at_nodes
 from stiction.results import Variable
+from stiction.sample import named_profiles
 
 Stop = Literal["sliding", "onset", "arrest", "time"]
 
@@ -80,6 +85,13 @@ def _progress(state: State) -> Progress:
     )
 
 
+def _note(now: Progress) -> str:
+    return (
+        f"t = {now.time:.6g} s, mean stress {now.mean_stress * 1e-6:.4f} MPa,"
+        f" {now.weakened_fraction:.0%} weakened"
+    )
+
+
 def _finite(value: Any) -> bool:
     number = isinstance(value, Real) and not isinstance(value, bool)
     return number and math.isfinite(float(value))
@@ -110,8 +122,9 @@ def _check(options: dict[str, Any]) -> None:
             problems.append(f"{name}: must be a path, got {describe(value)}")
         elif name == "checkpoint" and value is not None and Path(value).is_dir():
             problems.append(f"checkpoint: {str(value)!r} is a folder; name a file")
-    if options["progress"] is not None and not callable(options["progress"]):
-        problems.append(f"progress: must be callable, got {describe(options['progress'])}")
+    told = options["progress"]
+    if told is not None and not isinstance(told, bool) and not callable(told):
+        problems.append(f"progress: must be true, false or callable, got {describe(told)}")
     if not isinstance(options["method"], Rupture):
         problems.append(
             "method: must be a method object st.Rupture(loading_rate=...), got "
@@ -166,7 +179,7 @@ def simulate_rupture(
     checkpoint: str | Path | None = None,
     checkpoint_every: int = 10_000,
     restart: str | Path | None = None,
-    progress: Callable[[Progress], Any] | None = None,
+    progress: bool | Callable[[Progress], Any] | None = True,
 ) -> xr.Dataset:
     """Simulate one interface from its first slip to global sliding, in space and time.
 
@@ -208,8 +221,9 @@ def simulate_rupture(
     restart : path, optional
         Checkpoint of the same run to go on from; every later number is the same, bit by bit. The
         result holds what comes after it (with `store`, everything).
-    progress : callable, optional
-        Called with a `Progress` after each frame.
+    progress : bool or callable
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable is called with a `Progress` after each frame.
 
     Returns
     -------
@@ -228,9 +242,11 @@ def simulate_rupture(
     """
     _check(dict(locals()))
     check_variables(variables)
-    rows = problem.sample(profiles)
+    given, measured = gather(problem, named_profiles(profiles), "refuse")
+    rows = problem.sample(given)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
+    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
@@ -242,6 +258,8 @@ def simulate_rupture(
     if end_time is not None:
         run.control[monitor.END_TIME] = end_time
     if restart is None:
+        if initial_slip is not None:
+            initial_slip = at_nodes("initial_slip", initial_slip, "slip", problem.interface).values
         state = _initial(run, initial_slip, initial_load)
     else:
         state = read_checkpoint(restart, run)
@@ -273,6 +291,7 @@ def simulate_rupture(
     reason = "max_steps"
     near = _NEAR_ONSET * drop
     record = np.empty((max(every, every_implicit, every_near_onset or 1), monitor.COLUMNS))
+    meter = Meter("rupture", show=progress is True, unit="steps").start()
     try:
         while state.steps < method.max_steps:
             count = every if state.explicit else every_implicit
@@ -289,8 +308,9 @@ def simulate_rupture(
             if ended or interval is None or state.time // interval > before // interval:
                 frames.add(state)
             before = state.time
-            if progress is not None:
+            if callable(progress):
                 progress(_progress(state))
+            meter.note, meter.done = _note(_progress(state)), state.steps
             if ended:
                 reason = ended
                 break
@@ -307,6 +327,8 @@ def simulate_rupture(
         # Interrupted or out of disk: what was computed is worth keeping.
         _quietly(flush)
         raise
+    finally:
+        meter.stop()
     attributes["stopped"] = reason
     flush()  # before the checkpoint, which counts on the frames up to it
     if checkpoint is not None and not reason.startswith("not finite"):
@@ -317,7 +339,8 @@ def simulate_rupture(
         dataset.attrs["store"] = str(stream.folder)
     else:
         dataset = chunk_dataset(frames.take(), x, attributes)
-    return _complete(dataset, problem, method, run, state)
+    result = _complete(dataset, problem, method, run, state)
+    return result if measured is None else with_gaps(problem, result, measured)
 
 
 def _quietly(action: Callable[[], None]) -> None:

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from stiction._model import describe, to_plain
-from stiction._progress import progress_bar
+from stiction._model import describe, names_to_keep, to_plain, whole
+from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.assemble import Gathered, GridAxis
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.scheduler import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
-from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
 from stiction.evaluation import Method, check_method
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField, warn_if_inaccurate
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.sample import PROFILES
@@ -46,7 +49,8 @@ def make_plan(
         interface = as_random_interface(random)
     except InputError as error:
         problems += error.problems
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    number = whole(seed)
+    if number is None or number < 0:
         problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
     if isinstance(problem, Problem):
         for reason in method.supports(problem):
@@ -59,9 +63,9 @@ def make_plan(
                 problems += [f"{name}: {text}" for text in error.problems]
         method, mistakes = _keep_of_method(problem, method, keep, set(interface.names))
         problems += mistakes
-    if problems or interface is None:
+    if problems or interface is None or number is None:
         raise InputError(problems)
-    return Plan(problem, interface, method, int(seed), keep, keep_samples)
+    return Plan(problem, interface, method, number, keep, keep_samples)
 
 
 def _keep_of_method(
@@ -93,22 +97,29 @@ def _keep_of_method(
     return method, problems
 
 
-def check_count(name: str, value: Any, smallest: int) -> None:
-    """Refuse what is not a whole number of at least `smallest`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
+def check_count(name: str, value: Any, smallest: int) -> int:
+    """`value` as an int (1e4 too), if it is a whole number of at least `smallest`."""
+    count = whole(value)
+    if count is None or count < smallest:
         raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
+    return count
 
 
-def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> None:
-    """Refuse arguments of a run that make no sense, before any work is done."""
-    check_count("samples", samples, 1)
-    check_count("first", first, 0)
+def check_run(
+    samples: Any, first: Any, workers: Any, executor: Any, time_limit: Any = None
+) -> tuple[int, int, int | None]:
+    """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
+    samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
     if workers is not None:
-        check_count("workers", workers, 1)
+        workers = check_count("workers", workers, 1)
     if executor is not None and not hasattr(executor, "submit"):
         raise InputError(
             f"executor: must be a concurrent.futures executor, got {describe(executor)}"
         )
+    problems = check_time_limit(time_limit)
+    if problems:
+        raise InputError(problems)
+    return samples, first, workers
 
 
 def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
@@ -130,7 +141,7 @@ def check_size(needed: float, limit: float) -> None:
 
 
 def warn_of_fields(plans: Sequence[Plan]) -> None:
-    """Warn of fields that the grid or the interface cannot do justice to, once each."""
+    """Warn of fields that do not go with the grid, the interface or their units, once each."""
     pairs = list(
         dict.fromkeys(
             (field, plan.problem.interface)
@@ -142,10 +153,14 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
         warnings.simplefilter("always")
         for field, interface in pairs:
             warn_if_inaccurate(field, interface)
-    for warning in caught[:FEW]:
-        warn_accuracy(str(warning.message))
-    if len(caught) > FEW:
-        more = f"{len(caught) - FEW} more warnings like these, at other points of the sweep"
+        for problem, random in dict.fromkeys((plan.problem, plan.random) for plan in plans):
+            warn_of_units(problem, random.strength.mean)
+            check_residual(problem, random.properties)
+    found_warnings = list(dict.fromkeys((str(w.message), w.category) for w in caught))
+    for text, category in found_warnings[:FEW]:
+        warn_user(text, category)
+    if len(found_warnings) > FEW:
+        more = f"{len(found_warnings) - FEW} more warnings like these, at other points of the sweep"
         warn_accuracy(more)
 
 
@@ -176,24 +191,48 @@ def run_plans(
     attributes: Mapping[str, Any],
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
+    time_limit: float | None = None,
 ) -> xr.Dataset:
     """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
-    check_run(samples, first, workers, executor)
+    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
     warn_of_fields(plans)
     workers = usable_cores() if workers is None else workers
     gathered = Gathered(plans, samples, first)
     total = len(plans) * samples
-    with progress_bar(total, method_name(plans), progress) as report:
+    done = np.zeros((len(plans), samples), dtype=np.bool_)
+    with Meter(method_name(plans), total, progress, time_limit=time_limit) as meter:
         spans = [Span(point, first, samples) for point in range(len(plans))]
-        for outcome in share_out(plans, spans, executor=executor, workers=workers):
-            if outcome is None:
-                continue
-            if outcome.failures:
-                raise_failure(outcome.failures[0])
-            gathered.add(outcome)
-            report(outcome.count)
-    return gathered.dataset(attributes, axes)
+        work = share_out(plans, spans, executor=executor, workers=workers)
+        for outcome in work:
+            if outcome is not None:
+                if outcome.failures:
+                    raise_failure(outcome.failures[0])
+                gathered.add(outcome)
+                done[outcome.point, outcome.samples - first] = True
+                meter.advance(outcome.count)
+            if meter.over:
+                work.close()
+                break
+    result = gathered.dataset(attributes, axes)
+    return result if done.all() else _cut_short(result, done)
+
+
+def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
+    """What there is when the time was over: the first samples, up to one that no point has."""
+    count = int(np.argmin(np.append(done.any(axis=0), False)))
+    if not count:
+        raise TimeoutError(
+            "time_limit: not one sample was done in this time; raise time_limit, or give out= to"
+            " keep what is done and go on later"
+        )
+    result = result.isel(sample=slice(0, count))
+    if "kept_sample" in result.dims:
+        there = np.isin(result["kept_sample"].values, result["sample"].values)
+        result = result.isel(kept_sample=there)
+    text = f"{done[:, :count].sum()} of {done.size} samples were done when the time was over"
+    warn_accuracy(text)
+    return result.assign_attrs(cut_short=text)
 
 
 def method_name(plans: Sequence[Plan]) -> str:
@@ -210,12 +249,13 @@ def monte_carlo(
     samples: int,
     seed: int = 0,
     first: int = 0,
-    keep: tuple[str, ...] = (),
+    keep: str | Sequence[str] = (),
     keep_samples: Sequence[int] | None = None,
     keep_limit: float = KEEP_LIMIT,
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
+    time_limit: float | None = None,
 ) -> xr.Dataset:
     """Onset of many random interfaces.
 
@@ -233,7 +273,7 @@ def monte_carlo(
         Not negative.
     first : int
         Number of the first sample, to continue an ensemble.
-    keep : tuple of str
+    keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"sensitivity"``.
     keep_samples : sequence of int, optional
@@ -245,7 +285,11 @@ def monte_carlo(
     executor : concurrent.futures.Executor, optional
         Anything that has `submit`: processes, a Dask client's executor, ... instead of threads.
     progress : bool or callable
-        True shows a bar on a terminal; a callable gets (done, total).
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
+    time_limit : float, optional
+        Seconds. When they are over, the result holds the samples that are done, with the
+        attribute 'cut_short'; they are the first ones, to which `first` adds the rest later.
 
     Returns
     -------
@@ -259,10 +303,17 @@ def monte_carlo(
         Naming all that does not fit; a sample that does not fit is named with its seed.
     RuntimeError
         Naming the sample and the seed, if a solver fails.
+    TimeoutError
+        If not one sample was done within `time_limit`.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the time limit was reached.
     """
     chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, random, method, seed, tuple(keep), chosen)
-    check_run(samples, first, workers, executor)
+    plan = make_plan(problem, random, method, seed, names_to_keep(keep), chosen)
+    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],
@@ -272,4 +323,5 @@ def monte_carlo(
         workers=workers,
         executor=executor,
         progress=progress,
+        time_limit=time_limit,
     )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 
-from stiction._progress import progress_bar
+from stiction._progress import Meter, Show
 from stiction.ensemble.monte_carlo import method_name
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.scheduler import share_out, usable_cores
@@ -27,13 +27,14 @@ def run_stored(
     first: int = 0,
     workers: int | None = None,
     executor: Executor | None = None,
-    progress: bool | Callable[[int, int], None] = False,
+    progress: Show = True,
     retry: bool = False,
+    time_limit: float | None = None,
 ) -> list[Failure]:
     """Compute what is missing in a store, and store it as it is done, about once a second.
 
     Samples that fail are listed in the store and the others go on, unless all fail from the
-    start.
+    start. When the seconds of `time_limit` are over, it ends; what is missing stays missing.
 
     Returns
     -------
@@ -72,16 +73,18 @@ def run_stored(
         workers=usable_cores() if workers is None else workers,
         seconds=FLUSH_SECONDS,
     )
-    with progress_bar(to_do, method_name(plans), progress) as report:
+    with Meter(method_name(plans), to_do, progress, time_limit=time_limit) as meter:
         try:
             for outcome in work:
                 if outcome is not None:
                     buffer.append(outcome)
-                    report(outcome.count)
+                    meter.advance(outcome.count)
                     _give_up_if_hopeless(outcome, alive, lost)
                 late = time.monotonic() - flushed >= FLUSH_SECONDS
                 if late or sum(outcome.nbytes for outcome in buffer) >= FLUSH_BYTES:
                     flush()
+                if meter.over:
+                    break
         finally:  # also on Ctrl-C, and when workers are lost: what is done is kept
             work.close()
             flush()

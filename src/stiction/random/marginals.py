@@ -132,6 +132,22 @@ def _check_moments(name: str, distribution: Any, parameters: Any) -> None:
         )
 
 
+def _frozen(family: Any) -> Any:
+    """A distribution without parameters, such as a histogram, as a frozen one; others are refused.
+
+    A named family without its parameters would stand at 0 Pa with a width of 1 Pa.
+    """
+    name = str(getattr(family, "name", None) or type(family).__name__)
+    known = type(family) is type(getattr(scipy.stats, name, None))
+    if known or family.shapes:
+        given = ", ".join(f"{key}=..." for key in _parameter_names(family))
+        raise InputError(
+            f"scipy.stats.{name} is a family without parameters; freeze it by giving them:"
+            f" scipy.stats.{name}({given}), loc and scale in Pa"
+        )
+    return family()
+
+
 def _marginal(value: Any) -> Any:
     if isinstance(value, Beta | ScipyMarginal | PythonMarginal):
         return value
@@ -144,6 +160,8 @@ def _marginal(value: Any) -> Any:
             return Beta(**given)
         return _scipy_marginal(str(name), given)
     family = getattr(value, "dist", None)
+    if isinstance(value, scipy.stats.rv_continuous):
+        return _marginal(_frozen(value))
     if not isinstance(family, scipy.stats.rv_continuous):
         raise InputError(
             "must be st.Beta(...) or a frozen continuous scipy.stats distribution such as"

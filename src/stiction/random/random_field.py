@@ -11,18 +11,19 @@ import numpy as np
 import pydantic
 from pydantic import model_validator
 
-from stiction._model import Flag, Positive, describe, model, real_array
+from stiction._model import Flag, Positive, describe, model, real_array, whole
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.random.draws import standard_normal
-from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.hermite import correlation_of_mapped, hermite_coefficients, share_unaccounted
 from stiction.random.marginals import Marginal
 from stiction.random.quantile_table import from_normal
 from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
 from stiction.random.synthesis import gaussian_rows
 
 FEWEST_LENGTHS = 4.0
+ENOUGH_ACCOUNTED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,11 +124,9 @@ class RandomField:
         (samples, dimension) array
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
-        _check_counts(samples=samples, seed=seed, first=first, stream=stream)
+        counts = _check_counts(samples=samples, seed=seed, first=first, stream=stream)
         modes = self.modes(interface).count
-        return standard_normal(
-            seed, samples, modes, first=first, stream=stream, mean_mode=self.mean_mode
-        )
+        return standard_normal(**counts, modes=modes, mean_mode=self.mean_mode)
 
     def gaussian(self, interface: Interface, draws: Array) -> Array:
         """The underlying Gaussian field z of given draws, shape (samples, nodes), unit variance."""
@@ -211,6 +210,11 @@ class RandomField:
         interface : Interface
         of : {"strength", "z"}
             Of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian one.
+
+        Warns
+        -----
+        AccuracyWarning
+            If the tails of the marginal are too heavy for its correlation, with the largest error.
         """
         modes = self.modes(interface)
         spectrum = np.zeros(interface.size)
@@ -218,10 +222,21 @@ class RandomField:
         rho = np.fft.fft(spectrum).real
         if _which(of) == "z":
             return rho
-        return correlation_of_mapped(rho, hermite_coefficients(self.marginal))
+        return correlation_of_mapped(rho, self._map_coefficients())
+
+    def _map_coefficients(self) -> Array:
+        coefficients = hermite_coefficients(self.marginal)
+        error = share_unaccounted(coefficients)
+        if error > ENOUGH_ACCOUNTED:
+            warn_accuracy(
+                f"the correlation of the strength is uncertain by up to {error:.2g}: so much of the"
+                " variance of this marginal lies in tails too far out, or jumps too sharp, for its"
+                " expansion"
+            )
+        return coefficients
 
     def efolding_length(self, *, of: str = "strength") -> float:
-        """Distance at which the correlation falls to 1/e, m, on an infinite line.
+        """Distance at which the correlation falls to 1/e, m, truncation included, infinite line.
 
         Parameters
         ----------
@@ -230,7 +245,7 @@ class RandomField:
         """
         if _which(of) == "z":
             return self.spectrum.efolding_length
-        coefficients = hermite_coefficients(self.marginal)
+        coefficients = self._map_coefficients()
         low, high = 0.0, 1.0
         for _ in range(60):  # the correlation of the mapped field is monotone in that of z
             rho = 0.5 * (low + high)
@@ -267,14 +282,16 @@ def _which(of: str) -> str:
     return of
 
 
-def _check_counts(**counts: Any) -> None:
+def _check_counts(**counts: Any) -> dict[str, int]:
+    numbers = {name: whole(value) for name, value in counts.items()}
     problems = [
-        f"{name}: must be a whole number >= 0, got {value!r}"
-        for name, value in counts.items()
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0
+        f"{name}: must be a whole number >= 0, got {counts[name]!r}"
+        for name, number in numbers.items()
+        if number is None or number < 0
     ]
     if problems:
         raise InputError(problems)
+    return {name: int(counts[name]) for name in numbers}
 
 
 MOST_MODES = 1 << 22
@@ -323,6 +340,8 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
             f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
             f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
         )
+    if isinstance(field.spectrum, CustomSpectrum):
+        _warn_of_lines(field.spectrum, modes.count, interface)
     if field.mean_mode:
         return
     ratio = interface.extent / field.spectrum.efolding_length
@@ -334,3 +353,19 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
                 f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
                 " RandomField(mean_mode=True) restores the mean's variability"
             )
+
+
+def _warn_of_lines(spectrum: CustomSpectrum, count: int, interface: Interface) -> None:
+    """Warn where the modes of an interface fall beside or upon something narrow."""
+    apart = 2.0 * math.pi / interface.extent
+    if count < 1:
+        return
+    seen = apart * float(spectrum.density(apart * np.arange(1, count + 1)).sum())
+    ends = [spectrum.power_integral(k) for k in (0.5 * apart, (count + 0.5) * apart)]
+    ratio = seen / (ends[1] - ends[0]) if ends[1] > ends[0] else np.inf
+    if abs(ratio - 1.0) > 0.1:
+        warn_accuracy(
+            f"the modes of this interface, {apart:.3g} rad/m apart, carry {ratio:.3g} times the"
+            " power of the spectrum: it has lines or steps narrower than that, which a longer"
+            " interface would resolve"
+        )

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stiction._progress import TimeUp, duration
 from stiction._typing import Array
 from stiction.reliability.importance import Mixture, design_point
 from stiction.reliability.limit_state import LimitState
-from stiction.reliability.plain_monte_carlo import Count, count_failures
+from stiction.reliability.plain_monte_carlo import Count, count_failures, tally
 from stiction.reliability.pooling import Tail, run_until_precise, weights
 from stiction.reliability.result import FailureProbability, distinct, profiles_of, say
 from stiction.reliability.subset import MOST_LEVELS, Descent, descend
 from stiction.reliability.two_level import Bridge, bridge
 from stiction.reliability.uncertainty import (
-    binomial_interval,
     effective_size,
     generator,
     lognormal_interval,
@@ -47,7 +47,7 @@ class Request:
     seed, budget : int
     confidence : float
     pilot : int
-        First samples of plain Monte Carlo.
+        Least samples of plain Monte Carlo.
     spent : int
         Evaluations already made to choose the algorithm.
     """
@@ -71,35 +71,76 @@ def first_size(usual: int, budget: int) -> int:
     return min(usual, max(budget // 4, 20))
 
 
-def _missed(request: Request, cov: float) -> list[str]:
+def short_of(state: LimitState, evaluations: int) -> str:
+    """That there were too few evaluations, and what to do."""
+    return f"{ran_out(state, evaluations)} do not suffice; {advice(state)}"
+
+
+def ran_out(state: LimitState, evaluations: int) -> str:
+    """What was not enough, in words."""
+    limit = duration(state.meter.time_limit or 0.0)
+    return f"{evaluations} evaluations" + (f" in {limit}" if state.meter.over else "")
+
+
+def advice(state: LimitState) -> str:
+    """How to get more evaluations."""
+    return "raise time_limit" if state.meter.over else "raise max_evaluations"
+
+
+def _missed(request: Request, cov: float, evaluations: int) -> list[str]:
     if cov <= request.target_cov:
         return []
-    return [
-        f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}:"
-        f" {request.budget + request.spent} evaluations do not suffice; raise max_evaluations"
-    ]
+    why = short_of(request.state, evaluations)
+    return [f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}: {why}"]
 
 
-def by_counting(request: Request, reason: str, seen: Count | None) -> FailureProbability:
-    """Plain Monte Carlo."""
-    state = request.state
-    count = count_failures(
-        state,
+def _cut(request: Request, cov: float) -> bool:
+    """Whether it was the time that ended it."""
+    return request.state.meter.over and cov > request.target_cov
+
+
+def unknown(request: Request, reason: str, evaluations: int) -> FailureProbability:
+    """The answer where the time was over before anything could be told."""
+    text = f"nothing is known of the probability: {short_of(request.state, evaluations)}"
+    return FailureProbability(
+        probability=math.nan,
+        coefficient_of_variation=math.inf,
+        interval=(0.0, 1.0),
+        evaluations=evaluations,
+        stress=request.stress,
+        lower_bound=request.state.bounds[0],
+        algorithm="none",
+        reason=reason,
+        confidence=request.confidence,
+        cut_short=True,
+        warnings=say([text]),
+    )
+
+
+def by_counting(request: Request, reason: str) -> FailureProbability:
+    """Plain Monte Carlo, with the samples after those that were looked at to choose it."""
+    count, evaluations = count_failures(
+        request.state,
         request.seed,
         request.stress,
         target_cov=request.target_cov,
-        first=request.pilot,
+        least=request.pilot,
         max_evaluations=request.budget,
-        so_far=seen,
+        start=request.spent,
     )
-    cov = count.coefficient_of_variation
+    return counted(request, count, request.spent + evaluations, reason)
+
+
+def counted(request: Request, count: Count, evaluations: int, reason: str) -> FailureProbability:
+    """What a count says."""
+    state, cov = request.state, count.coefficient_of_variation
     shown = [state.draws(request.seed, int(i), 1) for i in count.numbers[:SHOWN]]
     draws = np.concatenate(shown) if shown else np.empty((0, state.dimension))
     return FailureProbability(
         probability=count.probability,
         coefficient_of_variation=cov,
-        interval=binomial_interval(count.failures, count.samples, request.confidence),
-        evaluations=count.samples,
+        interval=count.interval(request.confidence),
+        evaluations=evaluations,
         stress=request.stress,
         lower_bound=state.bounds[0],
         algorithm="plain",
@@ -107,7 +148,8 @@ def by_counting(request: Request, reason: str, seen: Count | None) -> FailurePro
         confidence=request.confidence,
         failing_profiles=profiles_of(state, draws),
         diagnostics={"failures": count.failures, "samples": count.samples},
-        warnings=say(_missed(request, cov)),
+        cut_short=_cut(request, cov),
+        warnings=say(_missed(request, cov, evaluations)),
     )
 
 
@@ -119,6 +161,7 @@ def subset_diagnostics(tail: Tail[Descent], stress: float) -> dict[str, float]:
         * sum(
             (1.0 - level.probability) / (level.probability * run.samples) * (1 + level.correlation)
             for level in run.levels
+            if level.probability > 0.0  # a level of equal values, where a small run got stuck
         )
         for weight, run in zip(weights(runs), runs, strict=True)
     )
@@ -178,29 +221,29 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         first=first_size(SUBSET, request.budget),
         largest=SUBSET_MOST,
         max_evaluations=request.budget,
+        meter=state.meter,
     )
     tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
+    evaluations = request.spent + sum(run.evaluations for run in runs)
     diagnostics = subset_diagnostics(tail, stress)
     interval = lognormal_interval(probability, cov, request.confidence)
     if all(len(run.levels) == 1 for run in runs) and runs[0].complete:
         # So likely that there was nothing to go down to: the samples are independent.
-        seen = [run.populations[0].values < stress for run in runs]
-        count = Count(sum(int(s.sum()) for s in seen), sum(s.size for s in seen))
-        cov = count.coefficient_of_variation
-        interval = binomial_interval(count.failures, count.samples, request.confidence)
-    doubts = _missed(request, cov)
+        count = tally(np.concatenate([run.populations[0].values for run in runs]), stress)
+        cov, interval = count.coefficient_of_variation, count.interval(request.confidence)
+    doubts = _missed(request, cov, evaluations)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
         deep = len(runs[0].levels) >= MOST_LEVELS
-        advice = f"it stops after {MOST_LEVELS} levels" if deep else "raise max_evaluations"
+        rest = f"it stops after {MOST_LEVELS} levels" if deep else advice(state)
         reached = tail.probability(np.nextafter(lowest, math.inf))
         error = tail.coefficient_of_variation(np.nextafter(lowest, math.inf))
         interval = (0.0, lognormal_interval(reached, error, request.confidence)[1])
         doubts = [
             f"after {runs[0].evaluations} evaluations subset simulation had come down to"
             f" {lowest:.7g} Pa (P = {reached:.2g}) and not to {stress:.7g} Pa: the probability is"
-            f" below that of the last level, which is all that the interval says; {advice}"
+            f" below that of the last level, which is all that the interval says; {rest}"
         ]
     else:
         doubts += subset_doubts(tail, diagnostics)
@@ -211,7 +254,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         probability=probability,
         coefficient_of_variation=cov,
         interval=interval,
-        evaluations=request.spent + sum(run.evaluations for run in runs),
+        evaluations=evaluations,
         stress=stress,
         lower_bound=state.bounds[0],
         algorithm="subset",
@@ -220,6 +263,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         levels=runs[0].levels,
         failing_profiles=profiles_of(state, last.draws[chosen]),
         diagnostics=diagnostics,
+        cut_short=_cut(request, cov),
         warnings=say(doubts),
     )
 
@@ -250,10 +294,12 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         first=first_size(BRIDGE, request.budget),
         largest=BRIDGE_MOST,
         max_evaluations=request.budget,
+        meter=state.meter,
     )
     tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
-    doubts = _missed(request, cov)
+    evaluations = request.spent + sum(run.evaluations for run in runs)
+    doubts = _missed(request, cov, evaluations)
     interval = lognormal_interval(probability, cov, request.confidence)
     if probability == 0.0:
         descent = runs[0].descent
@@ -261,7 +307,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         interval = (0.0, reached)
         doubts = [
             "no failure was found by the exact limit state; the interval says only that it is"
-            " rarer than the last level by the local criterion; raise max_evaluations"
+            " rarer than the last level by the local criterion: " + short_of(state, evaluations)
         ]
     last = min(run.last for run in runs)
     failures = sum(int(np.sum(run.values < stress)) for run in runs)
@@ -291,7 +337,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         probability=probability,
         coefficient_of_variation=cov,
         interval=interval,
-        evaluations=request.spent + sum(run.evaluations for run in runs),
+        evaluations=evaluations,
         first_stage_evaluations=sum(run.first_stage_evaluations for run in runs),
         stress=stress,
         lower_bound=state.bounds[0],
@@ -301,6 +347,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         levels=largest.descent.levels,
         failing_profiles=profiles_of(state, largest.failing[chosen]),
         diagnostics=diagnostics,
+        cut_short=_cut(request, cov),
         warnings=say(doubts),
     )
 
@@ -316,7 +363,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             "the median interface already fails at this stress: there is nothing to shift, and"
             " this is plain Monte Carlo"
         )
-        counted = by_counting(request, reason, None)
+        counted = by_counting(request, reason)
         return replace(counted, warnings=(*counted.warnings, *say([text])))
     mixture = Mixture(point.draws, problem.interface.size, field.mean_mode)
     rng = generator(request.seed, 4)
@@ -326,7 +373,13 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
     while True:
         size = int(min(max(wanted - count, IMPORTANCE), IMPORTANCE_MOST, request.budget - count))
         draws = mixture.sample(size, rng)
-        failed = state(draws) < stress
+        try:
+            values = state(draws)
+        except TimeUp as up:
+            values, draws = up.values, draws[: up.values.size]
+            if count + values.size == 0:
+                raise
+        size, failed = values.size, values < stress
         weight = np.where(failed, np.exp(mixture.log_weights(draws)), 0.0)
         found.append(weight)
         kept.append(draws[failed][:SHOWN])
@@ -336,14 +389,15 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         cov = (
             float(sample.std()) / probability / math.sqrt(count) if probability > 0.0 else math.inf
         )
-        if cov <= request.target_cov or count >= request.budget:
+        if cov <= request.target_cov or count >= request.budget or state.meter.over:
             break
         factor = min((cov / request.target_cov) ** 2, 4.0)
         wanted = 1.05 * count * factor
+        state.meter.expect(min(count * (cov / request.target_cov) ** 2, request.budget) - count)
     total = float(sample.sum())
     share = float(sample.max()) / total if total > 0.0 else 1.0
     size_of = effective_size(sample)
-    doubts = _missed(request, cov)
+    doubts = _missed(request, cov, count)
     if cov > 0.0 and (size_of < FEWEST_WEIGHTS or share > LARGEST_SHARE):
         doubts.append(
             f"the weights are worth {size_of:.0f} equal ones only, and the largest is"
@@ -372,5 +426,6 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             "effective_sample_size": size_of,
             "largest_weight_share": share,
         },
+        cut_short=_cut(request, cov),
         warnings=say(doubts),
     )

@@ -8,12 +8,14 @@ import numpy as np
 import xarray as xr
 
 from stiction._model import describe, to_plain
+from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.reliability.algorithms import advice, ran_out, short_of
 from stiction.reliability.design import (
     TailRequest,
     check_probability,
@@ -55,12 +57,21 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
-def _plain(state: LimitState, seed: int, stress: Any, samples: int, confidence: float) -> Any:
-    """Probability and interval by counting, NaN where fewer than three samples go so low."""
+def _onsets(state: LimitState, seed: int, samples: int) -> Array:
+    """Stresses of the first samples of the ensemble, as many as there is time for."""
     parts = []
     for first in range(0, samples, BATCH):
-        parts.append(state(state.draws(seed, first, min(BATCH, samples - first))))
-    onset = np.sort(np.concatenate(parts))
+        try:
+            parts.append(state(state.draws(seed, first, min(BATCH, samples - first))))
+        except TimeUp as up:
+            parts.append(up.values)
+            break
+    return np.concatenate(parts)
+
+
+def _plain(onset: Array, stress: Any, confidence: float) -> Any:
+    """Probability and interval by counting, NaN where fewer than three samples go so low."""
+    samples, onset = onset.size, np.sort(onset)
     counts = np.searchsorted(onset, stress, side="left")
     rows = [
         (k / samples, *binomial_interval(int(k), samples, confidence)) if k > 2 else (np.nan,) * 3
@@ -94,6 +105,8 @@ def failure_curve(
     confidence: float = 0.95,
     event: Event = "critical_stress",
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> xr.Dataset:
     """P(onset < s) from one half down to a smallest probability.
 
@@ -111,8 +124,11 @@ def failure_curve(
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
     plain_samples : int
         Samples of plain Monte Carlo to compare with; 0 for none.
-    seed, max_evaluations, confidence, event, workers
+    seed, max_evaluations, confidence, event, workers, progress
         As in `failure_probability`.
+    time_limit : float, optional
+        Seconds. When they are over, the curve ends where it has come to, the plain samples are
+        those that are done, and the attribute 'cut_short' says so.
 
     Returns
     -------
@@ -120,15 +136,24 @@ def failure_curve(
         Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
         `probability_high` and `coefficient_of_variation`, `stress_low`, `stress_high` (Pa),
         `plain_probability` with interval (NaN where fewer than three samples fail) and, where the
-        interface is alike everywhere, `rice_probability`.
+        interface is alike everywhere, `rice_probability`. `stress_above_bound` means little where
+        the attribute `lower_bound` is zero or less.
 
     Raises
     ------
     InputError
         Naming all that does not fit.
+    TimeoutError
+        If not even a few samples were done within `time_limit`.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the evaluations or the time allowed do not suffice.
     """
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_probability("smallest", smallest)
+    problems += check_probability("smallest", smallest) + check_time_limit(time_limit)
+    meter = Meter("failure_curve", show=progress, time_limit=time_limit)
     for name, value, least in (
         ("points_per_decade", points_per_decade, 1),
         ("plain_samples", plain_samples, 0),
@@ -143,20 +168,40 @@ def failure_curve(
         seed,
         event,
         workers,
+        meter=meter,
         problems=problems,
         check=check_sampling,
     )
-    budget = budget_of(state, max_evaluations)
-    tail = subset_tail(TailRequest(state, float(smallest), target_cov, int(seed), budget))
-    deepest = float(smallest)
+    request = TailRequest(
+        state, float(smallest), target_cov, int(seed), budget_of(state, max_evaluations)
+    )
+    with meter:
+        meter.expect(request.budget, at_most=True)
+        try:
+            tail = subset_tail(request)
+        except TimeUp:
+            raise TimeoutError(f"no curve: {short_of(state, 0)}") from None
+        onsets = np.empty(0)
+        if plain_samples and not meter.over:
+            meter.stage("failure_curve, plain Monte Carlo", int(plain_samples))
+            onsets = _onsets(state, int(seed), int(plain_samples))
+    deepest, spent = float(smallest), sum(run.evaluations for run in tail.runs)
+    doubts = []
     if not tail.runs[0].complete:
         deepest = tail.probability(float(np.nextafter(tail.runs[0].levels[-1].threshold, np.inf)))
-        say(
-            [
-                f"the evaluations allowed do not reach P = {smallest:g}: the curve ends at"
-                f" {deepest:.2g}; raise max_evaluations"
-            ]
-        )
+        doubts = [
+            f"{ran_out(state, spent)} do not reach P = {smallest:g}: the curve ends at"
+            f" {deepest:.2g}; {advice(state)}"
+        ]
+    short = (
+        float(tail.coefficient_of_variation(tail.quantile(deepest))) > target_cov
+        or onsets.size < plain_samples
+    )
+    cut = meter.over and (bool(doubts) or short)
+    if cut and not doubts:
+        lacking = "the curve is less precise than asked for, or has fewer plain samples"
+        doubts = [f"{lacking}: {short_of(state, spent)}"]
+    say(doubts)
     decades = max(np.log10(COMMONEST / deepest), 0.0)
     count = int(np.ceil(decades * points_per_decade)) + 1
     chances = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
@@ -182,18 +227,20 @@ def failure_curve(
     }
     if state.not_alike_everywhere() is None:
         values["rice_probability"] = _rice(problem, state.random.strength, stress, int(seed))
-    if plain_samples:
-        plain = _plain(state, int(seed), stress, int(plain_samples), confidence)
+    if onsets.size:
+        plain = _plain(onsets, stress, confidence)
         values |= dict(zip(("plain_probability", "plain_low", "plain_high"), plain, strict=True))
     attributes: dict[str, Any] = {
         "lower_bound": lowest,
         "event": state.event,
         "confidence": float(confidence),
         "seed": int(seed),
-        "evaluations": sum(run.evaluations for run in tail.runs),
-        "plain_samples": int(plain_samples),
+        "evaluations": spent,
+        "plain_samples": onsets.size,
         "method": method.type,
     }
+    if cut:
+        attributes["cut_short"] = "; ".join(doubts)
     try:
         attributes["study"] = {
             "problem": to_plain(problem),

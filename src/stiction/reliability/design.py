@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from stiction._model import describe
+from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction.criterion.method import LocalCriterion
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.algorithms import BRIDGE, BRIDGE_MOST, SUBSET, SUBSET_MOST, first_size
+from stiction.reliability.algorithms import (
+    BRIDGE,
+    BRIDGE_MOST,
+    SUBSET,
+    SUBSET_MOST,
+    advice,
+    first_size,
+    ran_out,
+    short_of,
+)
 from stiction.reliability.estimate import (
     ALIKE,
     FREQUENT,
@@ -26,7 +36,7 @@ from stiction.reliability.estimate import (
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state, real_number
 from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
-from stiction.reliability.result import say
+from stiction.reliability.result import above_bound, say
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
@@ -59,6 +69,8 @@ class DesignStress:
     confidence : float
         Of `interval`.
     diagnostics : dict
+    cut_short : bool
+        Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the result is not to be trusted; empty if it is.
     """
@@ -74,6 +86,7 @@ class DesignStress:
     confidence: float
     first_stage_evaluations: int = 0
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
+    cut_short: bool = False
     warnings: tuple[str, ...] = ()
 
     @property
@@ -85,8 +98,9 @@ class DesignStress:
         low, high = self.interval
         return (
             f"{self.stress / 1e6:.7g} MPa ({100 * self.confidence:g} %: {low / 1e6:.7g} to"
-            f" {high / 1e6:.7g}), {self.stress_above_bound / 1e3:.4g} kPa above the bound, at"
+            f" {high / 1e6:.7g}){above_bound(self.stress, self.lower_bound)}, at"
             f" P = {self.probability:g}; {self.algorithm}, {self.evaluations} evaluations"
+            f"{', cut short' if self.cut_short else ''}"
         )
 
 
@@ -149,6 +163,7 @@ class TailRequest:
                 first=first_size(first, self.budget),
                 largest=largest,
                 max_evaluations=self.budget,
+                meter=self.state.meter,
             )
         )
 
@@ -164,6 +179,7 @@ def subset_tail(request: TailRequest) -> Tail[Descent]:
             rng=generator(request.seed, 5, number),
             samples=samples,
             probability=DEEPER * request.probability,
+            floor=state.bounds[0],
             max_evaluations=left,
         )
 
@@ -183,6 +199,7 @@ def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
             rng=generator(request.seed, 6, number),
             max_evaluations=left,
             probability=request.probability,
+            floor=state.bounds[0],
         )
 
     return request.pooled(make, BRIDGE, BRIDGE_MOST)
@@ -215,19 +232,34 @@ def _finish(
     if tail.runs[0].complete:
         stress = tail.quantile(probability)
         cov = tail.coefficient_of_variation(stress)
+        least = math.nextafter(lowest, math.inf)
+        on_it = tail.probability(least)
+        if on_it >= probability:
+            stress, cov = lowest, tail.coefficient_of_variation(least)
+            doubts.append(
+                f"{on_it:.2g} of all samples let go at the bound of {lowest:.7g} Pa, as far as the"
+                f" method can tell: the stress at P = {probability:g} is the bound itself"
+            )
         interval = stress_interval(tail, probability, cov, confidence, lowest)
         if cov > target_cov:
             doubts.append(
                 f"the coefficient of variation of the probability is {cov:.3g}, not"
-                f" {target_cov:g}: {evaluations} evaluations do not suffice; raise max_evaluations"
+                f" {target_cov:g}: {short_of(state, evaluations)}"
             )
     else:
-        asked = tail.runs[0].evaluations > 0
-        seen = tail.runs[0].extent[0] if asked else state.bounds[1]
+        # What was seen of the tail bounds the stress: below its lowest value nothing is known.
+        seen = tail.runs[0].extent[0]
         stress, cov, interval = seen, math.inf, (lowest, seen)
+        place = f"the stress lies below {seen:.7g} Pa, the lowest seen"
+        if not seen > lowest:
+            stress, interval = lowest, (lowest, state.bounds[1])
+            place = f"some samples let go at the bound of {lowest:.7g} Pa, too few to tell more"
+        elif not math.isfinite(seen):
+            stress, interval = math.nan, state.bounds
+            place = "the method itself was not asked"
         doubts.append(
-            f"{evaluations} evaluations do not reach P = {probability:g}: the stress lies below"
-            f" {seen:.7g} Pa, the lowest seen; raise max_evaluations"
+            f"{ran_out(state, evaluations)} do not reach P = {probability:g}: {place};"
+            f" {advice(state)}"
         )
     return DesignStress(
         stress=stress,
@@ -244,6 +276,7 @@ def _finish(
             "runs": len(tail.runs),
             "effective_families": 1.0 / cov**2 if cov > 0.0 else math.inf,
         },
+        cut_short=state.meter.over and cov > target_cov,
         warnings=say(doubts),
     )
 
@@ -261,6 +294,8 @@ def design_stress(
     confidence: float = 0.95,
     event: Event = "critical_stress",
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> DesignStress:
     """Below which stress does the interface let go with a given probability?
 
@@ -280,7 +315,7 @@ def design_stress(
         method itself.
     target_cov : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    seed, max_evaluations, confidence, event, workers
+    seed, max_evaluations, confidence, event, workers, time_limit, progress
         As in `failure_probability`.
 
     Returns
@@ -296,10 +331,11 @@ def design_stress(
     Warns
     -----
     AccuracyWarning
-        If the evaluations allowed do not suffice.
+        If the evaluations or the time allowed do not suffice, or the onset piles up on the bound.
     """
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_probability("probability", probability)
+    problems += check_probability("probability", probability) + check_time_limit(time_limit)
+    meter = Meter("design_stress", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
         random,
@@ -307,22 +343,51 @@ def design_stress(
         seed,
         event,
         workers,
+        meter=meter,
         problems=problems,
         check=lambda state: (
             check_sampling(state)
             or check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
         ),
     )
-    budget, spent = budget_of(state, max_evaluations), 0
-    chosen, reason = str(algorithm), "as asked"
-    if algorithm == "auto":
-        chosen, reason, spent = _chosen(state, float(probability), int(seed), budget)
-    request = TailRequest(state, float(probability), target_cov, int(seed), budget - spent, spent)
-    if chosen == "two_level":
-        bridges = _two_level_tail(request)
-        cheap = sum(run.first_stage_evaluations for run in bridges.runs)
-        return _finish(request, bridges, confidence, chosen, reason, cheap)
-    return _finish(request, subset_tail(request), confidence, chosen, reason, 0)
+    request = TailRequest(
+        state, float(probability), target_cov, int(seed), budget_of(state, max_evaluations)
+    )
+    with meter:
+        meter.expect(request.budget, at_most=True)
+        return _sampled(request, algorithm, confidence)
+
+
+def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignStress:
+    """The answer by an algorithm, as far as there is time."""
+    chosen, reason = algorithm, "as asked"
+    try:
+        if algorithm == "auto":
+            chosen, reason, spent = _chosen(
+                request.state, request.probability, request.seed, request.budget
+            )
+            request = replace(request, budget=request.budget - spent, spent=spent)
+        if chosen == "two_level":
+            bridges = _two_level_tail(request)
+            cheap = sum(run.first_stage_evaluations for run in bridges.runs)
+            return _finish(request, bridges, confidence, chosen, reason, cheap)
+        return _finish(request, subset_tail(request), confidence, chosen, reason, 0)
+    except TimeUp as up:
+        spent = request.spent + up.spent
+        text = f"nothing is known of the stress: {short_of(request.state, spent)}"
+        return DesignStress(
+            stress=math.nan,
+            interval=request.state.bounds,
+            probability=request.probability,
+            coefficient_of_variation=math.inf,
+            evaluations=spent,
+            lower_bound=request.state.bounds[0],
+            algorithm="none",
+            reason=reason,
+            confidence=confidence,
+            cut_short=True,
+            warnings=say([text]),
+        )
 
 
 def check_sampling(state: LimitState) -> list[str]:

@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
+import numpy as np
+
 from stiction._model import describe
+from stiction._progress import Meter, Show, TimeUp, check_time_limit
+from stiction._typing import Array
 from stiction.criterion.method import LocalCriterion
 from stiction.errors import unknown_name
 from stiction.evaluation import Method
@@ -18,6 +22,8 @@ from stiction.reliability.algorithms import (
     by_importance,
     by_subset,
     by_two_levels,
+    counted,
+    unknown,
 )
 from stiction.reliability.limit_state import (
     Event,
@@ -26,7 +32,7 @@ from stiction.reliability.limit_state import (
     real_number,
     whole_number,
 )
-from stiction.reliability.plain_monte_carlo import Count, tally
+from stiction.reliability.plain_monte_carlo import tally
 from stiction.reliability.result import FailureProbability
 from stiction.reliability.two_level import agreement
 
@@ -106,26 +112,26 @@ def _exact(request: Request, probability: float, reason: str) -> FailureProbabil
     )
 
 
-def _chosen(request: Request) -> tuple[str, str, Count | None]:
-    """Algorithm, reason, and the pilot count that told."""
-    state = request.state
-    if state.method.type == "rupture":
-        return "plain", "a rupture simulation takes too long for long chains of samples", None
-    draws = state.draws(request.seed, 0, request.pilot)
-    values = state(draws)
-    pilot = tally(values, request.stress)
-    seen = f"{pilot.failures} failures among {pilot.samples} plain samples"
+def _chosen(request: Request, draws: Array, values: Array) -> tuple[str, str]:
+    """Algorithm and reason, by the pilot's draws and stresses.
+
+    What told which algorithm to take does not enter its estimate: counting is chosen where the
+    pilot happens to hold many failures.
+    """
+    state, pilot = request.state, tally(values, request.stress)
+    plural = "s" * (pilot.failures != 1)
+    seen = f"{pilot.failures} failure{plural} among {pilot.samples} plain samples"
     if pilot.probability >= FREQUENT:
-        return "plain", f"{seen}: frequent enough to count", pilot
+        return "plain", f"{seen}: frequent enough to count"
     if usable_first_stage(state) is None:
         share = agreement(state.by(LocalCriterion())(draws), values)
         if share >= ALIKE:
             text = (
                 f"{seen}: rare; the local criterion resembles equilibrium, at a tenth of its cost"
             )
-            return "two_level", text, pilot
+            return "two_level", text
         seen += f"; the local criterion picks only {share:.0%} of the weakest of them"
-    return "subset", f"{seen}: rare, and subset simulation does not need to know where", pilot
+    return "subset", f"{seen}: rare, and subset simulation does not need to know where"
 
 
 def failure_probability(
@@ -141,6 +147,8 @@ def failure_probability(
     confidence: float = 0.95,
     event: Event = "critical_stress",
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> FailureProbability:
     """How likely does an interface of random strength let go below a given stress?
 
@@ -156,8 +164,8 @@ def failure_probability(
     algorithm : {"auto", "plain", "subset", "importance", "two_level"}
         Plain Monte Carlo; subset simulation; importance sampling around the most likely weak spot
         at a random place (where the interface is alike everywhere); subset simulation by the local
-        criterion with equilibrium at its end. 'auto' counts failures among a thousand plain
-        samples and goes on counting from 1 % on; below, it takes two levels for equilibrium, if
+        criterion with equilibrium at its end. 'auto' looks at a thousand plain samples; if 1 % of
+        them fail it counts failures among others; else it takes two levels for equilibrium, if
         the local criterion picks the same samples as the weakest, and subset simulation
         otherwise. `reason` in the result says which and why.
     target_cov : float
@@ -175,6 +183,10 @@ def failure_probability(
         patch becomes unstable, arrested or not. By the local criterion they are the same.
     workers : int, optional
         Threads; all cores by default.
+    time_limit : float, optional
+        Seconds. When they are over the result holds what there is, with `cut_short` and a warning.
+    progress : bool or callable
+        As in `monte_carlo`; how many samples it will take is known better and better.
 
     Returns
     -------
@@ -195,10 +207,12 @@ def failure_probability(
     -----
     Subset simulation: Au and Beck (2001), Papaioannou et al. (2015); its error from the ancestry
     of the failing samples, Lee and Whiteley (2018). Intervals are binomial (Clopper and Pearson,
-    1934) for plain Monte Carlo, log-normal otherwise.
+    1934) for plain Monte Carlo, log-normal otherwise. Plain Monte Carlo counts until it has seen
+    2 + 1/target_cov^2 failures, which leaves its estimate unbiased (Haldane, 1945).
     """
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_stress("stress", stress)
+    problems += check_stress("stress", stress) + check_time_limit(time_limit)
+    meter = Meter("failure_probability", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
         random,
@@ -206,6 +220,7 @@ def failure_probability(
         seed,
         event,
         workers,
+        meter=meter,
         problems=problems,
         check=lambda state: check_algorithm(state, algorithm, ALGORITHMS),
     )
@@ -219,17 +234,35 @@ def failure_probability(
     if stress >= high:
         text = f"no interface holds more than the greatest strength, {high:g} Pa"
         return _exact(request, 1.0, text)
-    reason = "as asked"
+    with meter:
+        meter.expect(budget, at_most=True)
+        return _sampled(request, algorithm)
+
+
+def _sampled(request: Request, algorithm: str) -> FailureProbability:
+    """The answer by an algorithm, as far as there is time."""
+    state, reason = request.state, "as asked"
+    if algorithm == "auto" and state.method.type == "rupture":
+        algorithm, reason = "plain", "a rupture simulation takes too long for long chains"
     if algorithm == "auto":
-        chosen, reason, seen = _chosen(request)
-    else:
-        chosen, seen = algorithm, None
-    if chosen == "plain":
-        return by_counting(request, reason, seen)
-    if seen is not None:
-        request = request.after(seen.samples)
-    if chosen == "importance":
-        return by_importance(request, reason)
-    if chosen == "two_level":
-        return by_two_levels(request, state.by(LocalCriterion()), reason)
-    return by_subset(request, reason)
+        draws, values = state.draws(request.seed, 0, request.pilot), np.empty(0)
+        try:
+            values = state(draws)
+            algorithm, reason = _chosen(request, draws, values)
+        except TimeUp as up:
+            values = values if values.size else up.values
+            reason = "the time was over while looking how frequent failures are"
+            if not values.size:
+                return unknown(request, reason, 0)
+            return counted(request, tally(values, request.stress), values.size, reason)
+        request = request.after(values.size)
+    try:
+        if algorithm == "plain":
+            return by_counting(request, reason)
+        if algorithm == "importance":
+            return by_importance(request, reason)
+        if algorithm == "two_level":
+            return by_two_levels(request, state.by(LocalCriterion()), reason)
+        return by_subset(request, reason)
+    except TimeUp as up:
+        return unknown(request, reason, request.spent + up.spent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -10,13 +11,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stiction._model import describe
+from stiction._model import describe, whole
+from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
 from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
 from stiction.friction.law import SCALES
+from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 
@@ -28,9 +32,8 @@ PIECE = 16
 
 def whole_number(value: Any, least: int) -> bool:
     """Whether a value is a whole number, and not less than `least`."""
-    return (
-        isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(value >= least)
-    )
+    number = whole(value)
+    return number is not None and number >= least
 
 
 def real_number(value: Any) -> bool:
@@ -51,6 +54,8 @@ class LimitState:
         Which of the method's stresses.
     workers : int
         Threads. Rows do not depend on their batch, so the numbers do not depend on this.
+    meter : Meter
+        Told of every sample; says when the time is over.
     """
 
     problem: Problem
@@ -58,6 +63,11 @@ class LimitState:
     method: Any
     event: Event = "critical_stress"
     workers: int = 1
+    meter: Meter = dataclasses.field(default=SILENT, compare=False, repr=False)
+
+    @cached_property
+    def _portions(self) -> Portions:
+        return Portions(self.workers)
 
     @property
     def dimension(self) -> int:
@@ -89,14 +99,30 @@ class LimitState:
         return dict(self._solver(self.problem.sample(profiles)))
 
     def _stress(self, draws: Array) -> Array:
-        # On a coarse grid the local criterion rings, up to a little below the bound.
+        # Rounding may leave a stress a hair below the bound.
         found = self.onset(self.profiles(draws))[self.event]
         result: Array = np.maximum(found, self.bounds[0])
         return result
 
     def __call__(self, draws: Array) -> Array:
-        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,)."""
-        pieces = min(self.workers, max(1, draws.shape[0] // PIECE))
+        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,).
+
+        Raises
+        ------
+        TimeUp
+            With the stresses of the first draws, if the time allowed is over before the last.
+        """
+        found = np.empty(draws.shape[0])
+        for rows in self._portions(draws.shape[0]):
+            if self.meter.over:
+                raise TimeUp(found[: rows.start])
+            found[rows] = self._shared_out(draws[rows])
+            self.meter.advance(rows.stop - rows.start)
+        return found
+
+    def _shared_out(self, draws: Array) -> Array:
+        fewest = 1 if self._portions.slow else PIECE
+        pieces = min(self.workers, max(1, draws.shape[0] // fewest))
         if pieces == 1:
             return self._stress(draws)
         _ = self._solver, self.bounds  # prepared before the threads need them
@@ -164,6 +190,7 @@ def make_limit_state(
     event: str,
     workers: int | None,
     *,
+    meter: Meter = SILENT,
     problems: Sequence[str] = (),
     check: Callable[[LimitState], list[str]] | None = None,
 ) -> LimitState:
@@ -173,6 +200,8 @@ def make_limit_state(
     ----------
     problem, random, method, seed, event, workers
         As in `failure_probability`.
+    meter : Meter
+        Told of every sample; says when the time is over.
     problems : sequence of str
         What is wrong with other arguments; reported with the rest.
     check : callable, optional
@@ -194,4 +223,6 @@ def make_limit_state(
     if found or state is None:
         raise InputError(found)
     state.random.warn_if_inaccurate(problem.interface)
-    return replace(state, workers=usable_cores() if workers is None else int(workers))
+    warn_of_units(problem, state.random.strength.mean)
+    check_residual(problem, state.random.properties)
+    return replace(state, workers=usable_cores() if workers is None else int(workers), meter=meter)

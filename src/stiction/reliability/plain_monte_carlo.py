@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._progress import TimeUp
 from stiction._typing import Array
 from stiction.reliability.limit_state import LimitState
+from stiction.reliability.uncertainty import binomial_interval
 
 BATCH = 1024
 SHOWN = 64
@@ -25,43 +27,53 @@ class Count:
     failures, samples : int
     numbers : (up to 64,) int array
         Sample numbers of the first failures.
+    until_failure : bool
+        Whether counting ended at a failure, because it was the last one wanted. That one says
+        nothing of how frequent failures are, and neither does its sample.
     """
 
     failures: int
     samples: int
     numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    until_failure: bool = False
 
     @property
     def probability(self) -> float:
-        """Share of failures."""
-        return self.failures / self.samples
+        """Unbiased estimate: the share of failures, of all samples but the last failure.
+
+        Haldane (1945); with a least or a greatest number of samples, Girshick, Mosteller and
+        Savage (1946).
+        """
+        last = int(self.until_failure)
+        return (self.failures - last) / (self.samples - last)
 
     @property
     def coefficient_of_variation(self) -> float:
-        """Binomial standard error over the estimate."""
-        if self.failures == 0:
+        """Standard error over the estimate."""
+        last = int(self.until_failure)
+        if self.failures <= last:
             return math.inf
         # Where none held, as if one more had been drawn that did: nothing is certain by counting.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
-        return math.sqrt(held / self.failures)
+        return math.sqrt(held / (self.failures - last))
+
+    def interval(self, confidence: float) -> tuple[float, float]:
+        """Clopper and Pearson's; of a count until a failure, by the negative binomial law."""
+        low, high = binomial_interval(self.failures, self.samples, confidence)
+        if self.until_failure:
+            high = binomial_interval(self.failures - 1, self.samples - 1, confidence)[1]
+        return low, high
 
 
-NOTHING = Count(0, 0)
+def tally(values: Array, stress: float, first: int = 0) -> Count:
+    """The count among samples first, first + 1, ... of these stresses at onset."""
+    failed = np.flatnonzero(values < stress)
+    return Count(failed.size, values.size, first + failed[:SHOWN])
 
 
-def tally(values: Array, stress: float, so_far: Count = NOTHING) -> Count:
-    """The count after the next samples, of these stresses at onset."""
-    failed = values < stress
-    numbers = np.concatenate([so_far.numbers, so_far.samples + np.flatnonzero(failed)])
-    return Count(so_far.failures + int(failed.sum()), so_far.samples + values.size, numbers[:SHOWN])
-
-
-def count_on(state: LimitState, seed: int, stress: float, samples: int, so_far: Count) -> Count:
-    """The count extended to a number of samples."""
-    while so_far.samples < samples:
-        batch = min(BATCH, samples - so_far.samples)
-        so_far = tally(state(state.draws(seed, so_far.samples, batch)), stress, so_far)
-    return so_far
+def failures_wanted(target_cov: float) -> int:
+    """How many failures make the standard error small enough: it falls like 1/sqrt(r - 1)."""
+    return 2 + math.ceil(1.0 / (target_cov * target_cov))
 
 
 def count_failures(
@@ -70,22 +82,61 @@ def count_failures(
     stress: float,
     *,
     target_cov: float,
-    first: int,
+    least: int,
     max_evaluations: int,
-    so_far: Count | None = None,
-) -> Count:
-    """Count until the coefficient of variation is at most the target.
+    start: int = 0,
+) -> tuple[Count, int]:
+    """Count until there are enough failures, among at least `least` samples.
 
-    Sample i is that of `stiction.monte_carlo` with the same seed.
+    Stopping when the estimate looks precise enough would favour runs that saw many failures
+    early. So the number of failures is fixed beforehand, and what was computed beyond the last of
+    them does not count.
+
+    Parameters
+    ----------
+    state : LimitState
+        If its time is over, what was counted until then is the answer.
+    seed : int
+        Sample i is that of `stiction.monte_carlo` with the same seed.
+    stress, target_cov : float
+    least, max_evaluations : int
+    start : int
+        Number of the first sample.
+
+    Returns
+    -------
+    count : Count
+    evaluations : int
+        Those that do not count included.
+
+    Raises
+    ------
+    TimeUp
+        If its time is over before the first sample.
     """
-    count = NOTHING if so_far is None else so_far
-    wanted: float = max(first, count.samples)
-    while True:
-        count = count_on(state, seed, stress, int(min(wanted, max_evaluations)), count)
-        cov = count.coefficient_of_variation
-        if cov <= target_cov or count.samples >= max_evaluations:
-            return count
-        # Four times more where nothing is known; else what is missing, and a little.
-        known = count.failures >= 10
-        wanted = 1.05 * count.samples * (cov / target_cov) ** 2 if known else 4.0 * count.samples
-        wanted = max(wanted, count.samples + first)
+    wanted = failures_wanted(target_cov)
+    least = min(least, max_evaluations)
+    parts: list[NDArray[np.bool_]] = []
+    done = failures = 0
+    while done < least or (failures < wanted and done < max_evaluations):
+        size = least - done
+        if size <= 0:
+            rest = max_evaluations - done
+            size = math.ceil((wanted - failures) * done / failures) if failures else rest
+            size = min(size, rest)
+            state.meter.expect(size, at_most=not failures)
+        try:
+            values = state(state.draws(seed, start + done, min(size, BATCH)))
+        except TimeUp as up:
+            values = up.values
+        parts.append(values < stress)
+        done, failures = done + values.size, failures + int(parts[-1].sum())
+        if state.meter.over:
+            break
+    if not done:
+        raise TimeUp
+    numbers = np.flatnonzero(np.concatenate(parts))
+    shown = start + numbers[:SHOWN]
+    if failures >= wanted and numbers[wanted - 1] >= least:
+        return Count(wanted, int(numbers[wanted - 1]) + 1, shown, until_failure=True), done
+    return Count(failures, done, shown), done

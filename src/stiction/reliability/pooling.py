@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from stiction._progress import SILENT, Meter, TimeUp
+
 MARGIN = 1.1
 """The variance known so far is itself an estimate; aim a little further."""
 
@@ -64,6 +66,7 @@ def run_until_precise(
     first: int,
     largest: int,
     max_evaluations: int,
+    meter: Meter = SILENT,
 ) -> list[AnyRun]:
     """Runs until their pooled coefficient of variation is at most the target.
 
@@ -77,16 +80,28 @@ def run_until_precise(
     first, largest : int
         Size of the first run and of the largest; many runs of moderate size bound the memory.
     max_evaluations : int
+    meter : Meter
+        Told what is still to come; if its time is over no run is begun.
 
     Returns
     -------
     list of runs
         All complete, or a single incomplete one.
+
+    Raises
+    ------
+    TimeUp
+        If the first run had no time for anything.
     """
     runs: list[AnyRun] = []
     spent, size = 0, first
     while True:
-        run = make(size, len(runs), max_evaluations - spent)
+        try:
+            run = make(size, len(runs), max_evaluations - spent)
+        except TimeUp:
+            if runs:
+                return runs
+            raise
         spent += run.evaluations
         if not run.complete:
             return runs or [run]
@@ -99,8 +114,14 @@ def run_until_precise(
         wanted = MARGIN * total * (cov / target_cov) ** 2 - total if math.isfinite(cov) else total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
-        if size < first:
+        if size < first or meter.over:
             return runs
+        meter.expect(size * sum(cost(r) for r in runs) / total)
+
+
+def cost(run: Run) -> int:
+    """Samples that a run asked any method for."""
+    return run.evaluations + int(getattr(run, "first_stage_evaluations", 0))
 
 
 @dataclass(frozen=True, eq=False)

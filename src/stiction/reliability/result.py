@@ -40,7 +40,8 @@ class FailureProbability:
         Pa; no sample lets go below `lower_bound`, so that a rare failure is told by how little
         `stress` is above it.
     algorithm : str
-        'plain', 'subset', 'importance', 'two_level' or 'exact' (nothing had to be sampled).
+        'plain', 'subset', 'importance', 'two_level', 'exact' (nothing had to be sampled) or
+        'none' (the time was over before anything was known; `probability` is NaN).
     reason : str
         Why this algorithm.
     confidence : float
@@ -52,6 +53,8 @@ class FailureProbability:
         `strength` (and what else is random), `critical_stress`, `critical_position`, ...
     diagnostics : dict
         Numbers that belong to the algorithm, by name.
+    cut_short : bool
+        Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the estimate is not to be trusted; empty if it is.
     """
@@ -69,6 +72,7 @@ class FailureProbability:
     levels: tuple[Level, ...] = ()
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
+    cut_short: bool = False
     warnings: tuple[str, ...] = ()
 
     @property
@@ -80,10 +84,21 @@ class FailureProbability:
         low, high = self.interval
         return (
             f"P = {self.probability:.3g} ({100 * self.confidence:g} %: {low:.3g} to {high:.3g},"
-            f" c.o.v. {self.coefficient_of_variation:.2g}) below {self.stress / 1e6:.6g} MPa,"
-            f" {self.stress_above_bound / 1e3:.4g} kPa above the bound;"
+            f" c.o.v. {self.coefficient_of_variation:.2g}) below {self.stress / 1e6:.6g} MPa"
+            f"{above_bound(self.stress, self.lower_bound)};"
             f" {self.algorithm}, {self.evaluations} evaluations"
+            f"{', cut short' if self.cut_short else ''}"
         )
+
+
+def bounded(lowest: float) -> bool:
+    """Whether a least possible stress says anything: zero or none is no bound worth naming."""
+    return bool(np.isfinite(lowest) and lowest > 0.0)
+
+
+def above_bound(stress: float, lowest: float) -> str:
+    """How far a stress is above the bound, in words; nothing where there is no bound."""
+    return f", {(stress - lowest) / 1e3:.4g} kPa above the bound" if bounded(lowest) else ""
 
 
 def say(texts: list[str]) -> tuple[str, ...]:

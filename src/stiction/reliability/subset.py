@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._progress import TimeUp
 from stiction._typing import Array
 from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
 
@@ -161,7 +162,10 @@ def _grow(
         noise *= step
         candidate = math.sqrt(1.0 - step * step) * states[t - 1]
         candidate += noise
-        outcome = function(candidate)
+        try:
+            outcome = function(candidate)
+        except TimeUp as up:
+            raise TimeUp(up.values, (t - 1) * chains + up.spent) from None
         taken = outcome < ceiling
         states[t] = np.where(taken[:, None], candidate, states[t - 1])
         found[t] = np.where(taken, outcome, found[t - 1])
@@ -195,6 +199,7 @@ def descend(
     samples: int,
     threshold: float = -math.inf,
     probability: float = 0.0,
+    floor: float = -math.inf,
     level_probability: float = 0.1,
     max_evaluations: int | None = None,
 ) -> Descent:
@@ -212,6 +217,9 @@ def descend(
         Failure is a value below it; levels stop there.
     probability : float
         Or stop when a level's lowest share reaches this probability.
+    floor : float
+        No value is below it. Where the lowest share of a level lies on it, the run is complete:
+        there is nothing further down.
     level_probability : float
         Share p_0 of samples that go on.
     max_evaluations : int, optional
@@ -220,6 +228,12 @@ def descend(
     Returns
     -------
     Descent
+        Not complete if the function raised `TimeUp` on the way.
+
+    Raises
+    ------
+    TimeUp
+        If the function did so within its first few samples.
 
     Notes
     -----
@@ -229,12 +243,20 @@ def descend(
     The threshold of a level is the lowest value that does *not* go on, and only samples strictly
     below it do: then the product of the shares is unbiased although the levels are chosen from
     the samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). With the highest value
-    that goes on as the threshold, each level would add one part in N p_0 to the estimate.
+    that goes on as the threshold, each level would add one part in N p_0 to the estimate. Where
+    the lowest values are all equal, none is strictly below: the next higher value is the threshold.
     """
     count = max(2, round(samples * level_probability))
     samples = count * max(2, round(samples / count))
     draws = rng.standard_normal((samples, dimension))
-    values = function(draws)
+    cut = False
+    try:
+        values = function(draws)
+    except TimeUp as up:
+        if up.values.size < 3:
+            raise
+        cut, values, samples = True, up.values, up.values.size
+        draws, count = draws[:samples], max(2, round(samples * level_probability))
     ancestors, chains = np.arange(samples), samples
     ceiling, log_probability = math.inf, 0.0
     step, acceptance, evaluations = FIRST_STEP, 1.0, samples
@@ -247,14 +269,20 @@ def descend(
             old = populations[-KEEP - 1]
             populations[-KEEP - 1] = replace(old, draws=np.empty((0, dimension)))
         lowest = float(np.partition(values, count)[count])
-        final = lowest < threshold
+        final, bottom = lowest < threshold, lowest <= floor
+        if final:
+            lowest = threshold
+        elif bottom:
+            lowest = float(np.nextafter(floor, math.inf))
+        elif lowest == values.min() < values.max():
+            lowest = float(values[values > lowest].min())
         # States repeat along chains: with ties at the threshold a few fewer go on.
-        chosen = values < (threshold if final else lowest)
+        chosen = values < lowest
         share = float(chosen.mean())
         shaped = chosen.reshape(-1, chains)
         levels.append(
             Level(
-                threshold=threshold if final else lowest,
+                threshold=lowest,
                 probability=share,
                 acceptance=acceptance,
                 step=step,
@@ -265,19 +293,23 @@ def descend(
         stuck = share == 0.0 or len(levels) >= MOST_LEVELS
         if share > 0.0:
             reached = log_probability + math.log(share)
-            complete = final or reached <= math.log(max(probability, 1e-300))
+            complete = final or bottom or reached <= math.log(max(probability, 1e-300))
         seeds = rng.permutation(np.flatnonzero(chosen))
         steps = max(2, round(samples / max(seeds.size, 1)))
         cost = seeds.size * (steps - 1)
-        over = max_evaluations is not None and evaluations + cost > max_evaluations
+        over = cut or (max_evaluations is not None and evaluations + cost > max_evaluations)
         if complete or stuck or over:
             break
         log_probability += math.log(share)
         ceiling = lowest
         family = ancestors[seeds]
-        draws, values, acceptance, step = _grow(
-            function, draws[seeds], values[seeds], ceiling, steps, step, rng
-        )
+        try:
+            draws, values, acceptance, step = _grow(
+                function, draws[seeds], values[seeds], ceiling, steps, step, rng
+            )
+        except TimeUp as up:
+            evaluations += up.spent
+            break
         ancestors, chains = np.tile(family, steps), seeds.size
         evaluations += cost
     return Descent(samples, tuple(populations), tuple(levels), evaluations, complete)

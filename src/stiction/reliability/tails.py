@@ -11,6 +11,7 @@ import numpy as np
 import scipy.stats
 import xarray as xr
 
+from stiction._progress import Meter, Show
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.evaluation import Method
@@ -21,6 +22,7 @@ from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.spectra import CustomSpectrum
 from stiction.reliability.curve import failure_curve
+from stiction.reliability.limit_state import Event
 
 CORRELATION_RATIOS = (0.25, 0.5, 1.0, 2.0)
 LONGER = 4
@@ -115,7 +117,10 @@ def tail_study(
     target_cov: float = 0.3,
     plain_samples: int = 10_000,
     seed: int = 0,
+    event: Event = "critical_stress",
     workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
 ) -> TailStudy:
     """Failure curves for several correlation lengths, two lengths and three lower ends.
 
@@ -127,8 +132,10 @@ def tail_study(
         What is random; the spectrum of the strength must have a correlation length, and only the
         strength differs between the curves.
     method : LocalCriterion or Equilibrium
-    smallest, target_cov, plain_samples, seed, workers
+    smallest, target_cov, plain_samples, seed, event, workers, progress
         As in `failure_curve`.
+    time_limit : float, optional
+        Seconds for each curve.
 
     Returns
     -------
@@ -149,7 +156,10 @@ def tail_study(
         "target_cov": target_cov,
         "plain_samples": plain_samples,
         "seed": seed,
+        "event": event,
         "workers": workers,
+        "time_limit": time_limit,
+        "progress": progress is True,
     }
     long = longer(problem, LONGER)
 
@@ -162,13 +172,22 @@ def tail_study(
         spectrum = own_spectrum.with_correlation_length(ratio * problem.nucleation_length)
         return dataclasses.replace(strength, spectrum=spectrum)
 
-    own = curve(strength)
     others = list(alike_marginals(strength).items())
-    ends = {others[0][0]: own}
-    for name, marginal in others[1:]:
-        ends[name] = curve(dataclasses.replace(strength, marginal=marginal))
-    return TailStudy(
-        correlation={ratio: curve(of_length(ratio)) for ratio in CORRELATION_RATIOS},
-        length={1: own, LONGER: curve(strength, long)},
-        lower_end=ends,
-    )
+    total = len(others) + len(CORRELATION_RATIOS) + 1
+    with Meter("tail_study", total, progress, unit="curves") as meter:
+
+        def curve(field: RandomField, system: Problem = problem) -> xr.Dataset:
+            own = dataclasses.replace(random, strength=field)
+            found = failure_curve(system, own, **options)
+            meter.advance()
+            return found
+
+        own = curve(strength)
+        ends = {others[0][0]: own}
+        for name, marginal in others[1:]:
+            ends[name] = curve(dataclasses.replace(strength, marginal=marginal))
+        return TailStudy(
+            correlation={ratio: curve(of_length(ratio)) for ratio in CORRELATION_RATIOS},
+            length={1: own, LONGER: curve(strength, long)},
+            lower_end=ends,
+        )

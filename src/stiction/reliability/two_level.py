@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._progress import TimeUp
 from stiction._typing import Array
 from stiction.reliability.subset import (
     Descent,
@@ -91,7 +92,9 @@ class Bridge:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress seen, Pa."""
+        """Lowest and highest stress seen, Pa; of no sample, infinity and less."""
+        if not self.values.size:
+            return math.inf, -math.inf
         return float(self.values.min()), float(self.values.max())
 
     def probability(self, value: float) -> float:
@@ -149,6 +152,7 @@ def bridge(
     max_evaluations: int,
     threshold: float | None = None,
     probability: float = 0.0,
+    floor: float = -math.inf,
 ) -> Bridge:
     """The exact lower tail near a threshold, or near a probability if no threshold is given.
 
@@ -164,6 +168,8 @@ def bridge(
         Of the exact limit state.
     threshold : float, optional
     probability : float
+    floor : float
+        No stress is below it.
     """
     descent = descend(
         cheap,
@@ -172,6 +178,7 @@ def bridge(
         samples=CHEAP * samples,
         threshold=-math.inf if threshold is None else threshold,
         probability=ROOM * probability,
+        floor=floor,
     )
     first_stage, spent = descent.evaluations, 0
     best: Bridge | None = None
@@ -180,9 +187,18 @@ def bridge(
             break
         looked = rng.permutation(population.values.size)[:samples]
         draws, families = population.draws[looked], population.ancestors[looked]
-        values = exact(draws)
+        try:
+            values = exact(draws)
+        except TimeUp as up:  # a part of them would not be a fair sample of the families
+            spent += up.spent
+            break
         spent += looked.size
-        limit = _threshold(population, values, probability) if threshold is None else threshold
+        if threshold is not None:
+            limit = threshold
+        else:
+            limit = _threshold(population, values, probability)
+            if limit == floor:  # so many lie on it that the probability asked for does, too
+                limit = math.nextafter(floor, math.inf)
         failed = values < limit
         if not failed.any():
             if best is not None:
@@ -194,20 +210,24 @@ def bridge(
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
             walkers = min(kept_values.size, max(16, samples // STEPS), room)
-            states, found, acceptance, _ = conditional_chains(
-                exact,
-                kept[:walkers],
-                kept_values[:walkers],
-                limit,
-                STEPS,
-                descent.levels[-1].step,
-                rng,
-            )
-            spent += states.shape[0]
-            later = states[walkers * FORGOTTEN :]
-            last, wobble = _covered(
-                later, cheap, population.ceiling, families[failed][:walkers], samples
-            )
+            try:
+                states, found, acceptance, _ = conditional_chains(
+                    exact,
+                    kept[:walkers],
+                    kept_values[:walkers],
+                    limit,
+                    STEPS,
+                    descent.levels[-1].step,
+                    rng,
+                )
+                spent += states.shape[0]
+                later = states[walkers * FORGOTTEN :]
+                last, wobble = _covered(
+                    later, cheap, population.ceiling, families[failed][:walkers], samples
+                )
+            except TimeUp as up:
+                spent += up.spent
+                break
             first_stage += later.shape[0]
             kept, kept_values = states[-walkers:], found[-walkers:]
         best = Bridge(

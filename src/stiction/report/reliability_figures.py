@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiction._typing import Array
+from stiction.reliability.result import bounded
 from stiction.reliability.tails import LONGER, TailStudy, weakest_link
 from stiction.report.style import (
     ACCENT,
@@ -27,8 +28,14 @@ from stiction.report.tables import Table
 
 
 def _has_bound(curve: xr.Dataset) -> bool:
-    bound = float(curve.attrs["lower_bound"])
-    return bool(np.isfinite(bound) and bound > 0.0)
+    return bounded(float(curve.attrs["lower_bound"]))
+
+
+def _tail_stress(curve: xr.Dataset) -> tuple[Array, str]:
+    """The stress as the tail is best drawn against: above the bound, where there is one."""
+    if _has_bound(curve):
+        return curve["stress_above_bound"].values * 1e-3, "stress above the\nleast strength (kPa)"
+    return curve["stress"].values * 1e-3, "stress (kPa)\n"
 
 
 def _plain(axes: Axes, x: Array, curve: xr.Dataset, **style: Any) -> None:
@@ -160,20 +167,20 @@ def tail_figure(study: TailStudy) -> Figure:
         figure = new_figure(PAGE, 2.7)
         first, second, third = figure.subplots(1, 3, sharey=True)
         for i, (ratio, curve) in enumerate(study.correlation.items()):
-            x = curve["stress_above_bound"].values * 1e-3
+            x, label = _tail_stress(curve)
             first.plot(x, curve["probability"].values, **series(i), label=f"{ratio:g}")
         first.set_xscale("log")
-        first.set_xlabel("stress above the\nleast strength (kPa)")
+        first.set_xlabel(label)
         first.set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")
         first.legend(title=r"$\xi_0/h_n$", title_fontsize=7.5)
         short, long = study.length[1], study.length[LONGER]
         for i, (curve, name) in enumerate(((short, "$L$"), (long, f"${LONGER} L$"))):
-            x = curve["stress_above_bound"].values * 1e-3
+            x, _ = _tail_stress(curve)
             second.plot(x, curve["probability"].values, **series(i), label=name)
             style = {"color": series(i)["color"], "marker": "os"[i], "markersize": 2.5}
             _plain(second, x, curve, **style)
         second.plot(
-            short["stress_above_bound"].values * 1e-3,
+            _tail_stress(short)[0],
             weakest_link(short["probability"].values, LONGER),
             color=ACCENT,
             linewidth=0.8,
@@ -181,7 +188,7 @@ def tail_figure(study: TailStudy) -> Figure:
             label="weakest link",
         )
         second.set_xscale("log")
-        second.set_xlabel("stress above the\nleast strength (kPa)")
+        second.set_xlabel(label)
         second.legend()
         for i, (name, curve) in enumerate(study.lower_end.items()):
             x = curve["stress"].values * 1e-6
@@ -212,6 +219,8 @@ def curve_table(curve: xr.Dataset) -> Table:
         ("plain_probability", "plain Monte Carlo"),
         ("rice_probability", "Rice's formula"),
     ]
+    if not _has_bound(curve):  # then it says the stress again
+        del names[1]
     present = [(name, title) for name, title in names if name in curve]
     rows = zip(*(curve[name].values.tolist() for name, _ in present), strict=True)
     titles = tuple(title for _, title in present)

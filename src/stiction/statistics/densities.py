@@ -12,6 +12,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from stiction._brief import brief
 from stiction._jit import jit
 from stiction.errors import InputError
 from stiction.statistics.estimates import as_sample
@@ -42,6 +43,8 @@ class Density:
     value: Array
     error: Array
     bandwidth: float
+
+    __repr__ = brief
 
 
 @jit

@@ -214,7 +214,7 @@ def _uniform_load(problem: Problem) -> tuple[float, float]:
 
 
 def _strength_correlation(strength: RandomField, lags: Array) -> Array:
-    rho = strength.spectrum.correlation(lags)
+    rho = strength.spectrum.untruncated_correlation(lags)
     return correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
 
 

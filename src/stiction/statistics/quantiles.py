@@ -9,6 +9,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
+from stiction._brief import brief
 from stiction.errors import InputError
 from stiction.statistics.estimates import as_sample
 
@@ -36,6 +37,8 @@ class Quantiles:
     lower: Array
     upper: Array
     confidence: float
+
+    __repr__ = brief
 
 
 def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Quantiles:

@@ -6,7 +6,6 @@ import functools
 import json
 import operator
 import tomllib
-from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
@@ -17,12 +16,23 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
-from stiction._model import Count, Positive, _count, describe, explain, model, to_plain
+from stiction._model import (
+    Count,
+    Positive,
+    _count,
+    describe,
+    explain,
+    model,
+    names_to_keep,
+    to_plain,
+    whole,
+)
+from stiction._progress import Show
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
 from stiction.ensemble.plan import Plan
-from stiction.errors import InputError
+from stiction.errors import InputError, unknown_name
 from stiction.evaluation import methods
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -49,8 +59,9 @@ Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 def _chosen(value: Any) -> Any:
     """A number of samples stands for the first ones."""
-    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
-        return tuple(range(value))
+    count = whole(value)
+    if count is not None and count > 0:
+        return tuple(range(count))
     if not isinstance(value, list | tuple):
         raise InputError(
             "must be a list of sample numbers, or how many of the first samples to keep;"
@@ -81,7 +92,7 @@ class Ensemble:
         Not negative.
     first : int
         Number of the first sample.
-    keep : tuple of str
+    keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
     keep_samples : tuple of int or int, optional
@@ -93,7 +104,7 @@ class Ensemble:
     samples: Count
     seed: Number = 0
     first: Number = 0
-    keep: tuple[str, ...] = ()
+    keep: Annotated[tuple[str, ...], BeforeValidator(names_to_keep)] = ()
     keep_samples: Annotated[tuple[Number, ...], BeforeValidator(_chosen)] | None = None
     keep_limit: Positive | None = None
 
@@ -209,8 +220,9 @@ class Study:
         out: str | Path | None = None,
         workers: int | None = None,
         executor: Executor | None = None,
-        progress: bool | Callable[[int, int], None] = False,
+        progress: Show = True,
         retry: bool = False,
+        time_limit: float | None = None,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -220,8 +232,9 @@ class Study:
             A folder in which results are stored as they are done, or a file ending in ``.nc`` with
             such a folder beside it until it is complete. The same call goes on where a run was
             interrupted, and computes only what is new if `samples` was raised.
-        workers, executor, progress
-            See `stiction.monte_carlo`.
+        workers, executor, progress, time_limit
+            See `stiction.monte_carlo`. With `out`, what is missing when the time is over is NaN,
+            and the same call goes on.
         retry : bool
             Compute stored samples that failed again.
 
@@ -241,9 +254,16 @@ class Study:
         if out is not None:
             from stiction.stored_run import run_into
 
-            return run_into(
-                self, out, workers=workers, executor=executor, progress=progress, retry=retry
-            ).dataset()
+            stored = run_into(
+                self,
+                out,
+                workers=workers,
+                executor=executor,
+                progress=progress,
+                retry=retry,
+                time_limit=time_limit,
+            )
+            return stored.dataset()
         return run_plans(
             self.plans,
             self.ensemble.samples,
@@ -253,6 +273,7 @@ class Study:
             workers=workers,
             executor=executor,
             progress=progress,
+            time_limit=time_limit,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -296,14 +317,7 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        path = Path(path)
-        try:
-            given = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read: {error}") from None
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{path}: is not valid TOML: {error}") from None
-        return cls.from_dict(given, folder=path.parent)
+        return cls.from_dict(_read_toml(Path(path)), folder=Path(path).parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -326,6 +340,46 @@ def _refuse_first_version(given: Any) -> None:
             ]
             + ["sweep: keys below these tables begin with 'random.' as well"] * ("sweep" in given)
         )
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def read_setup(path: Path) -> tuple[Problem, Any]:
+    """The problem of a study file and its method or None; whatever else it holds is not needed.
+
+    Of a sweep, the first values.
+    """
+    given, folder = _read_toml(path), path.parent
+    problems = [
+        unknown_name("study", name, Study.__dataclass_fields__)
+        for name in given
+        if name not in Study.__dataclass_fields__
+    ]
+    sweep, _ = _read_sweep(given, folder)
+    given = _completed(given, sweep)
+    if "problem" not in given:
+        problems.append("problem: missing")
+    found: dict[str, Any] = {}
+    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod}
+    for name, kind in kinds.items():
+        if name not in given:
+            continue
+        try:
+            found[name] = pydantic.TypeAdapter(kind).validate_python(
+                given[name], context={"folder": folder}
+            )
+        except pydantic.ValidationError as error:
+            problems += explain(error, Study, prefix=(name,))
+    if problems:
+        raise InputError(problems)
+    return found["problem"], found.get("method")
 
 
 def _at_points(text: str, points: list[Point]) -> str:

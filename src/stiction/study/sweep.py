@@ -19,6 +19,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from stiction._model import _models_in, describe, to_plain
 from stiction.ensemble.assemble import GridAxis
 from stiction.errors import InputError, unknown_name
+from stiction.placed import Placed, is_profile, placed_profile
 from stiction.random.marginals import ScipyMarginal
 from stiction.results import Variable
 
@@ -108,14 +109,13 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
 def _value(key: str, value: Any, folder: Path | None) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
-    if isinstance(value, str) and folder is not None and value.endswith((".npy", ".csv")):
-        path = folder / value
+    file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
+    if file and folder is not None and is_profile(key):
         try:
-            if path.suffix == ".npy":
-                return np.load(path, allow_pickle=False).tolist()
-            return np.loadtxt(path, delimiter=",", ndmin=1).tolist()
-        except (OSError, ValueError) as error:
-            raise InputError(f"{key}: cannot read {value!r}: {error}") from None
+            found = placed_profile(value, key.rsplit(".", 1)[-1], folder)
+        except InputError as error:
+            raise InputError([f"{key}: {text}" for text in error.problems]) from None
+        return found.plain() if isinstance(found, Placed) else found.tolist()
     return value
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction._model import describe
-from stiction._progress import progress_bar
+from stiction._progress import Meter
 from stiction.errors import InputError
 from stiction.papers.albertini2020 import studies
 from stiction.papers.albertini2020.claims import CLAIMS, Claim, judged
@@ -107,7 +107,8 @@ def run(
     claims = [claim for claim in claims if there.issuperset(claim.needs)]
     needed = studies.with_needs(need for item in (*figures, *claims) for need in item.needs)
     total = studies.cost(needed, context) + _DRAWING * len(figures)
-    with progress_bar(total, "paper", progress) as context.report:
+    with Meter("paper", total, progress, unit="steps") as meter:
+        context.report = meter.advance
         results = studies.compute(needed, context)
         data = Data(context.setting, context.samples, seed, results)
         findings = judged(data, claims)

@@ -1,0 +1,105 @@
+"""What `export` writes: as the suffix says, with units, to the last digit."""
+
+import csv
+import importlib.util
+import re
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+from stiction.cli import app as room
+from stiction.export import SUFFIXES, columns, export
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A sweep with profiles kept, on disk."""
+    problem = st.paper.problem(nodes=256)
+    study = st.Study(
+        problem=problem,
+        random=st.paper.strength(problem, 0.5),
+        method=st.LocalCriterion(),
+        ensemble=st.Ensemble(samples=5, first=2, keep=("strength",), keep_samples=(3,)),
+        sweep=[
+            {"random.strength.spectrum.correlation_length": [1e-3, 2e-3, 3e-3]},
+            {"method": [{"type": "local_criterion"}, {"type": "local_criterion"}]},
+        ],
+    )
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    study.run(out=folder)
+    return folder
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            room.main()
+        return ended.value.code or 0, capsys.readouterr()
+
+    monkeypatch.setattr("warnings.showwarning", None, raising=False)
+    return run
+
+
+def test_a_table_reads_back_to_the_last_bit(run, tmp_path):
+    with pytest.warns(st.AccuracyWarning, match="strength: profiles along the interface"):
+        st.open_run(run).export(tmp_path / "out.csv")
+    with (tmp_path / "out.csv").open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    # Every column says its unit, in the last brackets.
+    names = {re.fullmatch(r"(\w+) \((.+)\)", column).groups() for column in head}
+    assert {("correlation_length", "m"), ("sample", "1"), ("critical_stress", "Pa")} <= names
+    assert len(rows) == 3 * 2 * 5
+    whole = st.open_run(run).dataset()
+    flat = whole["critical_stress"].stack(row=("correlation_length", "method", "sample"))
+    found = [float(row[head.index("critical_stress (Pa)")]) for row in rows]
+    np.testing.assert_array_equal(found, flat.values)
+    assert [int(row[head.index("sample (1)")]) for row in rows] == [2, 3, 4, 5, 6] * 6
+    lengths = [float(row[head.index("correlation_length (m)")]) for row in rows]
+    np.testing.assert_array_equal(lengths, flat["correlation_length"].values)
+
+
+def test_netcdf_holds_everything(run, command, tmp_path):
+    code, said = command("export", run, tmp_path / "out.nc")
+    assert (code, said.err) == (0, "")
+    with xr.open_dataset(tmp_path / "out.nc") as found:
+        assert found["strength"].attrs["units"] == "Pa"
+        assert found["strength"].dims[-1] == "x"
+
+
+@pytest.mark.parametrize("name", ["out.txt", "out.hdf5", "out"])
+def test_other_suffixes_are_refused(run, command, tmp_path, name):
+    code, said = command("export", run, tmp_path / name)
+    assert code == 2
+    assert all(suffix in said.err for suffix in SUFFIXES)
+    assert not (tmp_path / name).exists()
+    with pytest.raises(st.InputError, match="suffix"):
+        st.open_run(run).export(tmp_path / name)
+
+
+@pytest.mark.parametrize(("suffix", "library"), [(".parquet", "pyarrow"), (".zarr", "zarr")])
+def test_what_needs_a_library_says_which(run, command, tmp_path, suffix, library, monkeypatch):
+    path = tmp_path / f"out{suffix}"
+    if importlib.util.find_spec(library) is not None:
+        assert command("export", run, path)[0] == 0
+        assert path.exists()
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    code, said = command("export", run, tmp_path / f"other{suffix}")
+    assert code == 2
+    assert f"python -m pip install {library}" in said.err
+
+
+def test_missing_samples_are_nan_and_nothing_is_left_half_written(tmp_path):
+    result = xr.Dataset(
+        {"critical_stress": ("sample", [1.5, np.nan], {"units": "Pa"})},
+        coords={"sample": ("sample", [0, 1])},
+    )
+    export(result, tmp_path / "out.csv")
+    text = (tmp_path / "out.csv").read_text().splitlines()
+    assert text == ["sample (1),critical_stress (Pa)", "0,1.5", "1,nan"]
+    assert list(columns(result)) == ["sample (1)", "critical_stress (Pa)"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]

@@ -1,0 +1,48 @@
+"""Strength that may lie below the residual strength is spoken of before anything is computed."""
+
+import warnings
+
+import pytest
+import scipy.stats
+
+import stiction as st
+from stiction.random.overlap import check_residual, share_below_residual
+
+
+def test_strength_below_the_residual_strength_is_said_before_computing(solid, make_strength):
+    """The marginal reaches down to 0.66 MPa; 4.7 % of it lie below 0.73 MPa, 60 % below 1 MPa."""
+
+    def problem(residual):
+        friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=residual)
+        return st.Problem(solid, st.Interface(length=0.1, nodes=256), friction)
+
+    strength = make_strength(0.5)
+    share = 100.0 * strength.marginal.distribution.cdf(0.73e6)
+    text = rf"{share:.3g} % of its marginal, which reaches from 660000 to 1\.66e\+06 Pa"
+    for compute in (
+        lambda p: st.monte_carlo(p, strength, method=st.LocalCriterion(), samples=2),
+        lambda p: st.failure_probability(
+            p, strength, stress=0.7e6, method=st.LocalCriterion(), max_evaluations=100
+        ),
+        lambda p: st.design_stress(p, strength, probability=0.01, method=st.LocalCriterion()),
+    ):
+        with pytest.raises(st.InputError, match="most of the interface would not weaken"):
+            compute(problem(1.0e6))
+    with pytest.warns(st.AccuracyWarning, match=text):
+        check_residual(problem(0.73e6), {"strength": strength})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_residual(problem(0.66e6), {"strength": strength})
+        residual = st.RandomField(
+            marginal=st.Beta(alpha=2, beta=2, low=0.0, high=0.66e6), spectrum=strength.spectrum
+        )
+        check_residual(problem(0.0), {"strength": strength, "residual_strength": residual})
+
+
+def test_share_below_a_random_residual_strength(problem, make_strength):
+    """Two uniform marginals that overlap in a quarter of each: 1/32."""
+    spectrum = make_strength().spectrum
+    strength = st.RandomField(marginal=scipy.stats.uniform(3e5, 4e5), spectrum=spectrum)
+    residual = st.RandomField(marginal=scipy.stats.uniform(0.0, 4e5), spectrum=spectrum)
+    share = share_below_residual(problem, {"strength": strength, "residual_strength": residual})
+    assert share == pytest.approx(1.0 / 32.0, rel=1e-5)
