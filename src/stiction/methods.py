@@ -40,6 +40,11 @@ def check_method(method: Any) -> None:
         )
 
 
+def accepted(method: Method) -> tuple[str, ...]:
+    """What `Problem.rows` may let through for a method, besides what every method can do."""
+    return getattr(method, "accepts", ())
+
+
 def check_problem(problem: Any) -> None:
     """Refuse what is not a `Problem`, such as arguments that changed places."""
     if not isinstance(problem, Problem):
@@ -131,6 +136,7 @@ def onset(
         residual_strength=residual_strength,
         initial_stress=initial_stress,
         weakening_rate=weakening_rate,
+        accept=accepted(method),
     )
     values = solve(problem, method, method.prepare(problem), rows)
     return label(problem, method, values, np.arange(rows.count), attributes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.friction import SlipWeakening
 from stiction.interface import Interface
 from stiction.load import Load
-from stiction.rows import Rows, as_rows
+from stiction.rows import Rows, as_rows, steepest_rate
 from stiction.solid import Solid
 
 # lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
@@ -110,7 +111,7 @@ class Problem:
 
     def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
+        resolution = self.nucleation_length_of(rows.steepest_rate) / rows.spacing
         if resolution < enough:
             warn_accuracy(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
@@ -124,6 +125,7 @@ class Problem:
         residual_strength: Any = None,
         initial_stress: Any = None,
         weakening_rate: Any = None,
+        accept: Collection[str] = (),
     ) -> Rows:
         """Strength profiles and what else varies between samples, validated and broadcast.
 
@@ -134,6 +136,9 @@ class Problem:
         residual_strength, initial_stress, weakening_rate : array, optional
             Where given, replaces the problem's own: (samples, nodes), (nodes,), (samples, 1) or a
             number.
+        accept : collection of {"barriers", "overstress"}
+            What the method at hand can do besides: infinite strength where nothing breaks; an
+            initial stress above the strength.
 
         Raises
         ------
@@ -144,14 +149,16 @@ class Problem:
         nodes = self.interface.nodes
         problems: list[str] = []
 
-        def checked(name: str, given: Any, own: Any, count: int | None) -> Any:
+        def checked(
+            name: str, given: Any, own: Any, count: int | None, infinite: bool = False
+        ) -> Any:
             try:
-                return as_rows(name, own if given is None else given, nodes, count)
+                return as_rows(name, own if given is None else given, nodes, count, infinite)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
 
-        strength = checked("tau_p", tau_p, None, None)
+        strength = checked("tau_p", tau_p, None, None, "barriers" in accept)
         count = 1 if strength is None else strength.shape[0]
         residual = checked(
             "residual_strength", residual_strength, self.friction.residual_strength, count
@@ -168,17 +175,23 @@ class Problem:
         for name, other in (("residual_strength", residual), ("initial_stress", initial)):
             if strength is None or other is None or np.all(strength > other):
                 continue
+            if name == "initial_stress" and "overstress" in accept:
+                continue
             sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
             problems.append(
                 f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
                 f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
+                + ("; only st.Rupture() begins above the strength" * (name == "initial_stress"))
             )
         if problems:
             raise InputError(problems)
         if rates is None:
             with np.errstate(over="ignore"):  # too short a critical slip is refused just below
                 rates = (strength - residual) / np.asarray(self.friction.critical_slip)
-        too_few = self._too_few_nodes(float(rates.max()))
+            if np.any(barriers := np.isinf(strength)):  # any rate will do where nothing weakens
+                own = np.where(barriers, 0.0, rates).max(axis=1, keepdims=True)
+                rates = np.where(barriers, own, rates)
+        too_few = self._too_few_nodes(steepest_rate(strength, residual, rates))
         if too_few:
             raise InputError(too_few)
         profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)

@@ -11,6 +11,21 @@ from stiction._model import real_array
 from stiction._typing import Array
 from stiction.errors import InputError
 
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile."""
+
+
+def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+    """Largest weakening rate, Pa/m, of nodes that may break, all arrays (samples, nodes).
+
+    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min():
+        return float(rate.max())
+    typical = np.nanquantile(np.where(np.isfinite(drop), drop, np.nan), 0.25, axis=1)
+    return float(rate[drop <= BARRIER * typical[:, None]].max())
+
 
 @dataclass(frozen=True, eq=False)
 class Rows:
@@ -20,6 +35,7 @@ class Rows:
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
         tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa); views of what was given, not to be written to.
+        Strength may be infinite for methods that accept barriers.
     load_profile : (nodes,) array
         p, dimensionless, positive.
     spacing : float
@@ -48,17 +64,24 @@ class Rows:
         """Whether W is the same at all nodes of each sample."""
         return bool(np.all(self.weakening_rate == self.weakening_rate[:, :1]))
 
+    @property
+    def steepest_rate(self) -> float:
+        """Largest weakening rate of nodes that may break, Pa/m."""
+        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
     def mean_stress(self, load: Array) -> Array:
         """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
         mean: Array = self.initial_stress.mean(axis=1) + load * self.load_profile.mean()
         return mean
 
 
-def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Array:
+def as_rows(
+    name: str, value: Any, nodes: int, count: int | None = None, infinite: bool = False
+) -> Array:
     """`value` as a (samples, nodes) float64 array, or an `InputError` that names it.
 
     A single profile (nodes,) is one sample; where `count` is given, a scalar, a (nodes,) profile
-    or a (count, 1) column is broadcast to it.
+    or a (count, 1) column is broadcast to it. Positive infinity passes if `infinite`.
     """
     samples = "samples" if count is None else str(count)
     valid = f"({samples}, {nodes}) or ({nodes},)"
@@ -75,10 +98,11 @@ def as_rows(name: str, value: Any, nodes: int, count: int | None = None) -> Arra
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
-    bad = ~np.isfinite(array)
+    bad = np.isnan(array) | (array == -np.inf) if infinite else ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-        raise InputError(f"{name}: must be finite; entry {where} is not")
+        unless = ", or inf where nothing breaks" if infinite else ""
+        raise InputError(f"{name}: must be finite{unless}; entry {where} is not")
     if array.ndim < 2 or array.shape[1] != nodes:
         array = np.broadcast_to(array, (count or 1, nodes))
     return array

@@ -17,6 +17,7 @@ from stiction.ensemble.run import make_plan
 from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.methods import accepted
 from stiction.problem import Problem
 
 Event = Literal["critical_stress", "first_instability"]
@@ -101,7 +102,8 @@ class LimitState:
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
         others = {name: value for name, value in profiles.items() if name != "strength"}
-        return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
+        accept = accepted(self.method)
+        return dict(self._solver(self.problem.rows(profiles["strength"], **others, accept=accept)))
 
     def _stress(self, draws: Array) -> Array:
         # On a coarse grid the local criterion rings, up to a little below the bound.
