@@ -20,6 +20,7 @@ from stiction.dynamics.track import (
     CALM_SLIP,
     CALM_STEPS,
     CALM_STRESS,
+    CALM_TOP,
     DONE,
     DROPPED,
     EVENT_DROP,
@@ -40,6 +41,7 @@ from stiction.dynamics.track import (
     REST_STOP,
     SLID,
     SLID_STOP,
+    STEADY_STRESS,
     STEP,
     TIME,
     TO_IMPLICIT,
@@ -201,8 +203,13 @@ def explicit_steps(
             return taken + 1, ALL_SLID
         if control[EVENT_STOP] > 0.0 and fall > watch[EVENT_DROP]:
             return taken + 1, DROPPED
-        slowest = control[CALM_STRESS] * scale / impedance + control[CALM_SLIP] * rise / step
-        watch[CALM_STEPS] = watch[CALM_STEPS] + 1.0 if top < slowest else 0.0
+        # Waves make slip rates come and go; creep is slow, or as fast as it was.
+        quiet = top < control[CALM_STRESS] * scale / impedance + control[CALM_SLIP] * rise / step
+        steady = 0.5 * watch[CALM_TOP] <= top <= 2.0 * watch[CALM_TOP]
+        if quiet or (steady and top < control[STEADY_STRESS] * scale / impedance):
+            watch[CALM_STEPS] += 1.0
+        else:
+            watch[CALM_STEPS], watch[CALM_TOP] = 0.0, top
         if watch[CALM_STEPS] >= control[CALM_COUNT]:
             settle(watch, mean_stress, radiated)
             if control[REST_STOP] > 0.0 and watch[FIRST_STRESS] > -np.inf:

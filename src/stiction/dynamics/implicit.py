@@ -46,6 +46,7 @@ from stiction.dynamics.track import (
     SLIP_STEP,
     SMALL_DROP,
     SMALLEST_STEP,
+    STEADY_STRESS,
     STEP,
     TIME,
     TO_EXPLICIT,
@@ -177,7 +178,7 @@ def implicit_steps(
     Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
     stays. A step is repeated at half the size if no slip increments are found (negative
     curvature: the patches are unstable at this size), a node weakens too much, or the interface
-    accelerates too much for the load at onset to be accurate. Slip of nodes at their residual
+    accelerates too much for the load at onset to be accurate. Creep of nodes at their residual
     strength does not count, nor the weakening of nodes that weaken by next to nothing.
     """
     n = slip.size
@@ -257,10 +258,13 @@ def implicit_steps(
         largest, total = 0.0, 0.0
         if solved:
             least = control[SMALL_DROP] * scale
+            creep = control[STEADY_STRESS] * scale * size / impedance
             for i in range(n):
                 if slip[i] < critical[i] and u[i] > 0.0:
                     lost = weakening[i] * min(u[i], critical[i] - slip[i])
                     largest = max(largest, lost / max(weakening[i] * critical[i], least))
+                elif u[i] > creep:
+                    largest = max(largest, u[i] / critical[i])
                 total += u[i]
             if not np.isfinite(total):
                 watch[BAD_NODE] = 0.0

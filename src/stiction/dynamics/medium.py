@@ -40,6 +40,8 @@ class Medium:
         G*|k|/2 and G|k|/2, Pa/m.
     table, gain, fresh : arrays
         Of the explicit step, see `layout.step_table`.
+    shear_modulus, effective_modulus : float
+        G and G*, Pa.
     """
 
     nodes: int
@@ -54,6 +56,7 @@ class Medium:
     gain: Floats
     fresh: Floats
     shear_modulus: float
+    effective_modulus: float
 
 
 def prepare_medium(
@@ -102,4 +105,5 @@ def prepare_medium(
         gain=gain,
         fresh=fresh,
         shear_modulus=solid.shear_modulus,
+        effective_modulus=problem.effective_modulus,
     )

@@ -16,7 +16,7 @@ from stiction.dynamics.measures import fracture_energy, radiated_energy, rupture
 from stiction.dynamics.medium import Medium, prepare_medium
 from stiction.dynamics.run import Run, State
 from stiction.errors import InputError, warn_accuracy
-from stiction.problem import FEWEST_NODES, Problem
+from stiction.problem import FEWEST_NODES, SMALLEST_EIGENVALUE, Problem
 from stiction.results import ONSET_VARIABLES, Variable
 from stiction.rows import Rows, steepest_rate
 
@@ -26,6 +26,7 @@ Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_in
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300.0
 _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
+_STEADY_STRESS = 1e-2  # Z V of creep, likewise
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
 _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
@@ -289,7 +290,7 @@ def check_pace(run: Run, time: float) -> None:
             f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
             "and energies are not affected"
         )
-    scale = float(load_at(*run.scale, max(float(load_at(*run.history, time)), run.first_load)))
+    scale = run.scale_at(float(load_at(*run.history, time)))
     rise = run.slope(time) * run.medium.step / scale
     if rise > _COARSE:
         step = run.medium.step
@@ -316,9 +317,10 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     control[track.BREAKABLE] = np.count_nonzero(finite)
     set_stop(control, method.stop)
     # Calm: for as long as shear waves need to cross the interface, nothing slips faster than a
-    # crack of half its length does when the load alone drives it.
-    control[track.CALM_STRESS] = _CALM_STRESS
-    control[track.CALM_SLIP] = np.pi / medium.stiffness[0, 0]  # L/G*
+    # crack of half its length does when the load alone drives it, or nothing faster than before.
+    control[track.CALM_STRESS], control[track.STEADY_STRESS] = _CALM_STRESS, _STEADY_STRESS
+    length = medium.nodes * medium.spacing
+    control[track.CALM_SLIP] = length / medium.effective_modulus
     crossing = 2.0 * np.pi / medium.pace[0] / medium.step
     control[track.CALM_COUNT] = max(_CALM_STEPS, np.ceil(crossing))
     control[track.SLIP_STEP] = method.slip_step
@@ -337,7 +339,11 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
     )
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
-    return Run(medium, table, constants, history, control, steepest)
+    half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
+    loads = (strength[finite] - initial[finite]) / rows.load_profile[finite]
+    weakest = min(max(round(half / medium.spacing), 1), loads.size)
+    least = float(np.partition(loads, weakest - 1)[:weakest].mean())
+    return Run(medium, table, constants, history, control, steepest, least)
 
 
 def set_stop(control: Floats, stop: str) -> None:

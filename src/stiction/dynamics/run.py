@@ -94,6 +94,9 @@ class Run:
         Z, dx, <p>, <tau_i>.
     steepest_rate : float
         Largest weakening rate of nodes that may break, Pa/m.
+    least_load : float
+        Load below which nothing runs away: the mean strength of the weakest nodes that make up
+        half a nucleation length, Pa. A few nodes of next to no strength do not count.
     """
 
     medium: Medium
@@ -102,6 +105,7 @@ class Run:
     history: History
     control: Floats
     steepest_rate: float
+    least_load: float
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Static stress of a slip at a load, Pa: what an interface at rest carries."""
@@ -109,6 +113,10 @@ class Run:
         stress_hat[1:] = -self.medium.stiffness[0] * slip_hat[1:]
         shared: Floats = np.fft.irfft(stress_hat, self.medium.nodes)
         return shared + load * self.rows[4] + self.rows[5]
+
+    def scale_at(self, load: float) -> float:
+        """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
+        return float(load_at(*self.scale, max(load, self.least_load)))
 
     @functools.cached_property
     def first_load(self) -> float:
@@ -145,7 +153,7 @@ class Run:
         watch[track.PEAK_NODE] = int(np.argmax(stress - limit))
         watch[track.FIRST_STRESS] = watch[track.KINETIC] = -np.inf  # not yet
         watch[track.BAD_NODE] = -1.0
-        scale = follow_scale(watch, self.control, *self.scale, max(load, self.first_load))
+        scale = follow_scale(watch, self.control, *self.scale, max(load, self.least_load))
         watch[track.TOP_RATE] = rate.max()
         watch[track.SLID] = np.count_nonzero(delta >= self.rows[3])
         arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
@@ -204,6 +212,7 @@ class Run:
         carry_memory(state.memory, self.medium.table, state.carried, pairs)
         state.explicit = True
         state.watch[track.CALM_STEPS] = 0.0
+        state.watch[track.CALM_TOP] = state.rate.max()
 
     def _to_implicit(self, state: State) -> None:
         scale_memory(state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False)

@@ -19,7 +19,8 @@ STEP, LOCAL_RADIATED, RADIATED, PAST_STEP = 20, 21, 22, 23
 KINETIC = 24  # Pa, mean stress when all that can break first had broken; -inf before
 PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
 SCALE = 26  # Pa, stress scale of the largest load so far
-FIELDS = 27
+CALM_TOP = 27  # m/s, largest slip rate when the row of calm steps began
+FIELDS = 28
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
@@ -38,6 +39,7 @@ COLUMNS = 7
     BREAKABLE,  # nodes that can break at all
     CALM_STRESS,  # radiated stress Z V of the fastest node below which a step counts as calm
     CALM_SLIP,  # or slip per load that it may make, m/Pa: creep that the load alone drives
+    STEADY_STRESS,  # or Z V below which it counts as calm if V has not changed by a factor 2
     CALM_COUNT,  # calm steps in a row after which implicit steps take over
     SLIP_STEP,  # loss of strength of a node in one implicit step, in units of tau_p - tau_r
     SMALL_DROP,  # nodes that weaken by less than this count as weakening by this
@@ -51,8 +53,8 @@ COLUMNS = 7
     GROWTH,  # by this factor
     PEAK_WIDTH_SIZE,  # so close below its maximum the mean stress still is at it
     NEGLIGIBLE,  # rise of the load in a step for which that does not matter
-) = range(20)
-CONTROLS = 20
+) = range(21)
+CONTROLS = 21
 
 
 @jit
