@@ -71,6 +71,7 @@ class Rupture:
     kernel_tolerance : float
         Error allowed in the memory kernel C(T) by its sum of exponentials (1). The sum is fitted
         once a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
+        Refused where the error makes waves grow at any time step, from some 1e-3 on.
     memory_range : float
         That error holds up to T = |k| c_s t of this size (1); older slip rate decays faster than
         it should.
