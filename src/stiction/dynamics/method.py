@@ -11,12 +11,21 @@ from pydantic import BeforeValidator, Field
 
 from stiction._model import Count, Positive, _number, model
 from stiction.dynamics import track
-from stiction.dynamics.loading import History, first_reach, load_at, uniform_rate
+from stiction.dynamics.checks import (
+    SLOWEST,
+    check_finite,
+    check_pace,
+    resolves_steps,
+    warn_if_coarse,
+    warn_if_reversed_before,
+    warn_if_unresolved,
+)
+from stiction.dynamics.loading import History, first_reach, uniform_rate
 from stiction.dynamics.measures import fracture_energy, radiated_energy, rupture_speed
 from stiction.dynamics.medium import Medium, prepare_medium
 from stiction.dynamics.run import Run, State
-from stiction.errors import InputError, warn_accuracy
-from stiction.problem import FEWEST_NODES, SMALLEST_EIGENVALUE, Problem
+from stiction.errors import InputError
+from stiction.problem import SMALLEST_EIGENVALUE, Problem
 from stiction.results import ONSET_VARIABLES, Variable
 from stiction.rows import Rows, steepest_rate
 
@@ -28,8 +37,6 @@ _CALM_STEPS = 300.0
 _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
 _STEADY_STRESS = 1e-2  # Z V of creep, likewise
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
-_SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
-_COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
 _MORE: dict[str, Variable] = {
@@ -192,119 +199,6 @@ class Rupture:
         return found
 
 
-def warn_if_coarse(problem: Problem, rows: Rows) -> None:
-    """Warn where the nucleation length is not resolved, with the error to expect."""
-    resolution = problem.nucleation_length_of(rows.steepest_rate) / rows.spacing
-    if resolution < 15.0:
-        # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
-        # at 8, 16 and 32 nodes.
-        percent = 3.0 * (16.0 / resolution) ** 2.4
-        expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-        warn_accuracy(
-            f"the nucleation length{_where_steepest(rows)} spans {resolution:.1f} nodes: expect "
-            f"{expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32; the "
-            "critical load is far less sensitive)"
-        )
-
-
-def _where_steepest(rows: Rows) -> str:
-    """Which of several nucleation lengths is meant, for messages."""
-    if rows.uniform_weakening:
-        return ""
-    return f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
-
-
-def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
-    """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
-    rates = run.rows[2]
-    longest = problem.nucleation_length_of(1.0) / (FEWEST_NODES * run.medium.spacing)
-    steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
-    if steep.size:
-        warn_accuracy(
-            f"{steep.size} nodes slipped, the first at x = {steep[0] * run.medium.spacing:.6g} m, "
-            f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
-            " grid to resolve how they break; take more nodes, or infinite strength for barriers "
-            "that never break"
-        )
-
-
-def warn_if_reversed_before(run: Run, time: float) -> None:
-    """Warn if the load went below minus the strength before anything slipped."""
-    times, values = run.history
-    lowest = float(values[times <= time].min())
-    _warn_of_reverse(run, lowest * run.rows[4] + run.rows[5] < -run.rows[0], time, lowest)
-
-
-def warn_if_reversed(run: Run, state: State) -> bool:
-    """Warn if the stress is below minus the strength now; returns whether it is.
-
-    Where a rupture overshot, what has slipped may be left with a negative stress at a positive
-    load: that is not counted.
-    """
-    if state.stress.min() >= 0.0:
-        return False
-    strength = np.maximum(run.rows[0] - run.rows[2] * state.slip, run.rows[1])
-    below = state.stress < -strength - 1e-6 * state.watch[track.SCALE]
-    return _warn_of_reverse(
-        run, below & ((state.slip == 0.0) | (state.load < 0.0)), state.time, state.load
-    )
-
-
-def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: float) -> bool:
-    nodes = np.flatnonzero(below)
-    if nodes.size:
-        warn_accuracy(
-            f"the stress is below minus the strength at {nodes.size} nodes, the first at x = "
-            f"{nodes[0] * run.medium.spacing:.6g} m (up to t = {time:.6g} s, tau_0 = {load:.6g} "
-            "Pa): they would slip in reverse, which is not modelled, and are kept at rest; change "
-            "the sign of the load, or keep it above minus the strength"
-        )
-    return bool(nodes.size)
-
-
-def _resolves_steps(run: Run, time: float) -> bool:
-    """Whether the time since zero load, as a float, tells explicit steps apart."""
-    return float(np.spacing(time)) <= 0.01 * run.medium.step
-
-
-def check_pace(run: Run, time: float) -> None:
-    """Refuse or warn of loading that explicit steps or floating-point times cannot follow.
-
-    Parameters
-    ----------
-    run : Run
-    time : float
-        When it starts, s.
-
-    Raises
-    ------
-    InputError
-    """
-    if time > _SLOWEST:
-        raise InputError(
-            f"loading_rate: the first slip would come after {time:.3g} s, more than {_SLOWEST:g} s;"
-            " load faster (the onset no longer depends on the rate)"
-        )
-    if not _resolves_steps(run, time):
-        warn_accuracy(
-            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
-            f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
-            "and energies are not affected"
-        )
-    scale = run.scale_at(float(load_at(*run.history, time)))
-    rise = run.slope(time) * run.medium.step / scale
-    if rise > _COARSE:
-        step = run.medium.step
-        text = (
-            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa; use time_step={step * _COARSE / rise:.2g} or less,"
-            " or load more slowly"
-        )
-        if rise > _COARSEST:
-            raise InputError(text)
-        warn_accuracy(f"{text} (the onset is sampled coarsely)")
-
-
 def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: History) -> Run:
     """The run of one sample."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
@@ -329,7 +223,7 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     control[track.LOAD_STEP] = method.load_step
     control[track.SMALLEST_STEP] = _SWITCH * medium.step
     control[track.RESIDUAL] = 1e-9
-    control[track.LARGEST_STEP], control[track.END_TIME] = _SLOWEST, np.inf
+    control[track.LARGEST_STEP], control[track.END_TIME] = SLOWEST, np.inf
     control[track.EVENT_DROP_SIZE] = method.event_drop
     control[track.PEAK_WIDTH_SIZE] = 1e-5
     control[track.NOTICED] = 1e-7
@@ -359,21 +253,10 @@ def first_slip(run: Run) -> float:
     return first_reach(run.history, run.first_load)
 
 
-def check_finite(run: Run, state: State, reason: int) -> None:
-    """Raise `FloatingPointError` that says when and where a run became non-finite."""
-    if reason == track.NOT_FINITE:
-        node = int(state.watch[track.BAD_NODE])
-        raise FloatingPointError(
-            f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
-            f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
-            f"{state.steps} steps; the last finite state is kept"
-        )
-
-
 def front_speed(problem: Problem, run: Run, state: State, lengths: float) -> Floats:
     """Apparent speed of the front, m/s, over a window in units of the shortest h_n, (nodes,)."""
     shortest = problem.nucleation_length_of(run.steepest_rate)
-    if not _resolves_steps(run, state.time):
+    if not resolves_steps(run, state.time):
         return np.full(run.medium.nodes, np.nan)
     window = min(max(lengths * shortest, 8.0 * run.medium.spacing), 0.25 * problem.interface.length)
     return rupture_speed(state.arrival, run.medium.spacing, window)

@@ -17,21 +17,23 @@ from numpy.typing import NDArray
 from stiction._model import describe, real_array, to_plain
 from stiction.dynamics import track
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
+from stiction.dynamics.checks import (
+    check_finite,
+    check_pace,
+    warn_if_coarse,
+    warn_if_reversed,
+    warn_if_reversed_before,
+    warn_if_unresolved,
+)
 from stiction.dynamics.frames import Frames, check_variables
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
-    check_finite,
-    check_pace,
     first_slip,
     front_speed,
     make_run,
     set_stop,
     summary,
-    warn_if_coarse,
-    warn_if_reversed,
-    warn_if_reversed_before,
-    warn_if_unresolved,
 )
 from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
