@@ -47,6 +47,11 @@ def check_method(method: Any) -> None:
         )
 
 
+def accepted(method: Method) -> tuple[str, ...]:
+    """What `Problem.rows` may let through for a method, besides what every method can do."""
+    return getattr(method, "accepts", ())
+
+
 def check_problem(problem: Any) -> None:
     """Refuse what is not a `Problem`, such as arguments that changed places."""
     if not isinstance(problem, Problem):
@@ -174,8 +179,8 @@ def onset(
         "weakening_rate": weakening_rate,
     }
     given, measured = gather(problem, given, gaps)
-    rows = problem.rows(given.pop("tau_p"), **given)
-    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
+    rows = problem.rows(given.pop("tau_p"), **given, accept=accepted(method))
+    warn_of_units(problem, rows.mean_strength, float(rows.residual_strength.mean()))
     values = _in_portions(problem, method, rows, progress)
     result = label(problem, method, values, np.arange(rows.count), attributes)
     return result if measured is None else with_gaps(problem, result, measured)

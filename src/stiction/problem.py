@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from stiction.interface import Interface
 from stiction.load import Load
 from stiction.placed import Placed
 from stiction.plausible import MOST_NODES, suspects, warn_of_length
-from stiction.rows import Rows, as_rows
+from stiction.rows import Rows, as_rows, mean_strength, steepest_rate
 from stiction.solid import Solid
 
 # lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
@@ -137,7 +138,7 @@ class Problem:
 
     def warn_if_coarse(self, rows: Rows, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self.nucleation_length_of(float(rows.weakening_rate.max())) / rows.spacing
+        resolution = self.nucleation_length_of(rows.steepest_rate) / rows.spacing
         if resolution < enough:
             warn_accuracy(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
@@ -151,6 +152,7 @@ class Problem:
         residual_strength: Any = None,
         initial_stress: Any = None,
         weakening_rate: Any = None,
+        accept: Collection[str] = (),
     ) -> Rows:
         """Strength profiles and what else varies between samples, validated and broadcast.
 
@@ -161,6 +163,9 @@ class Problem:
         residual_strength, initial_stress, weakening_rate : array, optional
             Where given, replaces the problem's own: (samples, nodes), (nodes,), (samples, 1) or a
             number.
+        accept : collection of {"barriers", "overstress"}
+            What the method at hand can do besides: infinite strength where nothing breaks; an
+            initial stress above the strength.
 
         Raises
         ------
@@ -171,17 +176,24 @@ class Problem:
         nodes = self.interface.nodes
         problems: list[str] = []
 
-        def checked(name: str, given: Any, own: Any, count: int | None) -> Any:
+        def checked(
+            name: str, given: Any, own: Any, count: int | None, infinite: bool = False
+        ) -> Any:
             quantity = "strength" if name == "tau_p" else name
             value = own if given is None else given
             try:
-                return as_rows(name, value, quantity, self.interface, count)
+                return as_rows(name, value, quantity, self.interface, count, infinite)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
 
-        strength = checked("tau_p", tau_p, None, None)
+        strength = checked("tau_p", tau_p, None, None, "barriers" in accept)
         count = 1 if strength is None else strength.shape[0]
+        if strength is not None and np.any(stuck := np.all(np.isinf(strength), axis=1)):
+            problems.append(
+                f"tau_p: infinite at every node of sample {int(np.argmax(stuck))}; nothing can"
+                " break"
+            )
         residual = checked(
             "residual_strength", residual_strength, self.friction.residual_strength, count
         )
@@ -197,17 +209,25 @@ class Problem:
         for name, other in (("residual_strength", residual), ("initial_stress", initial)):
             if strength is None or other is None or np.all(strength > other):
                 continue
+            if name == "initial_stress" and "overstress" in accept:
+                continue
             sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
             problems.append(
                 f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
                 f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
+                + ("; only st.Rupture() begins above the strength" * (name == "initial_stress"))
             )
         if problems:
             raise InputError(problems)
         if rates is None:
             with np.errstate(over="ignore"):  # too short a critical slip is refused just below
                 rates = (strength - residual) / np.asarray(self.friction.critical_slip)
-        too_few = self._too_few_nodes(float(rates.max()), float(strength.mean()))
+            if np.any(barriers := np.isinf(strength)):  # any rate will do where nothing weakens
+                own = np.where(barriers, 0.0, rates).max(axis=1, keepdims=True)
+                rates = np.where(barriers, own, rates)
+        too_few = self._too_few_nodes(
+            steepest_rate(strength, residual, rates), mean_strength(strength)
+        )
         if too_few:
             raise InputError(too_few)
         profile = np.array(np.broadcast_to(self.load.profile, (nodes,)), dtype=np.float64)

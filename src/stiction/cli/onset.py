@@ -76,7 +76,7 @@ def onset(
         interpolate=interpolate,
         fill_gaps=fill_gaps,
     )
-    problem.rows(profile)
+    problem.rows(profile, accept=("barriers", "overstress"))  # each method refuses for itself
     results: dict[str, Any] = {}
     refused: list[tuple[str, str]] = []
     for one in methods:

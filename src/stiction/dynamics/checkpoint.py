@@ -14,7 +14,7 @@ from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.run import Run, State
 from stiction.errors import InputError
 
-FORMAT = 2
+FORMAT = 3
 
 _NAMES = {
     "nodes": "number of nodes",
@@ -40,7 +40,7 @@ def identity(run: Run) -> dict[str, NDArray[Any]]:
     medium, rows = run.medium, run.rows
     # When to stop may differ between the parts of one run; how to step may not.
     control = run.control.copy()
-    control[[track.SLID_STOP, track.DROP_STOP, track.END_TIME]] = 0.0
+    control[[track.SLID_STOP, track.EVENT_STOP, track.REST_STOP, track.END_TIME]] = 0.0
     values: dict[str, Any] = {
         "nodes": medium.nodes,
         "spacing": medium.spacing,

@@ -18,17 +18,23 @@ from stiction._model import describe, real_array, to_plain
 from stiction._progress import Meter
 from stiction.dynamics import track
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
+from stiction.dynamics.checks import (
+    check_finite,
+    check_pace,
+    warn_if_coarse,
+    warn_if_reversed,
+    warn_if_reversed_before,
+    warn_if_unresolved,
+)
 from stiction.dynamics.frames import Frames, check_variables
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
-    check_finite,
-    check_pace,
     first_slip,
     front_speed,
     make_run,
+    set_stop,
     summary,
-    warn_if_coarse,
 )
 from stiction.dynamics.run import NOTHING, Run, State
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
@@ -39,10 +45,10 @@ from stiction.problem import Problem
 from stiction.profiles import at_nodes
 from stiction.results import Variable
 
-Stop = Literal["sliding", "onset", "arrest", "time"]
+Stop = Literal["sliding", "onset", "rest", "time"]
 
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are streamed
-_NEAR_ONSET = 0.02  # fall of the mean stress, in units of tau_p - tau_r, that counts as 'around'
+_NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
 
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
@@ -107,7 +113,7 @@ def _check(options: dict[str, Any]) -> None:
         value = options[name]
         if value is not None and not (_finite(value) and value > 0.0):
             problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
-    if options["stop"] not in get_args(Stop):
+    if options["stop"] not in (None, *get_args(Stop)):
         problems.append(f"stop: must be one of {get_args(Stop)}, got {options['stop']!r}")
     elif options["stop"] == "time" and options["end_time"] is None:
         problems.append("end_time: needed with stop='time', got None")
@@ -137,6 +143,7 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
     if slip is None or load is None:
         time = first_slip(run)
         check_pace(run, time)
+        warn_if_reversed_before(run, time)
         return run.start(time)
     nodes = run.medium.nodes
     try:
@@ -174,7 +181,7 @@ def simulate_rupture(
     every_near_onset: int | None = None,
     interval: float | None = None,
     steps: bool = True,
-    stop: Stop = "sliding",
+    stop: Stop | None = None,
     end_time: float | None = None,
     store: str | Path | None = None,
     chunk: int = 64,
@@ -189,11 +196,12 @@ def simulate_rupture(
     ----------
     problem : Problem
     tau_p : (nodes,) or (1, nodes) array
-        Peak strength, Pa.
+        Peak strength, Pa; infinite where nothing ever breaks.
     method : Rupture
         Loading rate and numerical options.
     residual_strength, initial_stress, weakening_rate : array, optional
-        (nodes,), Pa or Pa/m; replaces the problem's own.
+        (nodes,), Pa or Pa/m; replaces the problem's own. Where the initial stress is above the
+        strength, slip begins at once.
     load : callable or (times, values), optional
         tau_0(t), Pa, instead of the method's constant rate. It must not fall before the first
         slip. A callable needs `end_time`.
@@ -203,18 +211,17 @@ def simulate_rupture(
         Fields to keep.
     every, every_implicit, every_near_onset : int
         Steps between frames: explicit ones, implicit ones (while the interface creeps), and
-        explicit ones until the mean stress has fallen by 2 % of the mean strength drop (if
+        explicit ones until the mean stress has fallen by 2 % of the stress scale of `Rupture` (if
         given). Since steps shorten as the interface accelerates, frames are dense in time around
         onset anyhow.
     interval : float, optional
         s; at most one frame in each interval of this length, counted from zero load.
     steps : bool
         Keep time, load, mean stress, ... of every step, over 'step'.
-    stop : {"sliding", "onset", "arrest", "time"}
-        When every node is at its residual strength; when the mean stress has fallen by
-        `method.event_drop`; when an instability has come to rest (or every node is at its
-        residual strength after all); or only at `end_time`. Unless it waits for `end_time`, a run
-        also ends where nothing slips and the load has stopped rising for good ("rest").
+    stop : {"sliding", "onset", "rest", "time"}, optional
+        As `method.stop`, which holds if left out; or "time", only at `end_time`. Unless it waits
+        for `end_time`, a run also ends where nothing slips and the load has stopped rising for
+        good ("rest").
     end_time : float, optional
         s; the run never goes beyond it (except for a part of the last explicit step).
     store : path, optional
@@ -253,18 +260,15 @@ def simulate_rupture(
         "weakening_rate": weakening_rate,
     }
     given, measured = gather(problem, given, "refuse")
-    rows = problem.rows(given.pop("tau_p"), **given)
+    rows = problem.rows(given.pop("tau_p"), **given, accept=method.accepts)
     if rows.count != 1:
         raise InputError(f"tau_p: one profile at a time, got {rows.count}")
-    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
+    warn_of_units(problem, rows.mean_strength, float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
-    drop = float(np.mean(run.rows[0] - run.rows[1]))
-    if stop == "time":
-        run.control[track.SLID_STOP] = np.inf
-    if stop == "onset":
-        run.control[track.DROP_STOP] = method.event_drop * drop
+    stop = stop or method.stop
+    set_stop(run.control, stop)
     if end_time is not None:
         run.control[track.END_TIME] = end_time
     if restart is None:
@@ -299,13 +303,14 @@ def simulate_rupture(
     before = state.time
     next_checkpoint = state.steps + checkpoint_every
     reason = "max_steps"
-    near = _NEAR_ONSET * drop
+    reversed_ = False
     record = np.empty((max(every, every_implicit, every_near_onset or 1), track.COLUMNS))
     meter = Meter("rupture", show=progress is True, unit="steps").start()
     try:
         while state.steps < method.max_steps:
             count = every if state.explicit else every_implicit
             falling = state.watch[track.LOCAL_STRESS] - state.mean_stress
+            near = _NEAR_ONSET * state.watch[track.SCALE]
             if every_near_onset is not None and state.explicit and falling < near:
                 count = every_near_onset
             count = min(count, method.max_steps - state.steps)
@@ -314,6 +319,7 @@ def simulate_rupture(
             frames.add_steps(part[:taken])
             if code == track.NOT_FINITE:
                 check_finite(run, state, code)
+            reversed_ = reversed_ or warn_if_reversed(run, state)
             ended = _reason(code, run, state, stop)
             if ended or interval is None or state.time // interval > before // interval:
                 frames.add(state)
@@ -340,6 +346,7 @@ def simulate_rupture(
     finally:
         meter.stop()
     attributes["stopped"] = reason
+    warn_if_unresolved(problem, run, state)
     flush()  # before the checkpoint, which counts on the frames up to it
     if checkpoint is not None and not reason.startswith("not finite"):
         write_checkpoint(checkpoint, run, state)
@@ -366,8 +373,8 @@ def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
         return "sliding"
     if code == track.DROPPED:
         return "onset"
-    if stop == "arrest" and state.watch[track.ARRESTED] > 0.0:
-        return "arrest"
+    if code == track.AT_REST:
+        return "rest"
     if run.ended(state):
         return "time"
     if stop != "time" and run.resting(state):

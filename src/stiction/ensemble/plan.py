@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction.fields.draws import BLOCK
 from stiction.fields.random_field import RandomField
-from stiction.methods import Method, Values, solve, variables_of
+from stiction.methods import Method, Values, accepted, solve, variables_of
 from stiction.problem import Problem
 from stiction.results import Variable
 
@@ -100,7 +100,7 @@ def compute(plan: Plan, first: int, samples: int) -> Values:
     """Results of samples first .. first + samples - 1; a plain function, for any executor."""
     profiles = plan.profiles(first, samples)
     extras: Mapping[str, Any] = {name: profiles[name] for name, _ in plan.fields}
-    rows = plan.problem.rows(profiles["strength"], **extras)
+    rows = plan.problem.rows(profiles["strength"], **extras, accept=accepted(plan.method))
     solver = _solver(plan.problem, plan.method)
     values = solve(plan.problem, plan.method, solver, rows)
     return values | {name: profiles[name] for name in plan.keep if name in PROFILES}

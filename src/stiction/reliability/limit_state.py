@@ -20,6 +20,7 @@ from stiction.ensemble.share import usable_cores
 from stiction.errors import InputError
 from stiction.fields.overlap import check_residual
 from stiction.fields.random_field import RandomField, warn_if_inaccurate
+from stiction.methods import accepted
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 
@@ -111,7 +112,8 @@ class LimitState:
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
         others = {name: value for name, value in profiles.items() if name != "strength"}
-        return dict(self._solver(self.problem.rows(profiles["strength"], **others)))
+        accept = accepted(self.method)
+        return dict(self._solver(self.problem.rows(profiles["strength"], **others, accept=accept)))
 
     def _stress(self, draws: Array) -> Array:
         # Rounding may leave a stress a hair below the bound.
