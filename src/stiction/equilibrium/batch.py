@@ -95,7 +95,10 @@ def solve_batch(
     modulus: float,
     results: Array,
     slips: Array,
+    stiffs: Array,
+    aheads: Array,
     multipliers: Array,
+    all_slips: bool,
 ) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
@@ -116,8 +119,11 @@ def solve_batch(
     spacing, modulus : float
         m and Pa.
     results : (samples, COLUMNS) array, output
-    slips, multipliers : (samples or 0, n) arrays, output
-        Filled if they have rows.
+    slips, stiffs, multipliers : (samples, n) arrays, output
+        d, K d and y at the first instability; K d where the fate is left undecided, and d only
+        there unless `all_slips`.
+    aheads : (samples, n) array, output
+        Where the fate is left undecided, a lower bound of the slip after the jump.
     """
     samples, n = excess.shape
     room = make_room(n)
@@ -151,23 +157,22 @@ def solve_batch(
         _, length, centre = main_patch(multiplier)
         line[POSITION] = centre * spacing
         line[LENGTH] = length * spacing
-        if slips.shape[0] > 0:
-            for i in range(n):
-                slips[row, i] = slip[i]
-        if multipliers.shape[0] > 0:
-            for i in range(n):
-                multipliers[row, i] = multiplier[i]
+        for i in range(n):
+            multipliers[row, i] = multiplier[i]
+        if all_slips:
+            slips[row] = slip
         line[FATE] = UNDECIDED
         for i in range(n):
             if slip[i] > critical[i] * (2.0 - AT_FLOOR):
                 line[FATE] = FLOOR_REACHED
         if line[FATE] == UNDECIDED:
             escape = escape_run(sample, load, spacing, modulus)
+            tried = slip.copy()
             line[FATE] = runs_away(
                 sample,
                 wide_column,
                 load,
-                slip,
+                tried,
                 stiff,
                 multiplier,
                 product,
@@ -176,3 +181,7 @@ def solve_batch(
                 reach,
                 work,
             )
+            if line[FATE] == UNDECIDED:
+                slips[row] = slip
+                stiffs[row] = stiff
+                aheads[row] = tried

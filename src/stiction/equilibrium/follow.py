@@ -16,9 +16,9 @@ from stiction.equilibrium.jump import (
     UNDECIDED,
     escape_run,
     jump,
-    step_to_floor,
 )
 from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.runaway import runs_away
 from stiction.equilibrium.setting import Setting
 from stiction.equilibrium.spaces import Sample, make_room
 from stiction.errors import warn_accuracy
@@ -50,7 +50,8 @@ class Event:
 class State:
     """Where the path is: load, slip, K d, and whether it has ended in global sliding.
 
-    `direction` is that of the last instability, and `first` the state at the first one.
+    `direction` is that of the last instability, and `first` the state at the first one. `ahead` is
+    a slip that is known to lie below the equilibrium to which the present instability leads.
     """
 
     load: float
@@ -60,6 +61,7 @@ class State:
     sliding: bool = False
     events: list[Event] = field(default_factory=list)
     first: State | None = None
+    ahead: Array | None = None
 
 
 def residual_nodes(sample: Sample, slip: Array) -> Array:
@@ -81,13 +83,21 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
     before, stiff_before = state.slip.copy(), state.stiff.copy()
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
-    escape = MARGIN * escape_run(sample, state.load, setting.spacing, setting.modulus)
-    unbounded = not np.isfinite(step_to_floor(sample, state.slip, state.direction, np.inf))
-    if unbounded or runs_away_frozen(
+    escape = escape_run(sample, state.load, setting.spacing, setting.modulus)
+    if state.ahead is None:
+        fate = runs_away(
+            sample, setting.wide_column, state.load, state.slip, state.stiff, state.direction,
+            setting.stiffness(state.direction), escape, setting.block, setting.reach,
+            np.empty((6, n)),
+        )  # fmt: skip
+    else:
+        state.slip, state.ahead, fate = state.ahead, None, UNDECIDED
+    escape *= MARGIN
+    if fate == UNDECIDED and runs_away_frozen(
         setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
     ):
         fate = SLIDING
-    else:
+    if fate == UNDECIDED:
         fate = jump(
             sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
             make_room(n),

@@ -13,10 +13,10 @@ from stiction.equilibrium.large import LargeProgram, Solution
 from stiction.equilibrium.program import OVERFULL, SOLVED, solve_program
 from stiction.equilibrium.runaway import block_factor
 from stiction.equilibrium.spaces import Grid, Sample, make_room
-from stiction.equilibrium.stiffness import coupling_strip, stiffness_column
+from stiction.equilibrium.stiffness import apply_stiffness, coupling_strip, stiffness_column
 from stiction.problem import Problem
 
-LONGEST_RUN = 512
+LONGEST_RUN = 2048
 """Nodes up to which the quick test for arrest follows a run."""
 LARGE_GRID = 4096
 """Nodes from which on the large path may be faster."""
@@ -62,6 +62,17 @@ class Setting:
         self._none = none
         self.reach = min(LONGEST_RUN, self.nodes - 1)
         self.block = block_factor(column, self.reach)
+
+    def stiffness(self, field: Array) -> Array:
+        """K times a field, (n,) array."""
+        result = np.empty(self.nodes)
+        members = np.flatnonzero(field)
+        room = np.empty((2, self.nodes // 2))
+        apply_stiffness(
+            self.grid.strip, self.grid.column[0], members, members.size, field[members], room,
+            result,
+        )  # fmt: skip
+        return result
 
     def windows(self, rates: Array) -> Windows:
         """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""

@@ -70,15 +70,21 @@ class Solver:
         count, nodes = rows.count, rows.nodes
         table = np.empty((count, batch.COLUMNS))
         multipliers = np.empty((count, nodes))
-        slips = np.empty((count if self.slip else 0, nodes))
-        known: dict[int, Solution] = {}
+        slips = np.empty((count, nodes))  # what is never written takes no memory
+        known: dict[int, State] = {}
         if nodes < LARGE_GRID:
-            self._batch(rows, table, slips, multipliers)
+            stiffs, aheads = np.empty((2, count, nodes))
+            self._batch(rows, table, slips, stiffs, aheads, multipliers)
+            for row in map(int, np.flatnonzero(table[:, batch.FATE] == UNDECIDED)):
+                known[row] = State(
+                    float(table[row, batch.LOAD]), slips[row].copy(), stiffs[row],
+                    multipliers[row].copy(), ahead=aheads[row],
+                )  # fmt: skip
         else:
             for row in range(count):
-                solution = self._one(rows, row, table, slips, multipliers)
-                if solution is not None and table[row, batch.FATE] == UNDECIDED:
-                    known[row] = solution
+                state = self._one(rows, row, table, slips, multipliers)
+                if state is not None:
+                    known[row] = state
         load = table[:, batch.LOAD].copy()
         first = load.copy()
         fate = table[:, batch.FATE].astype(np.int64)
@@ -87,7 +93,12 @@ class Solver:
         sliding_at = table[:, batch.POSITION].copy()
         for row in map(int, np.flatnonzero(fate != SLIDING)):
             sample = sample_of(rows, row)
-            state = self._follow(sample, fate[row] == batch.FLOOR_REACHED, known.get(row))
+            if row in known:
+                state = known[row]
+                fall(self.setting, sample, state)
+            else:
+                state = at_rest(sample)
+            follow(self.setting, sample, state)
             load[row] = state.load
             if state.events:
                 events[row] = state.events
@@ -120,17 +131,10 @@ class Solver:
             values["sensitivity"] = multipliers * mean_profile
         return values, events
 
-    def _follow(self, sample: Sample, from_rest: bool, solution: Solution | None) -> State:
-        """Follow one sample to global sliding, from rest or from its first instability."""
-        if not from_rest and solution is None:
-            solution = self.setting.programme(sample.excess, sample.rate)
-        if from_rest or solution is None:
-            return follow(self.setting, sample, at_rest(sample))
-        state = State(solution.load, solution.slip, solution.stiff, solution.multiplier)
-        fall(self.setting, sample, state)
-        return follow(self.setting, sample, state)
-
-    def _batch(self, rows: Rows, table: Array, slips: Array, multipliers: Array) -> None:
+    def _batch(
+        self, rows: Rows, table: Array, slips: Array, stiffs: Array, aheads: Array,
+        multipliers: Array,
+    ) -> None:
         """Solve the programme of all rows in one compiled loop."""
         setting = self.setting
         rate = np.ascontiguousarray(rows.weakening_rate)
@@ -140,13 +144,16 @@ class Solver:
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
             setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column,
             setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
-            setting.modulus, table, slips, multipliers,
+            setting.modulus, table, slips, stiffs, aheads, multipliers, self.slip,
         )  # fmt: skip
 
     def _one(
         self, rows: Rows, row: int, table: Array, slips: Array, multipliers: Array
-    ) -> Solution | None:
-        """Solve the programme of one row on a large grid, and test quickly for arrest."""
+    ) -> State | None:
+        """Solve the programme of one row on a large grid, and test quickly for arrest.
+
+        Returns the first instability if it is to be followed from there.
+        """
         setting = self.setting
         sample = sample_of(rows, row)
         line = table[row]
@@ -169,14 +176,19 @@ class Solver:
         line[batch.LENGTH] = length * setting.spacing
         if np.any(solution.slip > OVERSHOOT * sample.critical):
             line[batch.FATE] = batch.FLOOR_REACHED
-            return solution
+            return None
+        ahead = solution.slip.copy()
         line[batch.FATE] = runs_away(
-            sample, setting.wide_column, solution.load, solution.slip.copy(),
-            solution.stiff.copy(), solution.multiplier, stiff_multiplier,
+            sample, setting.wide_column, solution.load, ahead, solution.stiff,
+            solution.multiplier, stiff_multiplier,
             escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
             setting.reach, np.empty((6, setting.nodes)),
         )  # fmt: skip
-        return solution
+        if line[batch.FATE] == SLIDING:
+            return None
+        return State(
+            solution.load, solution.slip, solution.stiff, solution.multiplier, ahead=ahead
+        )
 
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""
