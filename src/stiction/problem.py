@@ -139,7 +139,13 @@ class Problem:
         ------
         InputError
             Naming all that is wrong: shapes, values that are not finite, strength not above the
-            residual strength and the initial stress, a weakening rate that is not positive.
+            initial stress, or nowhere above the residual strength, a weakening rate that is not
+            positive.
+
+        Notes
+        -----
+        A node whose strength is not above its residual strength does not weaken: its strength is
+        constant. An `AccuracyWarning` gives the share of such nodes.
         """
         nodes = self.interface.nodes
         problems: list[str] = []
@@ -165,19 +171,35 @@ class Problem:
                 problems.append(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
         if residual is not None and residual.min() < 0.0:
             problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        for name, other in (("residual_strength", residual), ("initial_stress", initial)):
-            if strength is None or other is None or np.all(strength > other):
-                continue
-            sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
+        if strength is not None and initial is not None and not np.all(strength > initial):
+            sample, node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
             problems.append(
-                f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
-                f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
+                f"tau_p: must be above initial_stress everywhere; sample {sample}, node {node}:"
+                f" {strength[sample, node]:g} against {initial[sample, node]:g} Pa"
             )
+        if strength is not None and residual is not None:
+            nowhere = np.flatnonzero(~np.any(strength > residual, axis=1))
+            if nowhere.size:
+                problems.append(
+                    f"tau_p: must be above residual_strength somewhere; sample {nowhere[0]} is"
+                    f" nowhere, from {strength[nowhere[0]].min():g} to"
+                    f" {strength[nowhere[0]].max():g} Pa: check the units of both"
+                )
         if problems:
             raise InputError(problems)
+        constant = strength <= residual
         if rates is None:
             with np.errstate(over="ignore"):  # too short a critical slip is refused just below
                 rates = (strength - residual) / np.asarray(self.friction.critical_slip)
+        if constant.any():
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
+            residual = np.minimum(residual, strength)
+            slowest = np.min(rates, axis=1, where=~constant, initial=np.inf, keepdims=True)
+            rates = np.where(constant, slowest, rates)
+            warn_accuracy(
+                f"tau_p is not above residual_strength at {100.0 * constant.mean():.2g} % of the"
+                " nodes; these do not weaken: their strength stays tau_p"
+            )
         too_few = self._too_few_nodes(float(rates.max()))
         if too_few:
             raise InputError(too_few)

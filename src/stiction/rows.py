@@ -20,6 +20,7 @@ class Rows:
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
         tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa); views of what was given, not to be written to.
+        Where tau_p was given at or below tau_r, tau_r = tau_p: strength is constant, whatever W.
     load_profile : (nodes,) array
         p, dimensionless, positive.
     spacing : float

@@ -11,7 +11,7 @@ from stiction.equilibrium.jump import AT_FLOOR, UNDECIDED, escape_run
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.program import solve_program
 from stiction.equilibrium.runaway import runs_away
-from stiction.equilibrium.spaces import Grid, Room, Sample, make_room
+from stiction.equilibrium.spaces import Grid, Room, Sample, make_room, make_sample
 from stiction.equilibrium.stiffness import apply_stiffness
 
 LOAD, GAP, PATCHES, POSITION, LENGTH, FATE = range(6)
@@ -131,19 +131,15 @@ def solve_batch(
     stiff = np.empty(n)
     multiplier = np.empty(n)
     product = np.empty(n)
-    critical = np.empty(n)
     work = np.empty((6, n))
     for row in range(samples):
-        for i in range(n):
-            critical[i] = (excess[row, i] - floor[row, i]) / rate[row, i]
-            room.diagonal[i] = grid.column[0] - rate[row, i]
-        sample = Sample(excess[row], floor[row], profile, rate[row], critical)
+        sample = make_sample(excess[row], floor[row], profile, rate[row])
         windows = usual
         for i in range(n):
+            room.diagonal[i] = grid.column[0] - sample.rate[i]
             if rate[row, i] != usual_rate:
                 windows = others
-                break
-        bound, start, choice = window_bound(excess[row], profile, rate[row], windows, work)
+        bound, start, choice = window_bound(excess[row], profile, sample.rate, windows, work)
         width = 0 if choice < 0 else windows.widths[choice]
         start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, profile)
         # If it does not succeed, the certificate says so.
@@ -163,7 +159,7 @@ def solve_batch(
             slips[row] = slip
         line[FATE] = UNDECIDED
         for i in range(n):
-            if slip[i] > critical[i] * (2.0 - AT_FLOOR):
+            if slip[i] > sample.critical[i] * (2.0 - AT_FLOOR) and sample.critical[i] > 0.0:
                 line[FATE] = FLOOR_REACHED
         if line[FATE] == UNDECIDED:
             escape = escape_run(sample, load, spacing, modulus)

@@ -65,9 +65,14 @@ class State:
 
 
 def residual_nodes(sample: Sample, slip: Array) -> Array:
-    """Which nodes have reached their floor, (n,) bool."""
-    reached: Array = slip >= AT_FLOOR * sample.critical
+    """Which nodes have reached their floor, (n,) bool; those of constant strength are none."""
+    reached: Array = (slip >= AT_FLOOR * sample.critical) & (sample.critical > 0.0)
     return reached
+
+
+def exceeds(sample: Sample, slip: Array) -> bool:
+    """Whether a slip that knows of no floor goes beyond one."""
+    return bool(np.any((slip > OVERSHOOT * sample.critical) & (sample.critical > 0.0)))
 
 
 def at_rest(sample: Sample) -> State:
@@ -102,6 +107,10 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
             sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
             make_room(n),
         )  # fmt: skip
+    if fate == ARRESTED and not np.any(
+        residual_nodes(sample, state.slip) & ~residual_nodes(sample, before)
+    ):
+        fate = UNDECIDED  # round-off: only nodes that reach their floor can stop an instability
     if fate == UNDECIDED:
         warn_accuracy(
             "the jump of an unstable patch did not settle; it is counted as global sliding"
@@ -128,8 +137,7 @@ def leap(setting: Setting, sample: Sample, state: State) -> bool:
     found = setting.programme(strength, rate)
     if found is None or found.load < state.load:
         return False
-    weak = ~residual
-    if np.any(found.slip[weak] > OVERSHOOT * sample.critical[weak]):
+    if exceeds(sample, np.where(residual, 0.0, found.slip)):
         return False
     state.load, state.slip, state.stiff = found.load, found.slip, found.stiff
     state.direction = found.multiplier

@@ -12,10 +12,10 @@ from stiction.equilibrium import batch
 from stiction.equilibrium.batch import solve_batch
 from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.follow import (
-    OVERSHOOT,
     Event,
     State,
     at_rest,
+    exceeds,
     fall,
     follow,
     residual_nodes,
@@ -25,7 +25,7 @@ from stiction.equilibrium.large import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import runs_away
 from stiction.equilibrium.setting import LARGE_GRID, Setting
-from stiction.equilibrium.spaces import Sample
+from stiction.equilibrium.spaces import Sample, make_sample
 from stiction.errors import warn_accuracy
 from stiction.problem import Problem
 from stiction.rows import Rows
@@ -40,7 +40,7 @@ def sample_of(rows: Rows, row: int) -> Sample:
     excess = np.ascontiguousarray(rows.strength[row] - initial)
     floor = np.ascontiguousarray(rows.residual_strength[row] - initial)
     rate = np.array(rows.weakening_rate[row])
-    return Sample(excess, floor, np.array(rows.load_profile), rate, (excess - floor) / rate)
+    return make_sample(excess, floor, np.array(rows.load_profile), rate)
 
 
 class Solver:
@@ -174,7 +174,7 @@ class Solver:
         _, length, centre = main_patch(solution.multiplier)
         line[batch.POSITION] = centre * setting.spacing
         line[batch.LENGTH] = length * setting.spacing
-        if np.any(solution.slip > OVERSHOOT * sample.critical):
+        if exceeds(sample, solution.slip):
             line[batch.FATE] = batch.FLOOR_REACHED
             return None
         ahead = solution.slip.copy()
