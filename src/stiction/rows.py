@@ -49,6 +49,15 @@ class Rows:
         """Whether W is the same at all nodes of each sample."""
         return bool(np.all(self.weakening_rate == self.weakening_rate[:, :1]))
 
+    def every_second(self, first: int) -> Rows:
+        """The same samples on the nodes `first`, `first` + 2, ..."""
+        nodes = slice(first, None, 2)
+        return Rows(
+            self.strength[:, nodes], self.residual_strength[:, nodes],
+            self.weakening_rate[:, nodes], self.initial_stress[:, nodes],
+            self.load_profile[nodes], 2.0 * self.spacing,
+        )  # fmt: skip
+
     def mean_stress(self, load: Array) -> Array:
         """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
         mean: Array = self.initial_stress.mean(axis=1) + load * self.load_profile.mean()
