@@ -98,3 +98,21 @@ def test_grid_far_too_fine(solid):
             method=Equilibrium(),
             weakening_rate=0.5e12,
         )
+
+
+def test_error_of_the_grid_needs_two_grids(solid):
+    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    problem = st.Problem(solid, st.Interface(0.1, 258), friction)
+    with pytest.raises(st.InputError, match="multiple of four.*got 258; take 260"):
+        st.onset(problem, np.ones(258), method=Equilibrium(discretization_error=True))
+
+
+def test_warning_says_the_estimated_error(solid):
+    problem = st.Problem(solid, st.Interface(0.1, 128), st.SlipWeakening(weakening_rate=0.5e12))
+    rng = np.random.default_rng(0)
+    with pytest.warns(st.AccuracyWarning, match="by an estimated .* of 3 samples"):
+        st.onset(
+            problem,
+            1e6 + 3e5 * rng.random((3, 128)),
+            method=Equilibrium(discretization_error=True),
+        )

@@ -93,6 +93,7 @@ def solve_batch(
     reach: int,
     spacing: float,
     modulus: float,
+    caution: float,
     results: Array,
     slips: Array,
     stiffs: Array,
@@ -118,6 +119,8 @@ def solve_batch(
         From `block_factor`.
     spacing, modulus : float
         m and Pa.
+    caution : float
+        Factor on the length at which a rupture counts as unstoppable.
     results : (samples, COLUMNS) array, output
     slips, stiffs, multipliers : (samples, n) arrays, output
         d, K d and y at the first instability; K d where the fate is left undecided, and d only
@@ -162,7 +165,7 @@ def solve_batch(
             if slip[i] > sample.critical[i] * (2.0 - AT_FLOOR) and sample.critical[i] > 0.0:
                 line[FATE] = FLOOR_REACHED
         if line[FATE] == UNDECIDED:
-            escape = escape_run(sample, load, spacing, modulus)
+            escape = caution * escape_run(sample, load, spacing, modulus)
             tried = slip.copy()
             line[FATE] = runs_away(
                 sample,

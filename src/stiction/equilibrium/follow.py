@@ -14,7 +14,6 @@ from stiction.equilibrium.jump import (
     AT_FLOOR,
     SLIDING,
     UNDECIDED,
-    escape_run,
     jump,
 )
 from stiction.equilibrium.patches import main_patch
@@ -88,7 +87,7 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
     before, stiff_before = state.slip.copy(), state.stiff.copy()
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
-    escape = escape_run(sample, state.load, setting.spacing, setting.modulus)
+    escape = setting.escape(sample, state.load)
     if state.ahead is None:
         fate = runs_away(
             sample, setting.wide_column, state.load, state.slip, state.stiff, state.direction,

@@ -19,6 +19,7 @@ from stiction.equilibrium.jump import (
     UNDECIDED,
     step_to_floor,
     strength_at,
+    unsupported,
 )
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.spaces import Sample
@@ -106,7 +107,7 @@ def runs_away(
     if not np.isfinite(step):
         return SLIDING
     first, length, _ = main_patch(direction)
-    if escape > width or length > width:
+    if (np.isfinite(escape) and escape > width) or length > width:
         return UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     origin = (first - (n - length) // 2) % n
@@ -158,7 +159,7 @@ def runs_away(
             fastest = max(fastest, solution[t])
             run = run + 1 if slip[i] >= AT_FLOOR * sample.critical[i] else 0
             longest = max(longest, run)
-        if longest >= escape:
+        if longest >= escape or unsupported(sample, load, slip):
             return SLIDING
         if fastest < SHARE * largest:
             return UNDECIDED

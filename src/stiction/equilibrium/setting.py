@@ -9,6 +9,7 @@ import numpy as np
 from stiction._typing import Array
 from stiction.equilibrium.batch import certificate, start_from_bound
 from stiction.equilibrium.bound import Windows, exact_window, window_bound, windows_between
+from stiction.equilibrium.jump import escape_run
 from stiction.equilibrium.large import LargeProgram, Solution
 from stiction.equilibrium.program import OVERFULL, SOLVED, solve_program
 from stiction.equilibrium.runaway import block_factor
@@ -46,10 +47,15 @@ class Setting:
     problem : Problem
     nodes : slice
         Nodes of the problem that are taken: all, or every second one.
+    prove_sliding : bool
+        Whether no length of a rupture counts as unstoppable.
     """
 
-    def __init__(self, problem: Problem, nodes: slice = slice(None)) -> None:
+    def __init__(
+        self, problem: Problem, nodes: slice = slice(None), prove_sliding: bool = False
+    ) -> None:
         self.problem = problem
+        self.caution = np.inf if prove_sliding else 1.0
         every = nodes.step or 1
         self.nodes = problem.interface.nodes // every
         self.spacing = problem.interface.spacing * every
@@ -83,6 +89,10 @@ class Setting:
             " them (it would need minutes a sample, and 64 leave an error of 3e-5). Take"
             f" every {share}th node or fewer, interface.nodes <= {self.nodes // (2 * share) * 2}"
         )
+
+    def escape(self, sample: Sample, load: float) -> float:
+        """Residual nodes in a row that count as unstoppable."""
+        return self.caution * float(escape_run(sample, load, self.spacing, self.modulus))
 
     def stiffness(self, field: Array) -> Array:
         """K times a field, (n,) array."""

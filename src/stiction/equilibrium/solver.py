@@ -20,7 +20,7 @@ from stiction.equilibrium.follow import (
     follow,
     residual_nodes,
 )
-from stiction.equilibrium.jump import SLIDING, UNDECIDED, escape_run
+from stiction.equilibrium.jump import SLIDING, UNDECIDED
 from stiction.equilibrium.large import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import runs_away
@@ -53,6 +53,8 @@ class Solver:
         Whether to return these as well.
     discretization_error : bool
         Whether to estimate it, from the onsets on every second node.
+    prove_sliding : bool
+        Whether to follow jumps until no balance of forces is left.
     nodes : slice
         Nodes of the problem that the rows have.
     """
@@ -63,9 +65,10 @@ class Solver:
         sensitivity: bool = False,
         slip: bool = False,
         discretization_error: bool = False,
+        prove_sliding: bool = False,
         nodes: slice = slice(None),
     ) -> None:
-        self.setting = Setting(problem, nodes)
+        self.setting = Setting(problem, nodes, prove_sliding)
         self.sensitivity = sensitivity
         self.slip = slip
         self.halves: list[Solver] = []
@@ -80,7 +83,7 @@ class Solver:
     def solve(self, rows: Rows) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
         """The onset of each row, and the arrested events of the rows that have any."""
         if not self.halves:
-            self.setting.problem.warn_if_coarse(rows, 12.0, discretization.ROUGHLY)
+            self.setting.problem.warn_if_coarse(rows, 8.0, discretization.ROUGHLY)
         values, events = self._solve(rows)
         if self.halves:
             coarse = [
@@ -160,7 +163,12 @@ class Solver:
         return values, events
 
     def _batch(
-        self, rows: Rows, table: Array, slips: Array, stiffs: Array, aheads: Array,
+        self,
+        rows: Rows,
+        table: Array,
+        slips: Array,
+        stiffs: Array,
+        aheads: Array,
         multipliers: Array,
     ) -> None:
         """Solve the programme of all rows in one compiled loop."""
@@ -172,7 +180,7 @@ class Solver:
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
             setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column,
             setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
-            setting.modulus, table, slips, stiffs, aheads, multipliers, self.slip,
+            setting.modulus, setting.caution, table, slips, stiffs, aheads, multipliers, self.slip,
         )  # fmt: skip
 
     def _one(
@@ -209,14 +217,12 @@ class Solver:
         line[batch.FATE] = runs_away(
             sample, setting.wide_column, solution.load, ahead, solution.stiff,
             solution.multiplier, stiff_multiplier,
-            escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
-            setting.reach, np.empty((6, setting.nodes)),
+            setting.escape(sample, solution.load), setting.block, setting.reach,
+            np.empty((6, setting.nodes)),
         )  # fmt: skip
         if line[batch.FATE] == SLIDING:
             return None
-        return State(
-            solution.load, solution.slip, solution.stiff, solution.multiplier, ahead=ahead
-        )
+        return State(solution.load, solution.slip, solution.stiff, solution.multiplier, ahead=ahead)
 
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""

@@ -11,7 +11,6 @@ from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import row_start
 
-
 FLAT = 1e-11
 """Share of the mean strength by which it must fall to count as weakening. Less cannot be told from
 the round-off of K d; an instability of such nodes would be one of nothing, and never end."""
