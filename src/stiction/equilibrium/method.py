@@ -52,7 +52,7 @@ class Equilibrium:
     prove_sliding : bool
         Follow every jump until the strength left cannot carry the load on average, which proves
         that the interface slides, instead of until a length at which no fracture energy stops a
-        rupture (Griffith). A few times slower; no sample of 6,000 changed.
+        rupture (Griffith). Takes 5 to 50 % longer; of 5,250 samples it changed none.
 
     Notes
     -----
