@@ -163,15 +163,22 @@ class Problem:
         residual_strength, initial_stress, weakening_rate : array, optional
             Where given, replaces the problem's own: (samples, nodes), (nodes,), (samples, 1) or a
             number.
-        accept : collection of {"barriers", "overstress"}
+        accept : collection of {"barriers", "overstress", "constant"}
             What the method at hand can do besides: infinite strength where nothing breaks; an
-            initial stress above the strength.
+            initial stress above the strength. "constant": the caller has warned of nodes that do
+            not weaken.
 
         Raises
         ------
         InputError
             Naming all that is wrong: shapes, values that are not finite, strength not above the
-            residual strength and the initial stress, a weakening rate that is not positive.
+            initial stress, or nowhere above the residual strength, a weakening rate that is not
+            positive.
+
+        Notes
+        -----
+        A node whose strength is not above its residual strength does not weaken: its strength is
+        constant. An `AccuracyWarning` gives the share of such nodes.
         """
         nodes = self.interface.nodes
         problems: list[str] = []
@@ -189,7 +196,8 @@ class Problem:
 
         strength = checked("tau_p", tau_p, None, None, "barriers" in accept)
         count = 1 if strength is None else strength.shape[0]
-        if strength is not None and np.any(stuck := np.all(np.isinf(strength), axis=1)):
+        stuck = np.zeros(1, dtype=bool) if strength is None else np.isinf(strength).all(axis=1)
+        if stuck.any():
             problems.append(
                 f"tau_p: infinite at every node of sample {int(np.argmax(stuck))}; nothing can"
                 " break"
@@ -206,25 +214,42 @@ class Problem:
                 problems.append(f"weakening_rate: must be positive, got {rates.min():g} Pa/m")
         if residual is not None and residual.min() < 0.0:
             problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        for name, other in (("residual_strength", residual), ("initial_stress", initial)):
-            if strength is None or other is None or np.all(strength > other):
-                continue
-            if name == "initial_stress" and "overstress" in accept:
-                continue
-            sample, node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
+        overstressed = strength is not None and initial is not None and np.any(strength <= initial)
+        if overstressed and "overstress" not in accept:
+            sample, node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
             problems.append(
-                f"tau_p: must be above {name} everywhere; sample {sample}, node {node}:"
-                f" {strength[sample, node]:g} against {other[sample, node]:g} Pa"
-                + ("; only st.Rupture() begins above the strength" * (name == "initial_stress"))
+                f"tau_p: must be above initial_stress everywhere; sample {sample}, node {node}:"
+                f" {strength[sample, node]:g} against {initial[sample, node]:g} Pa; only"
+                " st.Rupture() begins above the strength"
             )
+        if strength is not None and residual is not None:
+            weakens = (strength > residual) & np.isfinite(strength)
+            nowhere = np.flatnonzero(~weakens.any(axis=1) & ~stuck)
+            if nowhere.size:
+                problems.append(
+                    f"tau_p: must be above residual_strength somewhere; sample {nowhere[0]} is"
+                    f" nowhere, from {strength[nowhere[0]].min():g} to"
+                    f" {strength[nowhere[0]].max():g} Pa: check the units of both"
+                )
         if problems:
             raise InputError(problems)
+        constant = strength <= residual
         if rates is None:
             with np.errstate(over="ignore"):  # too short a critical slip is refused just below
                 rates = (strength - residual) / np.asarray(self.friction.critical_slip)
             if np.any(barriers := np.isinf(strength)):  # any rate will do where nothing weakens
                 own = np.where(barriers, 0.0, rates).max(axis=1, keepdims=True)
                 rates = np.where(barriers, own, rates)
+        if constant.any():
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
+            residual = np.minimum(residual, strength)
+            slowest = np.min(rates, axis=1, where=~constant, initial=np.inf, keepdims=True)
+            rates = np.where(constant, slowest, rates)
+            if "constant" not in accept:
+                warn_accuracy(
+                    f"tau_p is not above residual_strength at {100.0 * constant.mean():.2g} % of"
+                    " the nodes; these do not weaken: their strength stays tau_p"
+                )
         too_few = self._too_few_nodes(
             steepest_rate(strength, residual, rates), mean_strength(strength)
         )

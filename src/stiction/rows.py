@@ -15,7 +15,8 @@ from stiction.profile_nodes import describe_gaps
 from stiction.profiles import at_nodes
 
 BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile."""
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
+weaken."""
 
 
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
@@ -26,7 +27,8 @@ def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min():
         return float(rate.max())
-    typical = np.nanquantile(np.where(np.isfinite(drop), drop, np.nan), 0.25, axis=1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
     return float(rate[drop <= BARRIER * typical[:, None]].max())
 
 
@@ -44,6 +46,7 @@ class Rows:
     strength, residual_strength, weakening_rate, initial_stress : (samples, nodes) arrays
         tau_p, tau_r (Pa), W (Pa/m), tau_i (Pa); views of what was given, not to be written to.
         Strength may be infinite for methods that accept barriers.
+        Where tau_p was given at or below tau_r, tau_r = tau_p: strength is constant, whatever W.
     load_profile : (nodes,) array
         p, dimensionless, positive.
     spacing : float
@@ -91,6 +94,15 @@ class Rows:
     def steepest_rate(self) -> float:
         """Largest weakening rate of nodes that may break, Pa/m."""
         return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
+    def every_second(self, first: int) -> Rows:
+        """The same samples on the nodes `first`, `first` + 2, ..."""
+        nodes = slice(first, None, 2)
+        return Rows(
+            self.strength[:, nodes], self.residual_strength[:, nodes],
+            self.weakening_rate[:, nodes], self.initial_stress[:, nodes],
+            self.load_profile[nodes], 2.0 * self.spacing,
+        )  # fmt: skip
 
     def mean_stress(self, load: Array) -> Array:
         """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""

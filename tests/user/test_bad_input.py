@@ -158,7 +158,7 @@ CASES = {
         lambda: st.onset(
             make_problem(), np.ones(256), method=st.LocalCriterion(), residual_strength=2.0
         ),
-        ["tau_p", "residual_strength", "node 0"],
+        ["tau_p", "residual_strength", "sample 0 is nowhere"],
     ),
     "samples of one and of another": (
         lambda: st.onset(

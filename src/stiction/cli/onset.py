@@ -76,7 +76,8 @@ def onset(
         interpolate=interpolate,
         fill_gaps=fill_gaps,
     )
-    problem.rows(profile, accept=("barriers", "overstress"))  # each method refuses for itself
+    # Each method refuses, and warns, for itself.
+    problem.rows(profile, accept=("barriers", "overstress", "constant"))
     results: dict[str, Any] = {}
     refused: list[tuple[str, str]] = []
     for one in methods:

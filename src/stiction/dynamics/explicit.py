@@ -170,7 +170,8 @@ def explicit_steps(
         for i in range(n):
             if guess[i] > top:
                 top, node = guess[i], i
-            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+            # d_c = 0 where nothing weakens: there the first slip counts.
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
                 increment = 0.5 * step * (rate[i] + guess[i])
                 past = slip[i] - 0.5 * critical[i]
                 arrival[i] = time - step * min(1.0, past / max(increment, 1e-300))

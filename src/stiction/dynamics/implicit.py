@@ -263,7 +263,7 @@ def implicit_steps(
                 if slip[i] < critical[i] and u[i] > 0.0:
                     lost = weakening[i] * min(u[i], critical[i] - slip[i])
                     largest = max(largest, lost / max(weakening[i] * critical[i], least))
-                elif u[i] > creep:
+                elif u[i] > creep and critical[i] > 0.0:
                     largest = max(largest, u[i] / critical[i])
                 total += u[i]
             if not np.isfinite(total):
@@ -311,7 +311,7 @@ def implicit_steps(
                 slid += 1
             if rate[i] > top:
                 top, node = rate[i], i
-            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
                 beyond = slip[i] - 0.5 * critical[i]
                 arrival[i] = time - size * min(1.0, beyond / max(u[i], 1e-300))
         mean_stress = medium[3] + load * medium[2] - radiated

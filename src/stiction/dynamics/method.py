@@ -233,7 +233,8 @@ def make_run(method: Rupture, medium: Medium, rows: Rows, sample: int, history: 
     )
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
-    loads = (strength[finite] - initial[finite]) / rows.load_profile[finite]
+    weakens = finite & (critical > 0.0)
+    loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
     weakest = min(max(round(half / medium.spacing), 1), loads.size)
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
     return Run(medium, table, constants, history, control, steepest, least)

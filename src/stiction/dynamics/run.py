@@ -96,7 +96,8 @@ class Run:
         Largest weakening rate of nodes that may break, Pa/m.
     least_load : float
         Load below which nothing runs away: the mean strength of the weakest nodes that make up
-        half a nucleation length, Pa. A few nodes of next to no strength do not count.
+        half a nucleation length, Pa. A few nodes of next to no strength do not count, nor do
+        nodes that do not weaken.
     """
 
     medium: Medium
@@ -156,7 +157,7 @@ class Run:
         scale = follow_scale(watch, self.control, *self.scale, max(load, self.least_load))
         watch[track.TOP_RATE] = rate.max()
         watch[track.SLID] = np.count_nonzero(delta >= self.rows[3])
-        arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
+        arrival = np.where((delta > 0.0) & (delta >= 0.5 * self.rows[3]), time, np.nan)
         size = self.control[track.SMALLEST_STEP]
         slope = self.slope(time)
         first = 0.1 * self.control[track.LOAD_STEP] * scale / slope if slope > 0.0 else size

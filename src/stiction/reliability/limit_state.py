@@ -112,7 +112,7 @@ class LimitState:
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
         others = {name: value for name, value in profiles.items() if name != "strength"}
-        accept = accepted(self.method)
+        accept = (*accepted(self.method), "constant")  # of which `check_residual` has warned
         return dict(self._solver(self.problem.rows(profiles["strength"], **others, accept=accept)))
 
     def _stress(self, draws: Array) -> Array:
