@@ -196,6 +196,7 @@ class Study:
         executor: Executor | None = None,
         progress: bool | Callable[[int, int], None] = False,
         retry: bool = False,
+        lock: bool = True,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -209,6 +210,9 @@ class Study:
             See `stiction.monte_carlo`.
         retry : bool
             Compute stored samples that failed again.
+        lock : bool
+            Keep other runs out of the folder while this one writes; False for file systems that
+            have no locks.
 
         Returns
         -------
@@ -221,14 +225,15 @@ class Study:
             See `stiction.monte_carlo`; with `out`, samples that fail are listed in the attribute
             'failed_samples' instead.
         StoreError
-            If `out` cannot be used.
+            If `out` cannot be used, or what was stored is damaged before the end.
         """
         if out is not None:
             from stiction.runs import run_into
 
             return run_into(
-                self, out, workers=workers, executor=executor, progress=progress, retry=retry
-            ).dataset()
+                self, out, workers=workers, executor=executor, progress=progress, retry=retry,
+                lock=lock,
+            ).dataset()  # fmt: skip
         return run_plans(
             self.plans,
             self.ensemble.samples,

@@ -57,6 +57,13 @@ def run(
     retry: Annotated[
         bool, typer.Option("--retry", help="Compute stored samples that failed again.")
     ] = False,
+    no_lock: Annotated[
+        bool,
+        typer.Option(
+            "--no-lock",
+            help="For file systems without locks: do not keep other runs out of RUN.",
+        ),
+    ] = False,
 ) -> None:
     """Run the study of a file, or what is missing of it.
 
@@ -78,8 +85,9 @@ def run(
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
-                loaded, out, workers=workers, executor=executor, progress=True, retry=retry
-            )
+                loaded, out, workers=workers, executor=executor, progress=True, retry=retry,
+                lock=not no_lock,
+            )  # fmt: skip
     except KeyboardInterrupt:
         try:
             state = StoredRun(out).status()
@@ -90,10 +98,11 @@ def run(
         raise typer.Exit(130) from None
     names = ["critical_stress", "friction_coefficient"]
     _show_results(loaded, stored.dataset(only=names))
-    samples = len(loaded.plans) * loaded.ensemble.samples
-    typer.echo(f"{samples - len(stored.failures)} samples in {out}")
-    if stored.failures:
-        _show_failures(stored.failures, f"stiction run {study} --out {out} --retry")
+    state = stored.status()
+    typer.echo(f"{state.done} samples in {out}")
+    if state.failures:
+        _show_failures(state.failures, f"stiction run {study} --out {out} --retry")
+    if not state.complete:
         raise typer.Exit(1)
 
 

@@ -52,7 +52,7 @@ def run_stored(
     spans = store.missing(len(plans), samples, first, retry=retry)
     to_do = sum(span.samples for span in spans)
     variables = {name: v for plan in plans for name, v in plan.variables.items()}
-    alive = {span.point for chunk in store.chunks for span in chunk.done}
+    alive = {point for chunk in store.chunks for point in chunk.done[:, 0].tolist()}
     lost: dict[int, int] = {}
     buffer: list[Outcome] = []
     flushed = time.monotonic()
