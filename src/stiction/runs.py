@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from stiction._model import describe
 from stiction._netcdf import DamagedError, read_dataset, write_dataset
 from stiction.ensemble.chunk import ROWS, stored_samples
-from stiction.ensemble.files import Lock, cannot_write
+from stiction.ensemble.files import HeldError, Lock, cannot_write
 from stiction.ensemble.gather import Gathered
 from stiction.ensemble.run import check_run, warn_of_fields
 from stiction.ensemble.same import refuse_another
@@ -100,7 +100,7 @@ class StoredRun:
         self._store: Store | None = None
         if self.path.is_dir():
             self._store = Store(self.path)
-        elif beside.is_dir():
+        elif beside.is_dir() and ((beside / MANIFEST).exists() or not self.path.is_file()):
             self._store = Store(beside)
         elif self.path.is_file():
             self._result = _read_result(self.path)
@@ -204,8 +204,10 @@ def _is_active(folder: Path) -> bool:
     try:
         with Lock(folder / LOCK, announce=False):
             return False
-    except StoreError:
+    except HeldError:
         return True
+    except StoreError:  # no locks here: nobody knows
+        return False
 
 
 def folder_beside(file: Path) -> Path:
@@ -296,7 +298,7 @@ def run_into(
         before = _read_result(path)
         refuse_another(path, plain, json.loads(before.attrs["study"]))
         same = json.loads(before.attrs["study"])["ensemble"]["samples"] == ensemble.samples
-        if same and not folder.exists() and not (retry and FAILED in before.attrs):
+        if same and not (folder / MANIFEST).exists() and not (retry and FAILED in before.attrs):
             return StoredRun(path)
     with writing(folder, plain, __version__, lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import socket
+import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -23,6 +24,9 @@ from stiction.ensemble.trouble import StoreError
 from stiction.results import Variable
 
 Arrays = dict[str, NDArray[Any]]
+
+_ONE_AT_A_TIME = threading.Lock()
+"""The NetCDF library knows no threads: one may look at a run that another one writes."""
 
 
 def digest(data: bytes) -> str:
@@ -81,6 +85,10 @@ HELD = {errno.EACCES, errno.EAGAIN, errno.EDEADLK}
 """What the system says when somebody else has the lock; anything else is no lock at all."""
 
 
+class HeldError(StoreError):
+    """Somebody else has the lock."""
+
+
 class Lock:
     """One run at a time in a folder.
 
@@ -96,7 +104,7 @@ class Lock:
     def __enter__(self) -> Lock:
         folder = self.path.parent
         if self._key in _held:
-            raise StoreError(f"{folder}: a run in this process is writing to it")
+            raise HeldError(f"{folder}: a run in this process is writing to it")
         try:
             self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
@@ -112,7 +120,7 @@ class Lock:
                     " has no locks; choose another place, or say that nobody else writes to it:"
                     " --no-lock (lock=False in Python)"
                 ) from None
-            raise StoreError(
+            raise HeldError(
                 f"{folder}: another run is writing to it ({printable(holder)}); wait for it, or"
                 " choose another folder"
             ) from None
@@ -217,6 +225,15 @@ def encode(
     the time.
     """
     attributes = dict(attributes, content=_digest_of(values, attributes))
+    with _ONE_AT_A_TIME:
+        return _encode(values, variables, attributes)
+
+
+def _encode(
+    values: Mapping[str, NDArray[Any]],
+    variables: Mapping[str, Variable],
+    attributes: Mapping[str, Any],
+) -> bytes:
     file = netCDF4.Dataset("chunk.nc", "w", memory=1 << 12, format="NETCDF3_64BIT_DATA")
     try:
         for name, given in attributes.items():
@@ -250,7 +267,7 @@ def decode(data: bytes) -> tuple[Arrays, dict[str, Any]]:
     """
     result: Arrays = {}
     try:
-        with netCDF4.Dataset("chunk.nc", "r", memory=data) as file:
+        with _ONE_AT_A_TIME, netCDF4.Dataset("chunk.nc", "r", memory=data) as file:
             file.set_auto_maskandscale(False)
             attributes = {name: json.loads(file.getncattr(name)) for name in file.ncattrs()}
             for name, variable in file.variables.items():

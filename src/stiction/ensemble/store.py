@@ -91,19 +91,25 @@ class Store:
         self.failures: dict[tuple[int, int], Failure] = {}
         self.damage: list[str] = []
         self._mark = mark_of(self.study)
-        self._next = 0
+        self._next, self._read = 0, ""
         self._token = uuid.uuid4().hex[:8]
         self._lock: Lock | NoLock = NoLock()
         self._read_list()
 
-    def _read_list(self) -> None:
-        lines = (read_whole(self.path / LIST) or b"").split(b"\n")
+    def _read_list(self) -> bool:
+        """Read the list, and whether it is another than before."""
+        data = read_whole(self.path / LIST) or b""
+        if digest(data) == self._read:
+            return False
+        self._read, self.chunks, self.failures, self.damage = digest(data), [], {}, []
+        lines = data.split(b"\n")
         for number, line in enumerate(lines, 1):
             try:
                 self._note(_opened(line))
             except (ValueError, KeyError, TypeError):
                 if number < len(lines):  # what follows the last line end was cut short
                     self.damage.append(f"line {number} of {LIST} fails its checksum")
+        return True
 
     def _note(self, entry: Mapping[str, Any]) -> None:
         if "file" in entry:
@@ -166,16 +172,16 @@ class Store:
 
     def verify(self, *, whole: bool = True) -> dict[str, str]:
         """What is wrong with which chunk: of all that is in it, or of its size alone."""
-        found = {}
-        for chunk in self.chunks:
-            try:
-                if whole:
-                    self.table(chunk)
-                else:
-                    self._look_at(chunk)
-            except DamagedChunk as error:
-                found[chunk.file] = str(error)
-        return found
+        look = self.table if whole else self._look_at
+        while True:
+            found = {}
+            for chunk in self.chunks:
+                try:
+                    look(chunk)
+                except DamagedChunk as error:
+                    found[chunk.file] = str(error)
+            if not found or not self._read_list():  # a run may have joined chunks meanwhile
+                return found
 
     def _look_at(self, chunk: Chunk) -> None:
         try:
@@ -191,14 +197,21 @@ class Store:
         """All that is stored, chunk after chunk; damaged ones are skipped with a warning."""
         for damage in self.damage:
             self._warn(f"{damage}; what it named is missing; run the study again")
-        for chunk in self.chunks:
+        seen: set[str] = set()
+        waiting = list(self.chunks)
+        while waiting:
+            chunk = waiting.pop(0)
             try:
                 table = self.table(chunk)
             except DamagedChunk as error:
+                if self._read_list():  # a run has joined chunks meanwhile
+                    waiting = [chunk for chunk in self.chunks if chunk.file not in seen]
+                    continue
                 warn_of_damage(
                     self.path, chunk, error, "its samples are missing; run the study again"
                 )
                 continue
+            seen.add(chunk.file)
             yield table
 
     def _warn(self, text: str) -> None:
