@@ -23,6 +23,7 @@ from stiction._netcdf import DamagedError, read_dataset, write_dataset
 from stiction.ensemble.chunk import ROWS, stored_samples
 from stiction.ensemble.files import HeldError, Lock, cannot_write
 from stiction.ensemble.gather import Gathered
+from stiction.ensemble.points import variables_in
 from stiction.ensemble.run import check_run, warn_of_fields
 from stiction.ensemble.same import refuse_another
 from stiction.ensemble.store import (
@@ -107,7 +108,7 @@ class StoredRun:
         else:
             raise StoreError(f"{self.path}: there is no run here")
         if self._store is not None:
-            self.study = Study.from_dict(self._store.study)
+            self.study = Study.from_dict(self._store.study, trusted=True)
         else:
             self.study = Study.from_result(self._result)
 
@@ -302,8 +303,7 @@ def run_into(
             return StoredRun(path)
     with writing(folder, plain, __version__, lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
-            variables = {name: v for plan in plans for name, v in plan.variables.items()}
-            store.add(_outcomes_of(before, len(plans)), variables)
+            store.add(_outcomes_of(before, len(plans)), variables_in(plans))
         run_stored(
             store,
             plans,

@@ -360,9 +360,9 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
 
 def test_kept_studies_are_what_was_written(tmp_path):
     from stiction.paper.setting import Setting
-    from stiction.paper.studies import kept as module
     from stiction.paper.studies import theory
     from stiction.paper.studies.context import Context
+    from stiction.paper.studies.kept import keep, kept, place_of
 
     context = Context(Setting(), samples=2, seed=1, folder=tmp_path)
     dataset = xr.Dataset({"value": ("x", np.arange(300.0))}, attrs={"title": "kept"})

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.points import differing_in, variables_in
 from stiction.ensemble.work import Outcome
 from stiction.results import POSITION, SAMPLE, Variable, to_dataset
 
@@ -54,12 +55,11 @@ class Gathered:
         self.plans, self.samples, self.first, self.only = plans, samples, first, only
         self.variables: dict[str, Variable] = {}
         self.kept = plans[0].keep_samples
-        for plan in plans:
-            for name, variable in plan.variables.items():
-                if only is None or name in only:
-                    wide = len(variable.dims) > 1 and self.kept is not None
-                    dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
-                    self.variables[name] = replace(variable, dims=dims)
+        for name, variable in variables_in(plans).items():
+            if only is None or name in only:
+                wide = len(variable.dims) > 1 and self.kept is not None
+                dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
+                self.variables[name] = replace(variable, dims=dims)
         if self.kept is not None:
             inside = [s for s in self.kept if first <= s < first + samples]
             self._kept = np.array(sorted(inside), dtype=np.int64)
@@ -147,10 +147,12 @@ class Gathered:
         if "kept_sample" in used:
             coordinates["kept_sample"] = (self._kept, KEPT_SAMPLE)
         if "x" in used:
-            places = [plan.problem.interface.x for plan in self.plans]
+            some = differing_in(self.plans, "problem.interface")
+            places = [plan.problem.interface.x for plan in some]
             if all(np.array_equal(x, places[0]) for x in places):
                 coordinates["x"] = (places[0], POSITION)
             else:  # the length is swept: every point has positions of its own
+                places = [plan.problem.interface.x for plan in self.plans]
                 each = replace(POSITION, dims=(*dims, "x"))
                 coordinates["position"] = (np.reshape(places, (*shape, -1)), each)
         return to_dataset(values, variables, coordinates, attributes)

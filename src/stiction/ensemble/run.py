@@ -15,6 +15,7 @@ from stiction._model import describe, to_plain
 from stiction._progress import progress_bar
 from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
+from stiction.ensemble.points import differing_in
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy
@@ -134,7 +135,7 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
     """Warn of fields that the grid or the interface cannot do justice to, once each."""
     found = [
         (field, plan.problem.interface)
-        for plan in plans
+        for plan in differing_in(plans, "strength", *STREAMS, "problem.interface")
         for _, field in (("strength", plan.strength), *plan.fields)
     ]
     pairs = list(dict.fromkeys(found))
@@ -199,7 +200,7 @@ def run_plans(
 
 def method_name(plans: Sequence[Plan]) -> str:
     """For the progress bar."""
-    names = {plan.method.type for plan in plans}
+    names = {plan.method.type for plan in differing_in(plans, "method")}
     return str(names.pop()) if len(names) == 1 else "samples"
 
 
