@@ -354,7 +354,7 @@ def small_disk(tmp_path):
 
 def test_a_full_disk(small_disk, often, reference, monkeypatch):
     ballast = small_disk / "ballast"
-    ballast.write_bytes(b"\x00" * (1 << 19))
+    ballast.write_bytes(b"\x00" * (900 << 10))  # a chunk of a hundred samples takes some 8 kB
     with pytest.raises(StoreError, match="the disk is full"):
         make_study().run(out=small_disk / "run", workers=1)
     state = StoredRun(small_disk / "run").status()
