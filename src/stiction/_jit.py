@@ -93,18 +93,3 @@ def jit(function: Kernel) -> Kernel:
     numbers must come out whatever the batch.
     """
     return _compile(function, {"nogil": True, "error_model": "numpy"})
-
-
-def jit_sums(function: Kernel) -> Kernel:
-    """The same for plain sums of products: they may be reordered and fused.
-
-    A dot product runs some ten times faster if the compiler may sum in vector lanes. The order is
-    fixed once compiled and depends on the length alone, so results still do not depend on the
-    batch.
-    """
-    options = {
-        "nogil": True,
-        "error_model": "numpy",
-        "fastmath": {"reassoc", "contract", "nsz"},
-    }
-    return _compile(function, options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
@@ -30,13 +31,22 @@ from stiction.criterion.method import LocalCriterion
 from stiction.dynamics.method import Rupture
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.gather import GridAxis
-from stiction.ensemble.plan import Plan
+from stiction.ensemble.plan import STREAMS, Plan
+from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.ensemble.run import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
 from stiction.equilibrium.method import Equilibrium
 from stiction.errors import InputError, unknown_name
 from stiction.fields.random_field import RandomField
 from stiction.problem import Problem
-from stiction.sweep import Point, Sweep, grid_axes, name_point, points_of, unknown_keys, with_values
+from stiction.sweep import (
+    Point,
+    Sweep,
+    grid_axes,
+    name_point,
+    part_with_values,
+    points_of,
+    unknown_keys,
+)
 
 METHODS: tuple[Any, ...] = (LocalCriterion, Equilibrium, Rupture)
 AnyMethod = Annotated[LocalCriterion | Equilibrium | Rupture, Field(discriminator="type")]
@@ -129,21 +139,41 @@ class Study:
     title: str = ""
 
     @model_validator(mode="after")
-    def _fits_together(self) -> Study:
-        plans = self.plans
-        nodes = {plan.problem.interface.nodes for plan in plans}
-        if len(nodes) > 1 and any(plan.wide for plan in plans):
+    def _fits_together(self, info: pydantic.ValidationInfo) -> Study:
+        if (info.context or {}).get("trusted"):
+            return self
+        self._check_points()
+        some = differing_in(self.plans, "method", "problem.load", "problem.interface")
+        nodes = {plan.problem.interface.nodes for plan in some}
+        if len(nodes) > 1 and any(plan.wide for plan in some):
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
         ensemble = self.ensemble
-        size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in plans)
+        size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
         try:
-            check_size(size, ensemble.keep_limit or KEEP_LIMIT)
+            check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
         return self
+
+    def _check_points(self) -> None:
+        """Make every plan once; what is wrong is said once, with the points where it is."""
+        problems: dict[str, list[int]] = {}
+        for number in range(len(self.plans)):
+            try:
+                self.plans[number]
+            except InputError as error:
+                for text in error.problems:
+                    problems.setdefault(text, []).append(number)
+        if problems and not self.sweep:
+            raise InputError(problems)
+        if problems:
+            points = self.points
+            raise InputError(
+                [_at_points(text, [points[n] for n in where]) for text, where in problems.items()]
+            )
 
     @property
     def points(self) -> list[Point]:
@@ -151,41 +181,26 @@ class Study:
         return points_of(self.sweep)
 
     @cached_property
-    def plans(self) -> list[Plan]:
-        """What is to be computed, one plan a point."""
-        if not self.sweep:
-            return [self._plan()]
-        base = {name: getattr(self, name) for name in Study.__dataclass_fields__}
-        single = object.__new__(Study)
-        single.__dict__.update(base | {"sweep": ()})
-        plans: list[Plan] = []
-        problems: dict[str, list[Point]] = {}
-        for point in self.points:
-            try:
-                plans.append(with_values(single, point.values).plans[0])
-            except InputError as error:
-                for text in error.problems:
-                    problems.setdefault(text, []).append(point)
-        if problems:
-            raise InputError([_at_points(text, points) for text, points in problems.items()])
-        return plans
+    def plans(self) -> Sequence[Plan]:
+        """What is to be computed, one plan a point, made when it is asked for."""
+        base = _Parts(**{name: getattr(self, name) for name in _PARTS})
+        keys = [axis.keys for axis in self.sweep]
 
-    def _plan(self) -> Plan:
-        fields = {
-            "residual_strength": self.residual_strength,
-            "initial_stress": self.initial_stress,
-            "weakening_rate": self.weakening_rate,
-        }
-        given = self.ensemble
-        return make_plan(
-            self.problem, self.strength, self.method, given.seed, fields, given.keep,
-            given.keep_samples,
-        )  # fmt: skip
+        def part(name: str, steps: tuple[int, ...]) -> Any:
+            values = {
+                key: axis.steps[step][i]
+                for axis, step in zip(self.sweep, steps, strict=True)
+                for i, key in enumerate(axis.keys)
+                if key.split(".")[0] == name
+            }
+            return part_with_values(base, name, values) if values else getattr(base, name)
+
+        return Plans(keys, [len(axis.steps) for axis in self.sweep], _PARTS, part, _plan)
 
     @property
     def axes(self) -> list[GridAxis]:
         """The axes of the sweep as dimensions of the result."""
-        variables = {name for plan in self.plans for name in plan.variables}
+        variables = set(variables_in(self.plans))
         return grid_axes(self.sweep, sorted(variables | {"sample", "kept_sample", "x", "position"}))
 
     @property
@@ -208,6 +223,7 @@ class Study:
         progress: Show = True,
         retry: bool = False,
         time_limit: float | None = None,
+        lock: bool = True,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -222,6 +238,9 @@ class Study:
             and the same call goes on.
         retry : bool
             Compute stored samples that failed again.
+        lock : bool
+            Keep other runs out of the folder while this one writes; False for file systems that
+            have no locks.
 
         Returns
         -------
@@ -234,7 +253,7 @@ class Study:
             See `stiction.monte_carlo`; with `out`, samples that fail are listed in the attribute
             'failed_samples' instead.
         StoreError
-            If `out` cannot be used.
+            If `out` cannot be used, or what was stored is damaged before the end.
         """
         if out is not None:
             from stiction.runs import run_into
@@ -247,6 +266,7 @@ class Study:
                 progress=progress,
                 retry=retry,
                 time_limit=time_limit,
+                lock=lock,
             )
             return stored.dataset()
         return run_plans(
@@ -280,17 +300,20 @@ class Study:
         Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
 
     @classmethod
-    def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
+    def from_dict(
+        cls, given: dict[str, Any], *, folder: str | Path | None = None, trusted: bool = False
+    ) -> Study:
         """A study from plain dictionaries; file names of profiles are relative to `folder`.
 
-        A key that is swept need not have a value of its own.
+        A key that is swept need not have a value of its own. The points of a `trusted` study, one
+        that was valid when it was stored, are not looked at one by one.
         """
         sweep, mistakes = _read_sweep(given, folder)
         if sweep:
             given = _completed(given, sweep)
         try:
             study: Study = pydantic.TypeAdapter(cls).validate_python(
-                given, context={"folder": folder}
+                given, context={"folder": folder, "trusted": trusted}
             )
         except pydantic.ValidationError as error:
             texts = explain(error, cls)
@@ -349,6 +372,31 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
     if problems:
         raise InputError(problems)
     return found["problem"], found.get("method")
+
+
+@model(kw_only=True)
+class _Parts:
+    """What a point of a sweep consists of, each part valid by itself."""
+
+    problem: Problem
+    strength: RandomField
+    method: AnyMethod
+    ensemble: Ensemble
+    residual_strength: RandomField | None = None
+    initial_stress: RandomField | None = None
+    weakening_rate: RandomField | None = None
+
+
+_PARTS = tuple(_Parts.__dataclass_fields__)
+
+
+def _plan(parts: Mapping[str, Any]) -> Plan:
+    given = parts["ensemble"]
+    fields = {name: parts[name] for name in STREAMS}
+    return make_plan(
+        parts["problem"], parts["strength"], parts["method"], given.seed, fields, given.keep,
+        given.keep_samples,
+    )  # fmt: skip
 
 
 def _at_points(text: str, points: list[Point]) -> str:

@@ -66,7 +66,7 @@ def test_said_once(solid, what):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if what == "onset":
-            profile = field.sample(problem.interface, 8, seed=1)
+            profile = field.profiles(problem.interface, field.draws(problem.interface, 8, seed=1))
             st.onset(problem, profile, method=st.Equilibrium(), progress=False)
         elif what == "monte_carlo":
             st.monte_carlo(
@@ -74,7 +74,7 @@ def test_said_once(solid, what):
             )
         else:
             st.failure_probability(
-                problem, field, 1e6, method=st.Equilibrium(), algorithm="monte_carlo",
-                max_evaluations=40, progress=False,
+                problem, field, 1e6, method=st.Equilibrium(), algorithm="plain",
+                max_evaluations=100, progress=False,
             )  # fmt: skip
     assert len(_of_residual(caught)) == 1

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from stiction._files import write_atomically
 from stiction._progress import Meter
 from stiction.cli.common import StudyFile, TimeLimit, Workers
 from stiction.errors import InputError
@@ -145,9 +146,7 @@ def reliability(
         event=event,
         **others,
     )
-    aside = out / "failure_curve.nc.part"
-    curve.to_netcdf(aside)
-    aside.replace(out / "failure_curve.nc")
+    write_atomically(out / "failure_curve.nc", curve.to_netcdf)
     table = figures.curve_table(curve)
     table.write_csv(out)
     save(figures.curve_figure(curve), "failure_curve")

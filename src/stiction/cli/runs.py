@@ -13,17 +13,24 @@ from stiction.cli.common import RunPath, size, writable, writable_folder
 SHOWN = 20
 
 
-def status(run: RunPath) -> None:
-    """Say how far a run is, which samples failed and which chunks are damaged.
-
-    Every chunk is read and compared with its checksum.
-    """
+def status(
+    run: RunPath,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Read everything and compare it with its checksums; else whether chunks are"
+            " there in their sizes.",
+        ),
+    ] = False,
+) -> None:
+    """Say how far a run is, which samples failed and which chunks are damaged."""
     from stiction.runs import StoredRun
     from stiction.sweep import name_point
 
     stored = StoredRun(run)
     with Meter(f"checking {run}"):
-        state, study = stored.status(), stored.study
+        state, study = stored.status(verify=verify), stored.study
     share = 100.0 * state.done / state.samples
     typer.echo(f"{run}" + (f": {study.title}" if study.title else ""))
     typer.echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
@@ -41,8 +48,10 @@ def status(run: RunPath) -> None:
             typer.echo(f"  {name_point(point)}: {done} of {study.ensemble.samples}")
         if len(open_points) > SHOWN:
             typer.echo(f"  and {len(open_points) - SHOWN} more points that are not complete")
-    for file in state.damaged[:SHOWN]:
-        typer.echo(f"  damaged   {file}: running the study again computes it again")
+    for text in state.damaged[:SHOWN]:
+        typer.echo(f"  damaged   {text}; running the study again computes it again")
+    if state.verified and not state.damaged:
+        typer.echo("  verified  everything that is stored is what was written")
     if state.failures:
         typer.echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
         for failure in state.failures[:SHOWN]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
-import xarray as xr
 
 from stiction._progress import Meter
 from stiction.cli.common import StudyFile, writable_folder
@@ -20,7 +19,11 @@ from stiction.cli.profile import (
     XUnit,
     profile_of,
 )
-from stiction.problem import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from stiction.problem import Problem
 
 
 def rupture(

@@ -59,6 +59,13 @@ def run(
         bool, typer.Option("--retry", help="Compute stored samples that failed again.")
     ] = False,
     time_limit: TimeLimit = None,
+    no_lock: Annotated[
+        bool,
+        typer.Option(
+            "--no-lock",
+            help="For file systems without locks: do not keep other runs out of RUN.",
+        ),
+    ] = False,
 ) -> None:
     """Run the study of a file, or what is missing of it.
 
@@ -86,6 +93,7 @@ def run(
                 executor=executor,
                 retry=retry,
                 time_limit=time_limit,
+                lock=not no_lock,
             )
     except KeyboardInterrupt:
         try:
@@ -102,10 +110,11 @@ def run(
         text = f"time limit reached: {result.attrs['cut_short']}, stored in {out}"
         typer.echo(f"{text}; the same command goes on", err=True)
         raise typer.Exit(3)
-    samples = len(loaded.plans) * loaded.ensemble.samples
-    typer.echo(f"{samples - len(stored.failures)} samples in {out}")
-    if stored.failures:
-        _show_failures(stored.failures, f"stiction run {study} --out {out} --retry")
+    state = stored.status()
+    typer.echo(f"{state.done} samples in {out}")
+    if state.failures:
+        _show_failures(state.failures, f"stiction run {study} --out {out} --retry")
+    if not state.complete:
         raise typer.Exit(1)
 
 

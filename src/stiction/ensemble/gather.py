@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.points import differing_in, variables_in
 from stiction.ensemble.work import Outcome
 from stiction.results import POSITION, SAMPLE, Variable, to_dataset
 
@@ -54,12 +55,11 @@ class Gathered:
         self.plans, self.samples, self.first, self.only = plans, samples, first, only
         self.variables: dict[str, Variable] = {}
         self.kept = plans[0].keep_samples
-        for plan in plans:
-            for name, variable in plan.variables.items():
-                if only is None or name in only:
-                    wide = len(variable.dims) > 1 and self.kept is not None
-                    dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
-                    self.variables[name] = replace(variable, dims=dims)
+        for name, variable in variables_in(plans).items():
+            if only is None or name in only:
+                wide = len(variable.dims) > 1 and self.kept is not None
+                dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
+                self.variables[name] = replace(variable, dims=dims)
         if self.kept is not None:
             inside = [s for s in self.kept if first <= s < first + samples]
             self._kept = np.array(sorted(inside), dtype=np.int64)
@@ -68,30 +68,50 @@ class Gathered:
 
     def add(self, outcome: Outcome) -> None:
         """Put the values of an outcome in their places."""
-        rows = outcome.samples - self.first
+        points = np.full(outcome.samples.size, outcome.point)
+        wide_points = np.full(outcome.wide_samples.size, outcome.point)
+        self.put(points, outcome.samples, wide_points, outcome.wide_samples, outcome.values)
+
+    def put(
+        self,
+        points: NDArray[np.int64],
+        samples: NDArray[np.int64],
+        wide_points: NDArray[np.int64],
+        wide_samples: NDArray[np.int64],
+        values: Mapping[str, NDArray[Any]],
+    ) -> None:
+        """Put values of samples of any points in their places.
+
+        Parameters
+        ----------
+        points, samples : (rows,) arrays
+        wide_points, wide_samples : (wide_rows,) arrays
+            Those whose wide variables are in `values`.
+        values : dict of arrays
+            First axis as `samples`, of wide variables as `wide_samples`.
+        """
+        rows = samples - self.first
         inside = (rows >= 0) & (rows < self.samples)
-        wide_rows = np.empty(0, dtype=np.int64)
-        wide_inside = np.zeros(outcome.wide_samples.size, dtype=np.bool_)
+        narrow = points[inside], rows[inside]
         if self.kept is not None:
-            wide_inside = np.isin(outcome.wide_samples, self._kept)
-            wide_rows = np.searchsorted(self._kept, outcome.wide_samples[wide_inside])
-        for name, value in outcome.values.items():
+            wide_inside = np.isin(wide_samples, self._kept)
+            wide_rows = np.searchsorted(self._kept, wide_samples[wide_inside])
+            wide = wide_points[wide_inside], wide_rows
+        for name, value in values.items():
             if name not in self.variables:
                 continue
             if self.variables[name].dims[0] == "kept_sample":
-                self._put(name, outcome.point, wide_rows, value[wide_inside], self._kept.size)
+                self._put(name, wide, value[wide_inside], self._kept.size)
             else:
-                self._put(name, outcome.point, rows[inside], value[inside], self.samples)
+                self._put(name, narrow, value[inside], self.samples)
 
-    def _put(
-        self, name: str, point: int, rows: NDArray[np.int64], value: NDArray[Any], length: int
-    ) -> None:
+    def _put(self, name: str, where: tuple[Any, Any], value: NDArray[Any], length: int) -> None:
         if name not in self._arrays:
             shape = (len(self.plans), length)
             self._arrays[name] = np.zeros((*shape, *value.shape[1:]), dtype=value.dtype)
             self._seen[name] = np.zeros(shape, dtype=np.bool_)
-        self._arrays[name][point, rows] = value
-        self._seen[name][point, rows] = True
+        self._arrays[name][where] = value
+        self._seen[name][where] = True
 
     def _filled(self, name: str) -> NDArray[Any]:
         """The array of a variable, NaN where nothing was put."""
@@ -127,10 +147,12 @@ class Gathered:
         if "kept_sample" in used:
             coordinates["kept_sample"] = (self._kept, KEPT_SAMPLE)
         if "x" in used:
-            places = [plan.problem.interface.x for plan in self.plans]
+            some = differing_in(self.plans, "problem.interface")
+            places = [plan.problem.interface.x for plan in some]
             if all(np.array_equal(x, places[0]) for x in places):
                 coordinates["x"] = (places[0], POSITION)
             else:  # the length is swept: every point has positions of its own
+                places = [plan.problem.interface.x for plan in self.plans]
                 each = replace(POSITION, dims=(*dims, "x"))
                 coordinates["position"] = (np.reshape(places, (*shape, -1)), each)
         return to_dataset(values, variables, coordinates, attributes)

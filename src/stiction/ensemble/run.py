@@ -16,6 +16,7 @@ from stiction._model import describe, names_to_keep, to_plain, whole
 from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.gather import Gathered, GridAxis
 from stiction.ensemble.plan import PROFILES, STREAMS, Plan
+from stiction.ensemble.points import differing_in
 from stiction.ensemble.share import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
@@ -145,7 +146,7 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
     """Warn of fields that do not go with the grid, the interface or their units, once each."""
     found = [
         (field, plan.problem.interface)
-        for plan in plans
+        for plan in differing_in(plans, "strength", *STREAMS, "problem.interface")
         for _, field in (("strength", plan.strength), *plan.fields)
     ]
     pairs = list(dict.fromkeys(found))
@@ -239,7 +240,7 @@ def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
 
 def method_name(plans: Sequence[Plan]) -> str:
     """For the progress bar."""
-    names = {plan.method.type for plan in plans}
+    names = {plan.method.type for plan in differing_in(plans, "method")}
     return str(names.pop()) if len(names) == 1 else "samples"
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit, jit_sums
+from stiction._jit import jit
+from stiction._lanes import multiply_add
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.jump import (
@@ -55,11 +56,11 @@ def block_factor(column: Array, width: int) -> Array:
     return factor
 
 
-@jit_sums
+@jit
 def _add_scaled(target: Array, source: Array, first: int, count: int, factor: float) -> None:
     part = source[first : first + count]
     for i in range(count):
-        target[i] += factor * part[i]
+        target[i] = multiply_add(factor, part[i], target[i])
 
 
 @jit
