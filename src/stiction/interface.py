@@ -20,16 +20,16 @@ class Interface:
     length : float
         Period L, m.
     nodes : int
-        Number of nodes n, even and at least 8. Powers of two are fastest.
+        Number of nodes n, even, from 8 to 2^24. Powers of two are fastest.
 
     Raises
     ------
     InputError
-        If the length is not positive or the number of nodes is odd or below 8.
+        If the length is not positive or the number of nodes is odd or out of range.
     """
 
     length: Positive
-    nodes: Annotated[int, BeforeValidator(_count), Field(ge=8, multiple_of=2)]
+    nodes: Annotated[int, BeforeValidator(_count), Field(ge=8, le=2**24, multiple_of=2)]
 
     @property
     def spacing(self) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import as_path
 from stiction._model import describe
 from stiction.ensemble.files import Lock, cannot_write, sync_folder
 from stiction.ensemble.gather import Gathered
@@ -89,7 +90,7 @@ class StoredRun:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = as_path("path", path)
         beside = folder_beside(self.path)
         self._store: Store | None = None
         if self.path.is_dir():
@@ -174,7 +175,7 @@ class StoredRun:
         StoreError
             If it cannot be written.
         """
-        write_result(self.dataset(), Path(path))
+        write_result(self.dataset(), as_path("path", path))
 
 
 def _is_active(folder: Path) -> bool:
@@ -256,7 +257,7 @@ def run_into(
     """Run a study, or what is missing of it, into a folder or a file; see `Study.run`."""
     from stiction import __version__
 
-    path = Path(out)
+    path = as_path("out", out)
     ensemble, plans = study.ensemble, study.plans
     check_run(ensemble.samples, ensemble.first, workers, executor)
     plain = study.to_dict()  # refuses what cannot be written down

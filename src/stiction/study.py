@@ -15,6 +15,14 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction._checks import (
+    as_path,
+    check_flag,
+    check_instance,
+    check_progress,
+    is_whole,
+    too_many_samples,
+)
 from stiction._model import Count, Positive, _count, describe, explain, model, to_plain
 from stiction.criterion.method import LocalCriterion
 from stiction.dynamics.method import Rupture
@@ -33,9 +41,14 @@ AnyMethod = Annotated[LocalCriterion | Equilibrium | Rupture, Field(discriminato
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 
+MOST_KEPT = 10**6
+
+
 def _chosen(value: Any) -> Any:
     """A number of samples stands for the first ones."""
-    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
+    if is_whole(value, MOST_KEPT + 1):
+        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
+    if is_whole(value, 1):
         return tuple(range(value))
     if not isinstance(value, list | tuple):
         raise InputError(
@@ -127,6 +140,9 @@ class Study:
                 " is swept; make a study of each"
             )
         ensemble = self.ensemble
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(plans))
+        if problems:
+            raise InputError([f"ensemble.{text}" for text in problems])
         size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in plans)
         try:
             check_size(size, ensemble.keep_limit or KEEP_LIMIT)
@@ -223,6 +239,8 @@ class Study:
         StoreError
             If `out` cannot be used.
         """
+        check_flag("retry", retry)
+        check_progress(progress)
         if out is not None:
             from stiction.runs import run_into
 
@@ -255,8 +273,18 @@ class Study:
         return plain
 
     def to_toml(self, path: str | Path) -> None:
-        """Write it as a TOML file."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+        """Write it as a TOML file.
+
+        Raises
+        ------
+        InputError
+            If something in it exists in Python only, or the file cannot be written.
+        """
+        text = tomli_w.dumps(self.to_dict())
+        try:
+            as_path("path", path).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
@@ -264,6 +292,8 @@ class Study:
 
         A key that is swept need not have a value of its own.
         """
+        check_instance("study", given, dict)
+        folder = None if folder is None else as_path("folder", folder)
         sweep, mistakes = _read_sweep(given, folder)
         if sweep:
             given = _completed(given, sweep)
@@ -280,7 +310,7 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        path = Path(path)
+        path = as_path("path", path)
         try:
             given = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
@@ -292,9 +322,14 @@ class Study:
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """The study that made a result."""
+        check_instance("result", result, xr.Dataset)
         if "study" not in result.attrs:
-            raise InputError(f"result: has no attribute 'study': {describe(type(result))}")
-        return cls.from_dict(json.loads(result.attrs["study"]))
+            raise InputError("result: has no attribute 'study'; it is not the result of a study")
+        try:
+            given = json.loads(result.attrs["study"])
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"result: its attribute 'study' is no JSON: {error}") from None
+        return cls.from_dict(given)
 
 
 def _at_points(text: str, points: list[Point]) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import check_count, check_progress, is_real, is_whole, too_many_samples
 from stiction._model import describe, to_plain
 from stiction._progress import progress_bar
 from stiction.ensemble.gather import Gathered, GridAxis
@@ -50,7 +51,7 @@ def make_plan(
                 field.modes(problem.interface)
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    if not is_whole(seed, 0):
         problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
     random = tuple((name, field) for name, field in fields.items() if field is not None)
     if isinstance(problem, Problem):
@@ -94,16 +95,36 @@ def _wide(method: Any, name: str) -> bool:
     return name in method.variables and len(method.variables[name].dims) > 1
 
 
-def check_count(name: str, value: Any, smallest: int) -> None:
-    """Refuse what is not a whole number of at least `smallest`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
-        raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
+def _check_keep(
+    keep: Any, keep_samples: Any, keep_limit: Any
+) -> tuple[tuple[str, ...], tuple[int, ...] | None]:
+    """What is to be kept, and of which samples, or what is wrong with it."""
+    problems = []
+    if not isinstance(keep, list | tuple) or not all(isinstance(name, str) for name in keep):
+        problems.append(f"keep: must be a tuple of names, got {describe(keep)}")
+    whole = keep_samples is None or (
+        isinstance(keep_samples, list | tuple | range | np.ndarray)
+        and np.ndim(keep_samples) == 1
+        and all(is_whole(sample, 0) for sample in keep_samples)
+    )
+    if not whole:
+        given = describe(keep_samples)
+        problems.append(f"keep_samples: must be a list of sample numbers, got {given}")
+    if not (is_real(keep_limit) and keep_limit > 0.0):
+        problems.append(f"keep_limit: must be a positive number, got {describe(keep_limit)}")
+    if problems:
+        raise InputError(problems)
+    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
+    return tuple(keep), chosen
 
 
 def check_run(samples: Any, first: Any, workers: Any, executor: Any) -> None:
     """Refuse arguments of a run that make no sense, before any work is done."""
     check_count("samples", samples, 1)
     check_count("first", first, 0)
+    problems = too_many_samples(samples, first)
+    if problems:
+        raise InputError(problems)
     if workers is not None:
         check_count("workers", workers, 1)
     if executor is not None and not hasattr(executor, "submit"):
@@ -272,9 +293,10 @@ def monte_carlo(
         "weakening_rate": weakening_rate,
     }
     assert fields.keys() == STREAMS.keys()
-    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, strength, method, seed, fields, tuple(keep), chosen)
+    names, chosen = _check_keep(keep, keep_samples, keep_limit)
+    check_progress(progress)
     check_run(samples, first, workers, executor)
+    plan = make_plan(problem, strength, method, seed, fields, names, chosen)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],

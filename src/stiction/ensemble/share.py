@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.trouble import WorkerError
-from stiction.ensemble.work import Outcome, do_work, process_mark
 from stiction.ensemble.versions import versions
+from stiction.ensemble.work import Outcome, do_work, process_mark
 from stiction.fields.draws import BLOCK
 
 MOST_BYTES = 16 * 2**20

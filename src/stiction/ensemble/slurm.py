@@ -102,8 +102,8 @@ def slurm_cluster(settings: Cluster) -> Iterator[tuple[Any, Jobs]]:
         extra = dask.config.get("jobqueue.slurm.worker-extra-args", None) or []
     given["worker_extra_args"] = [*extra, *WORKER_WEB]
     given["job_cls"] = _job_class(jobs)
-    # Compute nodes read the certificate from a folder that only its owner can read, in the one where
-    # the jobs run unless another is given.
+    # Compute nodes read the certificate from a folder that only its owner can read, in the one
+    # where the jobs run unless another is given.
     place = given.pop("shared_temp_directory", None) or Path.cwd()
     with tempfile.TemporaryDirectory(prefix=".stiction-tls-", dir=place) as folder:
         if settings.tls:
@@ -172,7 +172,7 @@ def _scheduler_options(given: dict[str, Any]) -> dict[str, Any]:
 def _job_class(jobs: Jobs) -> Any:
     from dask_jobqueue.slurm import SLURMJob
 
-    class Job(SLURMJob):  # type: ignore[misc]  # dask-jobqueue is untyped
+    class Job(SLURMJob):
         """One that notes what SLURM said of it."""
 
         async def start(self) -> None:

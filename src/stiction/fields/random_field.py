@@ -11,6 +11,7 @@ import numpy as np
 import pydantic
 from pydantic import model_validator
 
+from stiction._checks import check_choice, is_whole, too_many_samples
 from stiction._model import Flag, Positive, describe, model, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
@@ -262,17 +263,18 @@ class RandomField:
 
 
 def _which(of: str) -> str:
-    if of not in ("strength", "z"):
-        raise InputError(f"of: must be 'strength' or 'z', got {of!r}")
+    check_choice("of", of, ("strength", "z"))
     return of
 
 
 def _check_counts(**counts: Any) -> None:
     problems = [
-        f"{name}: must be a whole number >= 0, got {value!r}"
+        f"{name}: must be a whole number >= 0, got {describe(value)}"
         for name, value in counts.items()
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0
+        if not is_whole(value, 0)
     ]
+    if not problems:
+        problems = too_many_samples(counts["samples"], counts["first"])
     if problems:
         raise InputError(problems)
 
