@@ -105,6 +105,7 @@ class StoredRun:
             self.study = Study.from_dict(self._store.study)
         else:
             self.study = Study.from_result(self._result)
+            _refuse_other_shape(self.path, self._result, self.study)
 
     def status(self) -> Status:
         """How far it is; reads every chunk to check it."""
@@ -225,7 +226,26 @@ def _read_result(path: Path) -> xr.Dataset:
         raise StoreError(f"{path}: is no NetCDF file that can be read: {error}") from None
     if "study" not in result.attrs:
         raise StoreError(f"{path}: holds no result of a study")
+    try:
+        str(result.attrs["stiction_version"])
+        for item in json.loads(result.attrs.get(FAILED, "[]")):
+            Failure(*item)
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise StoreError(
+            f"{path}: its attributes are damaged ({type(error).__name__}: {error})"
+        ) from None
     return result
+
+
+def _refuse_other_shape(path: Path, result: xr.Dataset, study: Study) -> None:
+    """A result that does not hold what its study says was put together by something else."""
+    names = study.plans[0].variables.keys()
+    missing = [name for name in names if name not in result]
+    sizes = {"sample": study.ensemble.samples} | {axis.dim: axis.size for axis in study.axes}
+    wrong = [dim for dim, size in sizes.items() if result.sizes.get(dim) != size]
+    if missing or wrong:
+        what = ", ".join([*missing, *wrong])
+        raise StoreError(f"{path}: does not hold the results of its study (see {what})")
 
 
 def check_target(path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, duration, writable
+from stiction.cli.common import StudyFile, duration, echo, writable
 from stiction.errors import InputError
 
 COLUMNS = ("method", "critical stress", "critical load", "first instability", "position", "time")
@@ -61,14 +61,14 @@ def onset(
             refused.append((one.type, str(error)))
     _print_table(results, problem.load.normal_pressure is not None)
     for name, text in refused:
-        typer.echo(f"{name} does not apply: {text}")
+        echo(f"{name} does not apply: {text}")
     if not results:
         raise typer.Exit(1)
     if out is not None:
         from stiction.report.onset_figure import write_onset_figure
 
         write_onset_figure(problem, profile, {n: r for n, (r, _) in results.items()}, out)
-        typer.echo(f"figure: {out}")
+        echo(f"figure: {out}")
 
 
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
@@ -121,4 +121,4 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
     widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
     for line in [head, *rows]:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-        typer.echo("  ".join(cells).rstrip())
+        echo("  ".join(cells).rstrip())

@@ -8,25 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, Workers
+from stiction.cli.common import StudyFile, Workers, echo, writable_folder
 from stiction.errors import InputError
-
-
-def _folder(path: Path) -> Path:
-    """Make the folder before any work is done, or say why that cannot be."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        (path / ".writable").touch()
-        (path / ".writable").unlink()
-    except OSError as error:
-        raise InputError(f"--out: {path} cannot be written: {error.strerror}") from None
-    return path
 
 
 def _say(text: str) -> None:
     """What is being done, for who watches a terminal."""
     if sys.stderr.isatty():
-        typer.echo(text, err=True)
+        echo(text, err=True)
 
 
 def reliability(
@@ -69,6 +58,8 @@ def reliability(
     from stiction.reliability.estimate import check_stress, failure_probability
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
+    from stiction.report.style import save_figure
+    from stiction.runs import write_result
     from stiction.study import Study
 
     loaded = Study.from_toml(study)
@@ -84,11 +75,11 @@ def reliability(
     mistakes += [] if probability is None else check_probability("--probability", probability)
     if mistakes:
         raise InputError(mistakes)
-    _folder(out)
+    writable_folder(out)
 
     def save(figure: Any, name: str) -> None:
         for ending in ("png", "pdf"):
-            figure.savefig(out / f"{name}.{ending}")
+            save_figure(figure, out / f"{name}.{ending}")
 
     _say(f"the curve down to P = {smallest:g}, by {method.type} ...")
     curve = failure_curve(
@@ -102,9 +93,7 @@ def reliability(
         workers=workers,
         **others,
     )
-    aside = out / "failure_curve.nc.part"
-    curve.to_netcdf(aside)
-    aside.replace(out / "failure_curve.nc")
+    write_result(curve, out / "failure_curve.nc")
     table = figures.curve_table(curve)
     table.write_csv(out)
     save(figures.curve_figure(curve), "failure_curve")
@@ -114,8 +103,8 @@ def reliability(
     widths = [max(len(row[i]) for row in cells) for i in range(len(table.columns))]
     for row in cells:
         line = "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        typer.echo(line)
-    typer.echo(
+        echo(line)
+    echo(
         f"bound {curve.attrs['lower_bound']:.7g} Pa; {curve.attrs['evaluations']} evaluations;"
         f" {method.type}, {curve.attrs['event']}"
     )
@@ -124,7 +113,7 @@ def reliability(
         found = failure_probability(
             problem, field, stress, method=method, seed=seed, workers=workers, **others
         )
-        typer.echo(f"{found}\n  {found.algorithm}: {found.reason}")
+        echo(f"{found}\n  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
             spot = figures.weak_spot_figure(
                 found.failing_profiles, problem.nucleation_length, stress
@@ -141,7 +130,7 @@ def reliability(
             workers=workers,
             **others,
         )
-        typer.echo(str(answer))
+        echo(str(answer))
     if tails:
         _say("seven more curves: correlation lengths, interface lengths, distributions ...")
         several = tail_study(
@@ -157,4 +146,4 @@ def reliability(
         )
         figures.tail_table(several).write_csv(out)
         save(figures.tail_figure(several), "failure_tails")
-    typer.echo(f"written to {out}")
+    echo(f"written to {out}")

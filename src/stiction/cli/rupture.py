@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from stiction._progress import status_line
-from stiction.cli.common import StudyFile, writable_folder
+from stiction.cli.common import StudyFile, echo, writable_folder
 
 
 def rupture(
@@ -42,6 +42,8 @@ def rupture(
     from stiction.dynamics.simulate import simulate_rupture
     from stiction.profile_file import read_profile
     from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
+    from stiction.report.style import save_figure
+    from stiction.runs import write_result
     from stiction.study import Study
 
     writable_folder(out)
@@ -69,8 +71,8 @@ def rupture(
             ),
             **extras,
         )
-    result.to_netcdf(out / "rupture.nc")
-    typer.echo(
+    write_result(result, out / "rupture.nc")
+    echo(
         f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
         f" kinetic stress {round(float(result.kinetic_stress) * 1e-6, 6) + 0.0:.6f} MPa\n"
         f"onset at x = {float(result.critical_position) * 1e3:.3f} mm after"
@@ -81,7 +83,7 @@ def rupture(
     for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
         figure = draw(result, problem)
         for ending in ("png", "pdf"):
-            figure.savefig(out / f"{name}.{ending}")
+            save_figure(figure, out / f"{name}.{ending}")
     if film:
-        typer.echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
-    typer.echo(f"written to {out}")
+        echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+    echo(f"written to {out}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, Workers, duration, size, summary
+from stiction.cli.common import StudyFile, Workers, duration, echo, size, summary
 from stiction.errors import InputError
 
 SHOWN = 12
@@ -86,12 +86,12 @@ def run(
             done = f"{state.done} of {state.samples} samples are stored in {out}"
         except RuntimeError:
             done = "nothing is stored yet"
-        typer.echo(f"interrupted: {done}; the same command goes on", err=True)
+        echo(f"interrupted: {done}; the same command goes on", err=True)
         raise typer.Exit(130) from None
     names = ["critical_stress", "friction_coefficient"]
     _show_results(loaded, stored.dataset(only=names))
     samples = len(loaded.plans) * loaded.ensemble.samples
-    typer.echo(f"{samples - len(stored.failures)} samples in {out}")
+    echo(f"{samples - len(stored.failures)} samples in {out}")
     if stored.failures:
         _show_failures(stored.failures, f"stiction run {study} --out {out} --retry")
         raise typer.Exit(1)
@@ -106,26 +106,26 @@ def _executor(study: Any, scheduler: str | None, slurm: bool) -> Any:
 
 
 def _show_failures(failures: Any, command: str) -> None:
-    typer.echo(f"{len(failures)} samples failed:", err=True)
+    echo(f"{len(failures)} samples failed:", err=True)
     for failure in failures[:SHOWN]:
-        typer.echo(f"  {failure}", err=True)
+        echo(f"  {failure}", err=True)
     if len(failures) > SHOWN:
-        typer.echo(f"  and {len(failures) - SHOWN} more", err=True)
-    typer.echo(f"compute them again with: {command}", err=True)
+        echo(f"  and {len(failures) - SHOWN} more", err=True)
+    echo(f"compute them again with: {command}", err=True)
 
 
 def _show_results(study: Any, result: Any) -> None:
     from stiction.sweep import name_point
 
     if not study.sweep:
-        typer.echo(summary(result))
+        echo(summary(result))
         return
     dims = [axis.dim for axis in study.axes]
     flat = result.stack(point=dims)
     for point in study.points[:SHOWN]:
-        typer.echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
+        echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
     if len(study.points) > SHOWN:
-        typer.echo(f"and {len(study.points) - SHOWN} more points")
+        echo(f"and {len(study.points) - SHOWN} more points")
 
 
 def check(
@@ -138,12 +138,12 @@ def check(
     from stiction.study import Study
 
     loaded = Study.from_toml(study)
-    typer.echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
+    echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     for name, text in _description(loaded):
-        typer.echo(f"  {name:20s} {text}")
+        echo(f"  {name:20s} {text}")
     if probe:
         for name, text in _cost(loaded):
-            typer.echo(f"  {name:20s} {text}")
+            echo(f"  {name:20s} {text}")
 
 
 def _description(study: Any) -> list[tuple[str, str]]:
@@ -218,4 +218,4 @@ def schema() -> None:
     """Print the JSON schema of a study file, for editors that complete and check TOML."""
     from stiction.study import study_schema
 
-    typer.echo(json.dumps(study_schema(), indent=2))
+    echo(json.dumps(study_schema(), indent=2))

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.report.style import PAGE, QUIET, color, marker, new_figure, paper_style, series
+from stiction.report.style import (
+    PAGE,
+    QUIET,
+    color,
+    marker,
+    new_figure,
+    paper_style,
+    save_figure,
+    series,
+)
 
 NAMES = {
     "local_criterion": "local criterion",
@@ -74,4 +83,4 @@ def write_onset_figure(
 ) -> None:
     """`draw_onset` as a file."""
     with paper_style():
-        draw_onset(problem, tau_p, results).savefig(path)
+        save_figure(draw_onset(problem, tau_p, results), path)
