@@ -315,6 +315,8 @@ class Study:
             given = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from None
+        except RecursionError:
+            raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{path}: is not valid TOML: {error}") from None
         return cls.from_dict(given, folder=path.parent)

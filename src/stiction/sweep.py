@@ -76,6 +76,8 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
             problems.append(f"{key}.{name}: must be a finite number, got {describe(value)}")
     if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 2:
         problems.append(f"{key}.count: must be a whole number >= 2, got {describe(count)}")
+    elif count > MOST_POINTS:
+        problems.append(f"{key}.count: must be at most {MOST_POINTS}, got {describe(count)}")
     if spacing not in ("linear", "log"):
         problems.append(f"{key}.spacing: must be 'linear' or 'log', got {describe(spacing)}")
     elif spacing == "log" and not problems and not (start > 0.0 and stop > 0.0):

@@ -286,18 +286,19 @@ MOST_MODES = 1 << 22
 def _modes(field: RandomField, interface: Interface) -> Modes:
     spacing = 2.0 * math.pi / interface.length
     # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
-    count = math.floor(field.spectrum.cutoff / spacing * (1.0 + 1e-12))
+    most = field.spectrum.cutoff / spacing * (1.0 + 1e-12)
+    if not most <= MOST_MODES:
+        raise InputError(
+            f"spectrum: has {most:.4g} modes on an interface of {interface.length:g} m, at most"
+            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
+        )
+    count = math.floor(most)
     if count < 1 and not field.mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {interface.length:g} m: the first mode"
             f" is at {spacing:.3g} rad/m, the spectrum is truncated at"
             f" {field.spectrum.cutoff:.3g} rad/m; shorten the correlation length, lengthen the"
             " interface or raise the truncation"
-        )
-    if count > MOST_MODES:
-        raise InputError(
-            f"spectrum: has {count} modes on an interface of {interface.length:g} m, at most"
-            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
         )
     power = np.zeros(count + 1)
     power[1:] = field.spectrum.density(spacing * np.arange(1, count + 1))
