@@ -117,7 +117,9 @@ def _one(summary: Summary, name: str, path: Path, reference: Any) -> None:
         if step == "status":
             outcome, detail = trial(use)
         else:
-            outcome, detail = trial(lambda use=use: found.append(_accepted(use, reference)))
+            outcome, detail = trial(
+                lambda use=use, found=found: found.append(_accepted(use, reference))
+            )
         if found and found[0]:
             outcome, detail = "FAULT accepted", found[0]
         summary.note(f"{name}: {step}", outcome, detail)
