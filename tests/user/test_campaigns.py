@@ -17,6 +17,7 @@ def campaigns(monkeypatch):
     monkeypatch.syspath_prepend(str(CAMPAIGNS))
 
 
+@pytest.mark.slow
 def test_bad_arguments_are_refused():
     import arguments
 

@@ -70,7 +70,8 @@ def full_disk(monkeypatch):
         ["onset", "study.toml", "--strength", "p.npy", "--method", "local_criterion",
          "--out", "figure.png"],
         ["reliability", "study.toml", "--smallest", "0.1", "--plain-samples", "0", "--out", "out"],
-        ["rupture", "study.toml", "--loading-rate", "1e10", "--out", "out"],
+        pytest.param(["rupture", "study.toml", "--loading-rate", "1e10", "--out", "out"],
+                     marks=pytest.mark.slow),
     ],
     ids=["plot", "report", "onset", "reliability", "rupture"],
 )  # fmt: skip
