@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import logging
+import os
 import sys
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -112,11 +112,13 @@ def main() -> None:
         sys.exit(1)
     except OSError as error:
         echo(f"error: {_of_the_system(error)}", err=True)
-        _close_stdout()
+        _drop_output()
         sys.exit(1)
 
 
-def _close_stdout() -> None:
-    """Leave nothing for the interpreter to write at its end, where a full disk is a traceback."""
-    with suppress(OSError):
-        sys.stdout.close()
+def _drop_output() -> None:
+    """Leave nothing that the interpreter would try to write at its end, to a full disk again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
