@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from stiction._checks import as_path
 from stiction.cli.common import StudyFile, Workers, duration, echo, size, summary
 from stiction.errors import InputError
 
@@ -74,7 +75,7 @@ def run(
         raise InputError("--workers, --scheduler, --slurm: give one of them")
     loaded = Study.from_toml(study)
     loaded.to_dict()
-    check_target(out)
+    check_target(as_path("--out", out))
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
