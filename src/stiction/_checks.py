@@ -49,8 +49,8 @@ def check_count(name: str, value: Any, least: int) -> None:
 def check_choice(name: str, value: Any, valid: Collection[str]) -> None:
     """Refuse what is not one of some names."""
     if not isinstance(value, str) or value not in valid:
-        names = ", ".join(repr(known) for known in valid)
-        raise InputError(f"{name}: must be one of {names}, got {describe(value)}")
+        names = " or ".join(repr(known) for known in valid)
+        raise InputError(f"{name}: must be {names}, got {describe(value)}")
 
 
 def check_flag(name: str, value: Any) -> None:

@@ -289,7 +289,7 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
     most = field.spectrum.cutoff / spacing * (1.0 + 1e-12)
     if not most <= MOST_MODES:
         raise InputError(
-            f"spectrum: has {most:.4g} modes on an interface of {interface.length:g} m, at most"
+            f"spectrum: has {most:.10g} modes on an interface of {interface.length:g} m, at most"
             f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
         )
     count = math.floor(most)
