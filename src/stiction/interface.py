@@ -5,10 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from stiction._model import Positive, _count, model
 from stiction._typing import Array
+from stiction.errors import InputError
+
+SHORTEST = 1e-30
+"""Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
 
 
 @model
@@ -20,16 +24,25 @@ class Interface:
     length : float
         Period L, m.
     nodes : int
-        Number of nodes n, even and at least 8. Powers of two are fastest.
+        Number of nodes n, even, from 8 to 2^24. Powers of two are fastest.
 
     Raises
     ------
     InputError
-        If the length is not positive or the number of nodes is odd or below 8.
+        If the length is not positive or the number of nodes is odd or out of range.
     """
 
     length: Positive
-    nodes: Annotated[int, BeforeValidator(_count), Field(ge=8, multiple_of=2)]
+    nodes: Annotated[int, BeforeValidator(_count), Field(ge=8, le=2**24, multiple_of=2)]
+
+    @model_validator(mode="after")
+    def _of_this_world(self) -> Interface:
+        if self.spacing < SHORTEST:
+            raise InputError(
+                f"length: must be at least {SHORTEST * self.nodes:g} m for {self.nodes}"
+                f" nodes, got {self.length:g}; check its unit"
+            )
+        return self
 
     @property
     def spacing(self) -> float:

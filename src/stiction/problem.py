@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import model_validator
 
+from stiction._checks import is_real
 from stiction._model import Mode, describe, model
 from stiction.errors import InputError, warn_accuracy
 from stiction.friction import SlipWeakening
@@ -118,6 +119,8 @@ class Problem:
 
     def nucleation_length_of(self, rate: float) -> float:
         """h_n, m, of a uniform weakening rate in Pa/m."""
+        if not (is_real(rate) and rate > 0.0):
+            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
         return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
 
     def _too_few_nodes(self, steepest_rate: float, strength: float | None = None) -> list[str]:

@@ -19,6 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._brief import brief
+from stiction._checks import as_path
 from stiction._model import describe
 from stiction._netcdf import DamagedError, read_dataset, write_dataset
 from stiction._progress import Show
@@ -38,6 +39,7 @@ from stiction.ensemble.store import (
 )
 from stiction.ensemble.stored import run_stored
 from stiction.ensemble.trouble import StoreError
+from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
 from stiction.study import Study
@@ -100,7 +102,7 @@ class StoredRun:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = as_path("path", path)
         beside = folder_beside(self.path)
         self._store: Store | None = None
         if self.path.is_dir():
@@ -115,6 +117,7 @@ class StoredRun:
             self.study = Study.from_dict(self._store.study, trusted=True)
         else:
             self.study = Study.from_result(self._result)
+            _refuse_other_shape(self.path, self._result, self.study)
 
     def __repr__(self) -> str:
         points = len(self.study.plans)
@@ -215,8 +218,9 @@ class StoredRun:
         """
         from stiction.export import check_suffix, export
 
-        check_suffix(Path(path))
-        export(self.dataset(), path)
+        target = as_path("path", path)
+        check_suffix(target)
+        export(self.dataset(), target)
 
 
 def _is_active(folder: Path) -> bool:
@@ -265,7 +269,26 @@ def _read_result(path: Path) -> xr.Dataset:
         ) from None
     if "study" not in result.attrs:
         raise StoreError(f"{path}: holds no result of a study")
+    try:
+        str(result.attrs["stiction_version"])
+        for item in json.loads(result.attrs.get(FAILED, "[]")):
+            Failure(*item)
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise StoreError(
+            f"{path}: its attributes are damaged ({type(error).__name__}: {error})"
+        ) from None
     return result
+
+
+def _refuse_other_shape(path: Path, result: xr.Dataset, study: Study) -> None:
+    """A result that does not hold what its study says was put together by something else."""
+    names = study.plans[0].variables.keys()
+    missing = [name for name in names if name not in result]
+    sizes = {"sample": study.ensemble.samples} | {axis.dim: axis.size for axis in study.axes}
+    wrong = [dim for dim, size in sizes.items() if result.sizes.get(dim) != size]
+    if missing or wrong:
+        what = ", ".join([*missing, *wrong])
+        raise StoreError(f"{path}: does not hold the results of its study (see {what})")
 
 
 def check_target(path: Path) -> None:
@@ -305,9 +328,7 @@ def run_into(
     StoreError
         If samples are missing in the end that have not failed.
     """
-    from stiction import __version__
-
-    path = Path(out)
+    path = as_path("out", out)
     ensemble, plans = study.ensemble, study.plans
     check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
@@ -322,7 +343,7 @@ def run_into(
         same = json.loads(before.attrs["study"])["ensemble"]["samples"] == ensemble.samples
         if same and not (folder / MANIFEST).exists() and not (retry and FAILED in before.attrs):
             return StoredRun(path)
-    with writing(folder, plain, __version__, lock=lock) as store:
+    with writing(folder, plain, versions(), lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
             store.add(_outcomes_of(before, len(plans)), variables_in(plans))
         run_stored(

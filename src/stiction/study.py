@@ -15,6 +15,13 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction._checks import (
+    as_path,
+    check_flag,
+    check_instance,
+    check_progress,
+    too_many_samples,
+)
 from stiction._model import (
     Count,
     Positive,
@@ -53,9 +60,14 @@ AnyMethod = Annotated[LocalCriterion | Equilibrium | Rupture, Field(discriminato
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 
+MOST_KEPT = 10**6
+
+
 def _chosen(value: Any) -> Any:
     """A number of samples stands for the first ones."""
     count = whole(value)
+    if count is not None and count > MOST_KEPT:
+        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
     if count is not None and count > 0:
         return tuple(range(count))
     if not isinstance(value, list | tuple):
@@ -151,6 +163,9 @@ class Study:
                 " is swept; make a study of each"
             )
         ensemble = self.ensemble
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
+        if problems:
+            raise InputError([f"ensemble.{text}" for text in problems])
         size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
         try:
             check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
@@ -255,6 +270,8 @@ class Study:
         StoreError
             If `out` cannot be used, or what was stored is damaged before the end.
         """
+        check_flag("retry", retry)
+        check_progress(progress)
         if out is not None:
             from stiction.runs import run_into
 
@@ -296,8 +313,18 @@ class Study:
         return plain
 
     def to_toml(self, path: str | Path) -> None:
-        """Write it as a TOML file."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+        """Write it as a TOML file.
+
+        Raises
+        ------
+        InputError
+            If something in it exists in Python only, or the file cannot be written.
+        """
+        text = tomli_w.dumps(self.to_dict())
+        try:
+            as_path("path", path).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
     @classmethod
     def from_dict(
@@ -308,6 +335,8 @@ class Study:
         A key that is swept need not have a value of its own. The points of a `trusted` study, one
         that was valid when it was stored, are not looked at one by one.
         """
+        check_instance("study", given, dict)
+        folder = None if folder is None else as_path("folder", folder)
         sweep, mistakes = _read_sweep(given, folder)
         if sweep:
             given = _completed(given, sweep)
@@ -324,14 +353,20 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        return cls.from_dict(_read_toml(Path(path)), folder=Path(path).parent)
+        path = as_path("path", path)
+        return cls.from_dict(_read_toml(path), folder=path.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """The study that made a result."""
+        check_instance("result", result, xr.Dataset)
         if "study" not in result.attrs:
-            raise InputError(f"result: has no attribute 'study': {describe(type(result))}")
-        return cls.from_dict(json.loads(result.attrs["study"]))
+            raise InputError("result: has no attribute 'study'; it is not the result of a study")
+        try:
+            given = json.loads(result.attrs["study"])
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"result: its attribute 'study' is no JSON: {error}") from None
+        return cls.from_dict(given)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -339,6 +374,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
 

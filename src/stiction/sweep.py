@@ -16,6 +16,7 @@ import numpy as np
 import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from stiction._checks import is_whole
 from stiction._model import _models_in, describe, to_plain
 from stiction.ensemble.gather import GridAxis
 from stiction.errors import InputError, unknown_name
@@ -75,8 +76,10 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
         value = given[name]
         if not _is_real(value) or not math.isfinite(value):
             problems.append(f"{key}.{name}: must be a finite number, got {describe(value)}")
-    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 2:
+    if not is_whole(count, 2):
         problems.append(f"{key}.count: must be a whole number >= 2, got {describe(count)}")
+    elif count > MOST_POINTS:
+        problems.append(f"{key}.count: must be at most {MOST_POINTS}, got {describe(count)}")
     if spacing not in ("linear", "log"):
         problems.append(f"{key}.spacing: must be 'linear' or 'log', got {describe(spacing)}")
     elif spacing == "log" and not problems and not (start > 0.0 and stop > 0.0):

@@ -16,6 +16,7 @@ import pytest
 import xarray as xr
 
 import stiction as st
+from stiction import runs
 from stiction.ensemble import share, store, stored, work
 from stiction.ensemble.files import Lock
 from stiction.ensemble.trouble import StoreError, WorkerError
@@ -383,8 +384,8 @@ def test_a_read_only_disk(small_disk, monkeypatch):
 
 def test_a_version_that_differs_is_said(tmp_path, often, monkeypatch):
     make_study(samples=40).run(out=tmp_path / "run")
-    monkeypatch.setattr(st, "__version__", "99.0")
-    with pytest.warns(UserWarning, match=r"begun with version .*, this is 99\.0"):
+    monkeypatch.setattr(runs, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
+    with pytest.warns(UserWarning, match=r"begun with stiction .*, this is stiction 99\.0, numpy"):
         make_study(samples=60).run(out=tmp_path / "run")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -397,7 +398,7 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     alive, most = set(), 0
 
     class Counting:
-        def submit(self, function, plan, point, first, count, mark):
+        def submit(self, function, plan, point, first, count, *marks):
             nonlocal most
             from concurrent.futures import Future
 

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from stiction._progress import Meter
-from stiction.cli.common import StudyFile, writable_folder
+from stiction.cli.common import StudyFile, echo, writable_folder
 from stiction.cli.profile import (
     FillGaps,
     Interpolate,
@@ -71,6 +71,8 @@ def rupture(
         rupture_figure,
         rupture_film,
     )
+    from stiction.report.style import save_figure
+    from stiction.runs import write_result
     from stiction.study import Study, read_setup
 
     writable_folder(out)
@@ -95,21 +97,21 @@ def rupture(
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
     result = simulate_rupture(problem, tau_p, method=method, every=every, **extras)
-    result.to_netcdf(out / "rupture.nc")
-    typer.echo(_summary(result, problem))
+    write_result(result, out / "rupture.nc")
+    echo(_summary(result, problem))
     with Meter("drawing the figures"):
         for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
             figure = draw(result, problem)
             for ending in ("png", "pdf"):
-                figure.savefig(out / f"{name}.{ending}")
+                save_figure(figure, out / f"{name}.{ending}")
     if film:
         with Meter("drawing the film"):
-            typer.echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+            echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
             if can_write_mp4():
-                typer.echo(f"film: {rupture_film(result, problem, out / 'rupture.mp4')}")
+                echo(f"film: {rupture_film(result, problem, out / 'rupture.mp4')}")
             else:
-                typer.echo("no rupture.mp4: the program ffmpeg was not found")
-    typer.echo(f"written to {out}")
+                echo("no rupture.mp4: the program ffmpeg was not found")
+    echo(f"written to {out}")
 
 
 def _megapascals(stress: Any) -> str:

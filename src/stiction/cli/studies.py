@@ -11,8 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
+from stiction._checks import as_path
 from stiction._progress import Meter, duration
-from stiction.cli.common import StudyFile, TimeLimit, Workers, size, summary
+from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, size, summary
 from stiction.errors import InputError
 
 SHOWN = 12
@@ -83,7 +84,7 @@ def run(
         raise InputError("--workers, --scheduler, --slurm: give one of them")
     loaded = Study.from_toml(study)
     loaded.to_dict()
-    check_target(out)
+    check_target(as_path("--out", out))
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
@@ -101,17 +102,17 @@ def run(
             done = f"{state.done} of {state.samples} samples are stored in {out}"
         except RuntimeError:
             done = "nothing is stored yet"
-        typer.echo(f"interrupted: {done}; the same command goes on", err=True)
+        echo(f"interrupted: {done}; the same command goes on", err=True)
         raise typer.Exit(130) from None
     names = ["critical_stress", "friction_coefficient"]
     result = stored.dataset(only=names)
     _show_results(loaded, result)
     if "cut_short" in result.attrs:
         text = f"time limit reached: {result.attrs['cut_short']}, stored in {out}"
-        typer.echo(f"{text}; the same command goes on", err=True)
+        echo(f"{text}; the same command goes on", err=True)
         raise typer.Exit(3)
     state = stored.status()
-    typer.echo(f"{state.done} samples in {out}")
+    echo(f"{state.done} samples in {out}")
     if state.failures:
         _show_failures(state.failures, f"stiction run {study} --out {out} --retry")
     if not state.complete:
@@ -127,26 +128,26 @@ def _executor(study: Any, scheduler: str | None, slurm: bool) -> Any:
 
 
 def _show_failures(failures: Any, command: str) -> None:
-    typer.echo(f"{len(failures)} samples failed:", err=True)
+    echo(f"{len(failures)} samples failed:", err=True)
     for failure in failures[:SHOWN]:
-        typer.echo(f"  {failure}", err=True)
+        echo(f"  {failure}", err=True)
     if len(failures) > SHOWN:
-        typer.echo(f"  and {len(failures) - SHOWN} more", err=True)
-    typer.echo(f"compute them again with: {command}", err=True)
+        echo(f"  and {len(failures) - SHOWN} more", err=True)
+    echo(f"compute them again with: {command}", err=True)
 
 
 def _show_results(study: Any, result: Any) -> None:
     from stiction.sweep import name_point
 
     if not study.sweep:
-        typer.echo(summary(result))
+        echo(summary(result))
         return
     dims = [axis.dim for axis in study.axes]
     flat = result.stack(point=dims)
     for point in study.points[:SHOWN]:
-        typer.echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
+        echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
     if len(study.points) > SHOWN:
-        typer.echo(f"and {len(study.points) - SHOWN} more points")
+        echo(f"and {len(study.points) - SHOWN} more points")
 
 
 def check(
@@ -159,14 +160,14 @@ def check(
     from stiction.study import Study
 
     loaded = Study.from_toml(study)
-    typer.echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
+    echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     for name, text in _description(loaded):
-        typer.echo(f"  {name:20s} {text}")
+        echo(f"  {name:20s} {text}")
     if probe:
         with Meter("timing a few samples"):
             cost = _cost(loaded)
         for name, text in cost:
-            typer.echo(f"  {name:20s} {text}")
+            echo(f"  {name:20s} {text}")
 
 
 def _description(study: Any) -> list[tuple[str, str]]:
@@ -241,4 +242,4 @@ def schema() -> None:
     """Print the JSON schema of a study file, for editors that complete and check TOML."""
     from stiction.study import study_schema
 
-    typer.echo(json.dumps(study_schema(), indent=2))
+    echo(json.dumps(study_schema(), indent=2))

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import os
 from collections.abc import Callable, Sequence
-from numbers import Integral, Real
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -14,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import as_path, is_finite, is_whole
 from stiction._model import describe, real_array, to_plain
 from stiction._progress import Meter
 from stiction.dynamics import track
@@ -97,24 +96,29 @@ def _note(now: Progress) -> str:
     )
 
 
+_MOST_EVERY = 10**6
+"""The record of the steps between two frames is kept in memory."""
+
+
 def _finite(value: Any) -> bool:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    return number and math.isfinite(float(value))
+    return isinstance(value, Real) and is_finite(value)
 
 
 def _check(options: dict[str, Any]) -> None:
     problems = []
     for name in ("every", "every_implicit", "every_near_onset", "checkpoint_every", "chunk"):
         value = options[name]
-        whole = isinstance(value, Integral) and not isinstance(value, bool)
-        if value is not None and not (whole and value >= 1):
-            problems.append(f"{name}: must be a whole number of steps, at least 1, got {value!r}")
+        if value is None and name == "every_near_onset":
+            continue
+        if not is_whole(value, 1) or value > _MOST_EVERY:
+            given = describe(value)
+            problems.append(f"{name}: must be a whole number of steps, 1 to 10**6, got {given}")
     for name in ("interval", "end_time"):
         value = options[name]
         if value is not None and not (_finite(value) and value > 0.0):
             problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
-    if options["stop"] not in (None, *get_args(Stop)):
-        problems.append(f"stop: must be one of {get_args(Stop)}, got {options['stop']!r}")
+    if options["stop"] is not None and options["stop"] not in get_args(Stop):
+        problems.append(f"stop: must be one of {get_args(Stop)}, got {describe(options['stop'])}")
     elif options["stop"] == "time" and options["end_time"] is None:
         problems.append("end_time: needed with stop='time', got None")
     if (options["initial_slip"] is None) != (options["initial_load"] is None):
@@ -123,13 +127,22 @@ def _check(options: dict[str, Any]) -> None:
         problems.append(f"initial_load: must be a number, Pa, got {options['initial_load']!r}")
     for name in ("store", "checkpoint", "restart"):
         value = options[name]
-        if value is not None and not isinstance(value, str | os.PathLike):
-            problems.append(f"{name}: must be a path, got {describe(value)}")
-        elif name == "checkpoint" and value is not None and Path(value).is_dir():
+        if value is None:
+            continue
+        try:
+            as_path(name, value)
+        except InputError as error:
+            problems += error.problems
+            continue
+        if name == "checkpoint" and Path(value).is_dir():
             problems.append(f"checkpoint: {str(value)!r} is a folder; name a file")
     told = options["progress"]
     if told is not None and not isinstance(told, bool) and not callable(told):
         problems.append(f"progress: must be true, false or callable, got {describe(told)}")
+    if not isinstance(options["steps"], bool | np.bool_):
+        problems.append(f"steps: must be True or False, got {describe(options['steps'])}")
+    if not isinstance(options["problem"], Problem):
+        problems.append(f"problem: must be a Problem, got {describe(options['problem'])}")
     if not isinstance(options["method"], Rupture):
         problems.append(
             "method: must be a method object st.Rupture(loading_rate=...), got "

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import check_memory
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import differing_in, variables_in
 from stiction.ensemble.work import Outcome
@@ -63,6 +64,8 @@ class Gathered:
         if self.kept is not None:
             inside = [s for s in self.kept if first <= s < first + samples]
             self._kept = np.array(sorted(inside), dtype=np.int64)
+        narrow = sum(len(variable.dims) == 1 for variable in self.variables.values())
+        check_memory("samples", 9.0 * len(plans) * samples * narrow)
         self._arrays: dict[str, NDArray[Any]] = {}
         self._seen: dict[str, NDArray[np.bool_]] = {}
 

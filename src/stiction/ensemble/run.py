@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import check_count, check_progress, is_real, is_whole, too_many_samples
 from stiction._model import describe, names_to_keep, to_plain, whole
 from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.gather import Gathered, GridAxis
@@ -99,12 +100,29 @@ def _wide(method: Any, name: str) -> bool:
     return name in method.variables and len(method.variables[name].dims) > 1
 
 
-def check_count(name: str, value: Any, smallest: int) -> int:
-    """`value` as an int (1e4 too), if it is a whole number of at least `smallest`."""
-    count = whole(value)
-    if count is None or count < smallest:
-        raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
-    return count
+def _check_keep(
+    keep: Any, keep_samples: Any, keep_limit: Any
+) -> tuple[tuple[str, ...], tuple[int, ...] | None]:
+    """What is to be kept, and of which samples, or what is wrong with it."""
+    problems: list[str] = []
+    names: tuple[str, ...] = ()
+    try:
+        names = names_to_keep(keep)
+    except InputError as error:
+        problems += error.problems
+    known = keep_samples is None or (
+        isinstance(keep_samples, list | tuple | range | np.ndarray)
+        and np.ndim(keep_samples) == 1
+        and all(is_whole(sample, 0) for sample in keep_samples)
+    )
+    if not known:
+        given = describe(keep_samples)
+        problems.append(f"keep_samples: must be a list of sample numbers, got {given}")
+    if not (is_real(keep_limit) and keep_limit > 0.0):
+        problems.append(f"keep_limit: must be a positive number, got {describe(keep_limit)}")
+    if problems:
+        raise InputError(problems)
+    return names, None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
 
 
 def check_run(
@@ -112,6 +130,9 @@ def check_run(
 ) -> tuple[int, int, int | None]:
     """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
     samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
+    problems = too_many_samples(samples, first)
+    if problems:
+        raise InputError(problems)
     if workers is not None:
         workers = check_count("workers", workers, 1)
     if executor is not None and not hasattr(executor, "submit"):
@@ -325,9 +346,10 @@ def monte_carlo(
         "weakening_rate": weakening_rate,
     }
     assert fields.keys() == STREAMS.keys()
-    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, strength, method, seed, fields, names_to_keep(keep), chosen)
+    names, chosen = _check_keep(keep, keep_samples, keep_limit)
+    check_progress(progress)
     samples, first, workers = check_run(samples, first, workers, executor, time_limit)
+    plan = make_plan(problem, strength, method, seed, fields, names, chosen)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],

@@ -69,7 +69,7 @@ class Store:
     study : dict
         In plain form.
     versions : list of str
-        Of the package, that wrote to it.
+        Of what wrote to it, as of `stiction.ensemble.versions`.
     chunks : list of Chunk
     failures : dict of Failure
         By point and sample.
@@ -435,7 +435,7 @@ def writing(
         refuse_another(path, study, store.study)
         if version not in store.versions:
             store._warn(
-                f"was begun with version {store.versions[-1]}, this is {version}: samples"
+                f"was begun with {store.versions[-1]}, this is {version}: samples"
                 " of both may differ in their last digits"
             )
         if version not in store.versions or study != store.study:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import check_instance
 from stiction._model import to_plain
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
@@ -60,6 +61,7 @@ def equilibrium_events(
     The patch jumps to the least equilibrium at the same load: an overdamped interface would stop
     there. Inertia may carry a rupture through; only `Rupture` decides that.
     """
+    check_instance("problem", problem, Problem)
     rows = problem.rows(
         tau_p,
         residual_strength=residual_strength,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import check_instance
 from stiction._model import real_array, to_plain
 from stiction._typing import Array
 from stiction.equilibrium.follow import State, at_rest, follow, residual_nodes
@@ -108,6 +109,7 @@ def equilibrium_path(
         If there is more than one profile or the loads do not rise, and as `onset` does.
     """
     given = _check_loads(loads)
+    check_instance("problem", problem, Problem)
     rows = problem.rows(
         tau_p,
         residual_strength=residual_strength,

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._model import describe, whole
+from stiction._checks import is_whole
+from stiction._model import describe
 from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
 from stiction.ensemble.plan import STREAMS
@@ -28,17 +29,6 @@ Event = Literal["critical_stress", "first_instability"]
 
 PIECE = 16
 """Fewest rows worth a thread of their own."""
-
-
-def whole_number(value: Any, least: int) -> bool:
-    """Whether a value is a whole number, and not less than `least`."""
-    number = whole(value)
-    return number is not None and number >= least
-
-
-def real_number(value: Any) -> bool:
-    """Whether a value is a number and neither text nor a truth value; NaN and infinity are."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -231,15 +221,17 @@ def make_limit_state(
         What else is wrong, once there is a limit state.
     """
     found = list(problems)
-    if event not in ("critical_stress", "first_instability"):
-        found.append(f"event: must be 'critical_stress' or 'first_instability', got {event!r}")
-    if workers is not None and not whole_number(workers, 1):
+    if not isinstance(event, str) or event not in get_args(Event):
+        given = describe(event)
+        found.append(f"event: must be 'critical_stress' or 'first_instability', got {given}")
+    if workers is not None and not is_whole(workers, 1):
         found.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     state = None
     try:
         make_plan(problem, strength, method, seed, dict(fields))
         random = tuple((name, field) for name, field in fields.items() if field is not None)
-        kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
+        first = isinstance(event, str) and event == "first_instability"
+        kind: Event = "first_instability" if first else "critical_stress"
         state = LimitState(problem, (("strength", strength), *random), method, kind)
         found += check(state) if check else []
     except InputError as error:
