@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import xarray as xr
 
 import stiction as st
 from stiction._cache import private_folder
+from stiction._netcdf import write_dataset
 from stiction.cli import app
 from stiction.ensemble import files
 
@@ -143,7 +145,7 @@ def test_hostile_attributes_of_a_result(command, attributes):
     command("run", "study.toml", "--out", "result.nc")
     result = xr.load_dataset("result.nc").assign_attrs(attributes)
     result.attrs = {name: value for name, value in result.attrs.items() if value is not None}
-    result.to_netcdf("hostile.nc")
+    write_dataset(result, Path("hostile.nc"))
     for name in ("status", "plot", "report"):
         code, _, errors = command(name, "hostile.nc")
         assert code in (1, 2)
@@ -153,8 +155,8 @@ def test_hostile_attributes_of_a_result(command, attributes):
 def test_a_result_that_holds_something_else(command):
     command("run", "study.toml", "--out", "result.nc")
     result = xr.load_dataset("result.nc")
-    result.isel(sample=slice(3)).to_netcdf("short.nc")
-    result.drop_vars("critical_stress").to_netcdf("other.nc")
+    write_dataset(result.isel(sample=slice(3)), Path("short.nc"))
+    write_dataset(result.drop_vars("critical_stress"), Path("other.nc"))
     for name in ("short.nc", "other.nc"):
         code, _, errors = command("status", name)
         assert (code, "does not hold the results of its study" in errors) == (1, True)

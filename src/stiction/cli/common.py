@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._checks import as_path
 from stiction.errors import InputError
 
 StudyFile = Annotated[
@@ -42,6 +41,8 @@ def echo(text: Any = "", *, err: bool = False) -> None:
 
 def writable(path: Path, what: str) -> Path:
     """Refuse an output that cannot be written before any work is done."""
+    from stiction._checks import as_path
+
     as_path("--out", path)
     folder = path.absolute().parent
     if path.is_dir():
@@ -55,6 +56,8 @@ def writable(path: Path, what: str) -> Path:
 
 def writable_folder(path: Path) -> Path:
     """A folder for several files, made if need be, or refused before any work is done."""
+    from stiction._checks import as_path
+
     as_path("--out", path)
     if path.exists() and not path.is_dir():
         raise InputError(f"--out: {path} is a file; give the name of a folder")

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._checks import as_path
 from stiction._progress import Meter, duration
 from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, size, summary
 from stiction.errors import InputError
@@ -77,6 +76,7 @@ def run(
     Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
     or the command; 3: the time limit was reached; 130: interrupted.
     """
+    from stiction._checks import as_path
     from stiction.runs import StoredRun, check_target, run_into
     from stiction.study import Study
 
