@@ -10,6 +10,7 @@ uninterrupted run. Chunks are written every 20 ms, so that many kills fall into 
 from __future__ import annotations
 
 import argparse
+import json
 import random
 import subprocess
 import sys
@@ -100,13 +101,15 @@ def wait_for(process: subprocess.Popen[bytes], event: Callable[[], bool], second
         time.sleep(0.001)
 
 
-def chunks_in(out: Path) -> int:
-    """Chunks listed so far."""
+def samples_in(out: Path) -> int:
+    """Samples listed so far (chunks are joined: their number goes up and down)."""
     folder = out.with_name(out.name + ".run") if out.suffix == ".nc" else out
     try:
-        return (folder / "chunks.jsonl").read_bytes().count(b'"file"')
+        lines = (folder / "chunks.jsonl").read_bytes().split(b"\n")[:-1]
     except FileNotFoundError:
         return 0
+    entries = [json.loads(line.partition(b" ")[2]) for line in lines]
+    return sum(span[2] for entry in entries for span in entry.get("done", ()))
 
 
 def result_of(out: Path) -> xr.Dataset:
@@ -130,7 +133,7 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
         ending = ".nc" if counts.studies % 2 else ""
         out = folder / f"run{counts.studies}{ending}"
         while True:
-            before = chunks_in(out)
+            before = samples_in(out)
             process = start(study, out)
             if counts.kills == kills:
                 finish(process)
@@ -138,7 +141,7 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
             if chance.random() < 0.25:  # while it starts, reads what is there, or computes
                 wait_for(process, lambda: False, chance.uniform(0.3 * idle, 1.5 * idle))
             else:  # while it computes, or when it has just finished
-                wait_for(process, lambda now=before, out=out: chunks_in(out) > now, 60.0)
+                wait_for(process, lambda now=before, out=out: samples_in(out) > now, 60.0)
                 wait_for(process, lambda: False, chance.uniform(0.0, 0.4))
             if process.poll() is not None:
                 finish(process)
@@ -147,7 +150,7 @@ def campaign(kills: int, folder: Path, seed: int = 0, say: bool = False) -> Coun
             process.wait()
             process.stderr.close()
             counts.kills += 1
-            counts.in_the_middle += chunks_in(out) > before
+            counts.in_the_middle += samples_in(out) > before
         counts.studies += 1
         counts.different += not result_of(out).identical(reference)
         if say:

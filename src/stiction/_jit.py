@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numba.core import event
 
-from stiction._cache import cache_folder
+from stiction._cache import cache_folder, private_folder
 
 logger = logging.getLogger("stiction")
 
@@ -69,7 +69,11 @@ def _digest_of_sources() -> str:
 # numba takes a compiled kernel for current as long as the kernel's own file is: it does not notice
 # that a function or a constant of another file has changed. So every state of the sources that
 # kernels can reach has a folder of its own.
-_FOLDER = Path(numba.config.CACHE_DIR or cache_folder() / "compiled") / _digest_of_sources()
+_FOLDER = (
+    private_folder(Path(numba.config.CACHE_DIR), _digest_of_sources())
+    if numba.config.CACHE_DIR
+    else private_folder(cache_folder(), "compiled", _digest_of_sources())
+)
 
 
 def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
@@ -93,18 +97,3 @@ def jit(function: Kernel) -> Kernel:
     numbers must come out whatever the batch.
     """
     return _compile(function, {"nogil": True, "error_model": "numpy"})
-
-
-def jit_sums(function: Kernel) -> Kernel:
-    """The same for plain sums of products: they may be reordered and fused.
-
-    A dot product runs some ten times faster if the compiler may sum in vector lanes. The order is
-    fixed once compiled and depends on the length alone, so results still do not depend on the
-    batch.
-    """
-    options = {
-        "nogil": True,
-        "error_model": "numpy",
-        "fastmath": {"reassoc", "contract", "nsz"},
-    }
-    return _compile(function, options)

@@ -45,6 +45,7 @@ class Method(Protocol):
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
     package that names it under the entry points "stiction.methods" offers it in study files too;
     its `type` is then a ``Literal`` with a default.
+    It may have `accepts` as well, of "barriers" and "overstress": see `Problem.sample`.
     """
 
     @property
@@ -111,6 +112,11 @@ def check_method(method: Any) -> None:
         )
     if missing:
         raise InputError(f"method: {describe(method)} lacks {', '.join(missing)}")
+
+
+def accepted(method: Method) -> tuple[str, ...]:
+    """What `Problem.sample` may let through for a method, besides what every method can do."""
+    return getattr(method, "accepts", ())
 
 
 def check_problem(problem: Any) -> None:
@@ -248,8 +254,8 @@ def onset(
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
-    sample = problem.sample(profiles)
-    warn_of_units(problem, float(sample.strength.mean()), float(sample.residual_strength.mean()))
+    sample = problem.sample(profiles, accept=accepted(method))
+    warn_of_units(problem, sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
     result = label(problem, method, values, np.arange(sample.samples), attributes)
     return result if measured is None else with_gaps(problem, result, measured)

@@ -14,6 +14,9 @@ from stiction._typing import Array
 from stiction.errors import InputError
 
 FEWEST = 8
+MOST = 2**24
+SHORTEST = 1e-30
+"""Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
 
 
 def _one_or_two(value: Any) -> tuple[Any, ...]:
@@ -41,6 +44,8 @@ def _nodes(value: Any) -> Any:
             raise ValueError(f"must be at least {FEWEST}")
         if count % 2:
             raise ValueError("must be even")
+    if math.prod(counts) > MOST:
+        raise ValueError(f"must be at most 2^24 = {MOST} in all")
     return counts if len(counts) == 2 else counts[0]
 
 
@@ -73,13 +78,14 @@ class Interface:
         Period, m. One number is a line, two are a plane: along x, the direction of load and slip,
         and along y, across it.
     nodes : int or (int, int)
-        Number of nodes in each direction, even and at least 8. Powers of two are fastest.
+        Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
+        are fastest.
 
     Raises
     ------
     InputError
-        If a length is not positive, a number of nodes is odd or below 8, or one of the two says
-        line and the other plane.
+        If a length is not positive, a number of nodes is odd or out of range, or one of the two
+        says line and the other plane.
 
     Examples
     --------
@@ -99,6 +105,11 @@ class Interface:
             raise InputError(
                 "length and nodes: give one number each for a line or two each for a plane, got"
                 f" length = {_plain(self.length)}, nodes = {_plain(self.nodes)}"
+            )
+        if min(self.spacings) < SHORTEST:
+            raise InputError(
+                f"length: the nodes must be at least {SHORTEST:g} m apart, got"
+                f" {min(self.spacings):g} m; check its unit"
             )
         return self
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 from pydantic import model_validator
 
+from stiction._checks import is_real
 from stiction._model import Mode, describe, model
 from stiction.errors import InputError, warn_accuracy
 from stiction.friction import Friction
@@ -16,7 +18,14 @@ from stiction.interface import Interface
 from stiction.load import Load
 from stiction.placed import Placed
 from stiction.plausible import MOST_NODES, suspects, warn_of_length
-from stiction.sample import PROFILES, Sample, named_profiles, profiles_of
+from stiction.sample import (
+    PROFILES,
+    Sample,
+    mean_strength,
+    named_profiles,
+    profiles_of,
+    steepest_rate,
+)
 from stiction.solid import Solid
 
 # lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
@@ -140,6 +149,8 @@ class Problem:
 
     def nucleation_length_of(self, rate: float) -> float:
         """h_n, m, of a uniform weakening rate in Pa/m."""
+        if not (is_real(rate) and rate > 0.0):
+            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
         return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
 
     def nodes_in_nucleation_length(self, rate: float) -> float:
@@ -179,14 +190,14 @@ class Problem:
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self.nodes_in_nucleation_length(float(sample.weakening_rate.max()))
+        resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
         if resolution < enough:
             warn_accuracy(
                 f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
                 f" {cost}"
             )
 
-    def sample(self, profiles: Any) -> Sample:
+    def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
         """What differs between samples, validated, with the problem's own for all the rest.
 
         Parameters
@@ -196,6 +207,10 @@ class Problem:
             'strength', and any of 'residual_strength', 'initial_stress', 'normal_pressure' (Pa)
             and one of 'weakening_rate' (Pa/m), 'critical_slip' (m) and 'fracture_energy' (J/m²),
             which may also be (samples, 1) or a number and replace the problem's own.
+        accept : collection of {"barriers", "overstress", "constant"}
+            What the method at hand can do besides: infinite strength where nothing breaks; an
+            initial stress above the strength. "constant": the caller has warned of nodes that do
+            not weaken.
 
         Returns
         -------
@@ -205,7 +220,13 @@ class Problem:
         ------
         InputError
             Naming all that is wrong: names, shapes, values that are not finite, strength not above
-            the residual strength and the initial stress, a weakening rate that is not positive.
+            the initial stress, or nowhere above the residual strength, a weakening rate that is
+            not positive.
+
+        Notes
+        -----
+        A node whose strength is not above its residual strength does not weaken: its strength is
+        constant. An `AccuracyWarning` gives the share of such nodes.
         """
         if isinstance(profiles, Sample):
             return profiles
@@ -214,18 +235,28 @@ class Problem:
         friction, load = self.friction, self.load
         problems: list[str] = []
 
-        def checked(name: str, own: Any, samples: int | None) -> Any:
+        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
             try:
-                return profiles_of(name, given.get(name, own), self.interface, samples)
+                return profiles_of(name, given.get(name, own), self.interface, samples, infinite)
             except InputError as error:
                 problems.extend(error.problems)
                 return None
 
         if "strength" not in given:
             raise InputError("strength: missing among the profiles")
-        strength = checked("strength", None, None)
+        strength = checked("strength", None, None, "barriers" in accept)
         samples = 1 if strength is None else strength.shape[0]
-        own_residual: Any = 0.0 if strength is None else friction.residual(strength)
+        along = tuple(range(1, 1 + len(shape)))
+        breaks = strength
+        if strength is not None:
+            stuck = np.isinf(strength).all(axis=along)
+            breaks = np.where(np.isinf(strength), 0.0, strength)
+            if stuck.any():
+                problems.append(
+                    f"strength: infinite at every node of sample {int(np.argmax(stuck))}; nothing"
+                    " can break"
+                )
+        own_residual: Any = 0.0 if breaks is None else friction.residual(breaks)
         residual = checked("residual_strength", own_residual, samples)
         initial = checked("initial_stress", load.initial_stress, samples)
         pressure = np.broadcast_to(np.nan, (samples, *shape))
@@ -243,21 +274,48 @@ class Problem:
             )
         if residual is not None and residual.min() < 0.0:
             problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        for name, other in (("residual_strength", residual), ("initial_stress", initial)):
-            if strength is None or other is None or np.all(strength > other):
-                continue
-            number, *node = np.unravel_index(int(np.argmin(strength - other)), strength.shape)
+        overstressed = strength is not None and initial is not None and np.any(strength <= initial)
+        if overstressed and "overstress" not in accept:
+            number, *node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
             where = (number, *node)
             problems.append(
-                f"strength: must be above {name} everywhere; sample {number}, node"
-                f" {', '.join(map(str, node))}: {strength[where]:g} against {other[where]:g} Pa"
+                f"strength: must be above initial_stress everywhere; sample {number}, node"
+                f" {', '.join(map(str, node))}: {strength[where]:g} against {initial[where]:g} Pa;"
+                " only st.Rupture() begins above the strength"
             )
+        if strength is not None and residual is not None:
+            weakens = (strength > residual) & np.isfinite(strength)
+            nowhere = np.flatnonzero(~weakens.any(axis=along) & ~stuck)
+            if nowhere.size:
+                problems.append(
+                    f"strength: must be above residual_strength somewhere; sample {nowhere[0]} is"
+                    f" nowhere, from {strength[nowhere[0]].min():g} to"
+                    f" {strength[nowhere[0]].max():g} Pa: check the units of both"
+                )
         if problems:
             raise InputError(problems)
-        rates = (
-            value if scale == "weakening_rate" else friction.rate(strength - residual, scale, value)
+        constant = strength <= residual
+        if scale == "weakening_rate":
+            rates = value
+        else:
+            with np.errstate(over="ignore"):  # too short a critical slip is refused just below
+                rates = friction.rate(strength - residual, scale, value)
+            if np.any(barriers := np.isinf(strength)):  # any rate will do where nothing weakens
+                own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
+                rates = np.where(barriers, own, rates)
+        if constant.any():
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
+            residual = np.minimum(residual, strength)
+            slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
+            rates = np.where(constant, slowest, rates)
+            if "constant" not in accept:
+                warn_accuracy(
+                    f"strength is not above residual_strength at {100.0 * constant.mean():.2g} %"
+                    " of the nodes; these do not weaken: their strength stays as it is"
+                )
+        too_few = self._too_few_nodes(
+            steepest_rate(strength, residual, rates), mean_strength(strength)
         )
-        too_few = self._too_few_nodes(float(rates.max()), float(strength.mean()))
         if too_few:
             raise InputError(too_few)
         profile = np.array(np.broadcast_to(load.profile, shape), dtype=np.float64)

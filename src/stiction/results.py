@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numba
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -97,6 +98,8 @@ def to_dataset(
     coords = {name: (v.dims, array, attrs(v)) for name, (array, v) in coordinates.items()}
     dataset = xr.Dataset(data, coords=coords)
     dataset.attrs["stiction_version"] = __version__
+    dataset.attrs["numpy_version"] = np.__version__
+    dataset.attrs["numba_version"] = numba.__version__
     for name, value in attributes.items():
         plain = isinstance(value, str | int | float)
         dataset.attrs[name] = value if plain else json.dumps(value)

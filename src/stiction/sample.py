@@ -15,6 +15,29 @@ from stiction.profile_nodes import describe_gaps
 from stiction.profiles import at_nodes
 from stiction.results import Variable
 
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
+weaken."""
+
+
+def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+    """Largest weakening rate, Pa/m, of nodes that may break, all arrays (samples, *shape).
+
+    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min():
+        return float(rate.max())
+    drop = drop.reshape(drop.shape[0], -1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
+    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
+
+
+def mean_strength(strength: Array) -> float:
+    """Mean strength, Pa, where it is finite."""
+    return float(strength.mean(where=np.isfinite(strength)))
+
 
 class Sample(NamedTuple):
     """One interface or many: the profiles that every method starts from.
@@ -25,7 +48,9 @@ class Sample(NamedTuple):
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
         tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); views of what was given, not to be
-        written to. Without the first axis for `one` sample.
+        written to. Without the first axis for `one` sample. Strength may be infinite for methods
+        that accept barriers. Where it was given at or below the residual strength, both are equal:
+        strength is constant, whatever W.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
@@ -70,6 +95,20 @@ class Sample(NamedTuple):
         flat = self.weakening_rate.reshape(self.samples, -1)
         return bool(np.all(flat == flat[:, :1]))
 
+    @property
+    def mean_strength(self) -> float:
+        """Mean strength where it is finite, Pa."""
+        return mean_strength(self.strength)
+
+    @property
+    def steepest_rate(self) -> float:
+        """Largest weakening rate of nodes that may break, Pa/m."""
+        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
+    def every_second(self, first: int) -> Sample:
+        """The same samples on the nodes `first`, `first` + 2, ... of a line."""
+        return Sample(*(values[..., first::2] for values in self))
+
     def mean_stress(self, load: Array) -> Array:
         """Mean interface stress <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
         mean: Array = self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
@@ -94,12 +133,14 @@ PROFILES: dict[str, Variable] = {
 of random draws and never changes."""
 
 
-def profiles_of(name: str, value: Any, interface: Interface, samples: int | None = None) -> Array:
+def profiles_of(
+    name: str, value: Any, interface: Interface, samples: int | None = None, infinite: bool = False
+) -> Array:
     """`value` as a (samples, *shape) float64 array, or an `InputError` that names it.
 
     A single profile (*shape) is one sample; where `samples` is given, a number, a profile or one
     number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays the names of
-    dimensions, the coordinates and the units decide.
+    dimensions, the coordinates and the units decide. Positive infinity passes if `infinite`.
     """
     shape = interface.shape
     nodes = ", ".join(map(str, shape))
@@ -126,25 +167,26 @@ def profiles_of(name: str, value: Any, interface: Interface, samples: int | None
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{turned}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
-    _check_finite(name, array, interface)
+    _check_finite(name, array, interface, infinite)
     if samples is not None:
         return np.broadcast_to(array, (samples, *shape))
     return array[None] if array.shape == shape else array
 
 
-def _check_finite(name: str, array: Array, interface: Interface) -> None:
-    bad = ~np.isfinite(array)
+def _check_finite(name: str, array: Array, interface: Interface, infinite: bool) -> None:
+    bad = np.isnan(array) | (array == -np.inf) if infinite else ~np.isfinite(array)
     if not bad.any():
         return
     missing = np.isnan(array)
+    unless = ", or inf where nothing breaks" if infinite else ""
     if len(interface.shape) == 1 and array.shape[-1:] == interface.shape and missing.any():
         where = describe_gaps(np.atleast_2d(missing), interface)
         raise InputError(
-            f"{name}: must be finite: there {where}; st.onset(..., gaps='fill') and"
+            f"{name}: must be finite{unless}: there {where}; st.onset(..., gaps='fill') and"
             " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
         )
     entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-    raise InputError(f"{name}: must be finite; entry {entry} is not")
+    raise InputError(f"{name}: must be finite{unless}; entry {entry} is not")
 
 
 def named_profiles(given: Any) -> dict[str, Any]:

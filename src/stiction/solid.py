@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction._checks import check_choice
 from stiction._model import Mode, Positive, _number, model
-from stiction.errors import InputError
 from stiction.plausible import warn_of_waves
 
 
@@ -82,8 +82,7 @@ class Solid:
         Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress; mode III: G. In every case
         it is 2 G (1 - c_s^2/c_d^2) for mode II (Geubelle and Rice, 1995, static limit).
         """
-        if mode not in ("II", "III"):
-            raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")
+        check_choice("mode", mode, ("II", "III"))
         if mode == "III":
             return self.shear_modulus
         return 2.0 * self.shear_modulus * (1.0 - self.wave_speed_ratio**-2)

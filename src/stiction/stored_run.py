@@ -9,6 +9,7 @@ import os
 import shutil
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._brief import brief
+from stiction._checks import as_path
 from stiction._model import describe
+from stiction._netcdf import DamagedError, read_dataset, write_dataset
 from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
-from stiction.ensemble.files import Lock, cannot_write, sync_folder
+from stiction.ensemble.chunk import ROWS, stored_samples
+from stiction.ensemble.files import HeldError, Lock, cannot_write
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
+from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
 from stiction.ensemble.same import refuse_another
 from stiction.ensemble.store import (
@@ -34,6 +39,7 @@ from stiction.ensemble.store import (
     writing,
 )
 from stiction.ensemble.trouble import StoreError
+from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
 from stiction.study.study import Study
@@ -53,7 +59,9 @@ class Status:
     done_by_point : (points,) array
     failures : tuple of Failure
     damaged : tuple of str
-        Chunks that fail their checksum; running the study again computes them again.
+        What is wrong with which chunk; running the study again computes it again.
+    verified : bool
+        Whether everything was read and compared with its checksum, or chunks looked at only.
     chunks, bytes : int
     seconds : float
         Computing time of all workers together.
@@ -66,6 +74,7 @@ class Status:
     done_by_point: NDArray[np.int64]
     failures: tuple[Failure, ...]
     damaged: tuple[str, ...]
+    verified: bool
     chunks: int
     bytes: int
     seconds: float
@@ -93,52 +102,66 @@ class StoredRun:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = as_path("path", path)
         beside = folder_beside(self.path)
         self._store: Store | None = None
         if self.path.is_dir():
             self._store = Store(self.path)
-        elif beside.is_dir():
+        elif beside.is_dir() and ((beside / MANIFEST).exists() or not self.path.is_file()):
             self._store = Store(beside)
         elif self.path.is_file():
             self._result = _read_result(self.path)
         else:
             raise StoreError(f"{self.path}: there is no run here")
         if self._store is not None:
-            self.study = Study.from_dict(self._store.study)
+            self.study = Study.from_dict(self._store.study, trusted=True)
         else:
             self.study = Study.from_result(self._result)
+            _refuse_other_shape(self.path, self._result, self.study)
 
     def __repr__(self) -> str:
-        ensemble = self.study.ensemble
         points = len(self.study.plans)
         each = f"{points} points of " if points > 1 else ""
-        return f"<StoredRun {str(self.path)!r}: {each}{ensemble.samples} samples>"
+        return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
 
-    def status(self) -> Status:
-        """How far it is; reads every chunk to check it."""
+    def status(self, *, verify: bool = True) -> Status:
+        """How far it is.
+
+        Parameters
+        ----------
+        verify : bool
+            Read every chunk and compare it with its checksum and with the list; else only look
+            whether it is there, in its size. A finished file was verified when it was opened.
+
+        Raises
+        ------
+        StoreError
+            If something is there and cannot be read.
+        """
         ensemble = self.study.ensemble
-        total = len(self.study.plans) * ensemble.samples
+        points = len(self.study.plans)
+        total = points * ensemble.samples
         if self._store is None:
             first = self._result[next(iter(self._result.data_vars))]
-            points = len(self.study.plans)
             done = np.isfinite(first.values.reshape(points, -1)).sum(axis=1)
             size = self.path.stat().st_size
-            return Status(total, int(done.sum()), done, self.failures, (), 1, size, 0.0, False)
+            return Status(
+                total, int(done.sum()), done, self.failures, (), True, 1, size, 0.0, False
+            )
         store = self._store
-        damaged = store.damaged()
-        bad = {chunk.file for chunk in damaged}
-        store.chunks = [chunk for chunk in store.chunks if chunk.file not in bad]
-        done = store.done(len(self.study.plans), ensemble.samples, ensemble.first).sum(axis=1)
+        bad = store.verify(whole=verify)
+        intact = [chunk for chunk in store.chunks if chunk.file not in bad]
+        done = stored_samples(intact, points, ensemble.samples, ensemble.first).sum(axis=1)
         return Status(
             total,
             int(done.sum()),
             done,
             self.failures,
-            tuple(sorted(bad)),
-            len(store.chunks),
-            sum(chunk.bytes for chunk in store.chunks),
-            sum(chunk.seconds for chunk in store.chunks),
+            (*store.damage, *(f"{file} {text}" for file, text in sorted(bad.items()))),
+            verify,
+            len(intact),
+            sum(chunk.bytes for chunk in intact),
+            sum(chunk.seconds for chunk in intact),
             _is_active(store.path),
         )
 
@@ -169,8 +192,9 @@ class StoredRun:
             return self._result if only is None else self._result[names]
         study = self.study
         gathered = Gathered(study.plans, study.ensemble.samples, study.ensemble.first, only)
-        for outcome in self._store.outcomes():
-            gathered.add(outcome)
+        for table in self._store.tables():
+            values = {name: v for name, v in table.values.items() if name not in ROWS}
+            gathered.put(*table.rows, values)
         attributes = study.attributes
         if self.failures:
             attributes[FAILED] = [list(failure) for failure in self.failures]
@@ -194,8 +218,9 @@ class StoredRun:
         """
         from stiction.export import check_suffix, export
 
-        check_suffix(Path(path))
-        export(self.dataset(), path)
+        target = as_path("path", path)
+        check_suffix(target)
+        export(self.dataset(), target)
 
 
 def _is_active(folder: Path) -> bool:
@@ -204,8 +229,10 @@ def _is_active(folder: Path) -> bool:
     try:
         with Lock(folder / LOCK, announce=False):
             return False
-    except StoreError:
+    except HeldError:
         return True
+    except StoreError:  # no locks here: nobody knows
+        return False
 
 
 def folder_beside(file: Path) -> Path:
@@ -214,20 +241,14 @@ def folder_beside(file: Path) -> Path:
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
-    """Write a result as one NetCDF file, whole or not at all."""
-    aside = path.with_name(path.name + ".part")
+    """Write a result as one NetCDF file with checksums, whole or not at all."""
     # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
     if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
         raise cannot_write(path, OSError(errno.ENOSPC, ""))
     try:
-        result.to_netcdf(aside)
-        with open(aside, "rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(aside, path)
+        write_dataset(result, path)
     except (OSError, RuntimeError) as error:  # the NetCDF library raises either
-        aside.unlink(missing_ok=True)
         raise cannot_write(path, error) from error
-    sync_folder(path.parent)
 
 
 def _free_bytes(folder: Path) -> float:
@@ -239,13 +260,35 @@ def _free_bytes(folder: Path) -> float:
 
 def _read_result(path: Path) -> xr.Dataset:
     try:
-        with xr.open_dataset(path) as opened:
-            result = opened.load()
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path}: is no NetCDF file that can be read: {error}") from None
+        result = read_dataset(path)
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except DamagedError as error:
+        raise StoreError(
+            f"{path}: {error}; move it away, and running the study again computes it anew"
+        ) from None
     if "study" not in result.attrs:
         raise StoreError(f"{path}: holds no result of a study")
+    try:
+        str(result.attrs["stiction_version"])
+        for item in json.loads(result.attrs.get(FAILED, "[]")):
+            Failure(*item)
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise StoreError(
+            f"{path}: its attributes are damaged ({type(error).__name__}: {error})"
+        ) from None
     return result
+
+
+def _refuse_other_shape(path: Path, result: xr.Dataset, study: Study) -> None:
+    """A result that does not hold what its study says was put together by something else."""
+    names = study.plans[0].variables.keys()
+    missing = [name for name in names if name not in result]
+    sizes = {"sample": study.ensemble.samples} | {axis.dim: axis.size for axis in study.axes}
+    wrong = [dim for dim, size in sizes.items() if result.sizes.get(dim) != size]
+    if missing or wrong:
+        what = ", ".join([*missing, *wrong])
+        raise StoreError(f"{path}: does not hold the results of its study (see {what})")
 
 
 def check_target(path: Path) -> None:
@@ -274,11 +317,18 @@ def run_into(
     progress: Show = True,
     retry: bool = False,
     time_limit: float | None = None,
+    lock: bool = True,
 ) -> StoredRun:
-    """Run a study, or what is missing of it, into a folder or a file; see `Study.run`."""
-    from stiction import __version__
+    """Run a study, or what is missing of it, into a folder or a file; see `Study.run`.
 
-    path = Path(out)
+    What is read back at the end decides whether it is complete.
+
+    Raises
+    ------
+    StoreError
+        If samples are missing in the end that have not failed.
+    """
+    path = as_path("out", out)
     ensemble, plans = study.ensemble, study.plans
     check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
@@ -291,12 +341,11 @@ def run_into(
         before = _read_result(path)
         refuse_another(path, plain, json.loads(before.attrs["study"]))
         same = json.loads(before.attrs["study"])["ensemble"]["samples"] == ensemble.samples
-        if same and not folder.exists() and not (retry and FAILED in before.attrs):
+        if same and not (folder / MANIFEST).exists() and not (retry and FAILED in before.attrs):
             return StoredRun(path)
-    with writing(folder, plain, __version__) as store:
+    with writing(folder, plain, versions(), lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
-            variables = {name: v for plan in plans for name, v in plan.variables.items()}
-            store.add(_outcomes_of(before, len(plans)), variables)
+            store.add(_outcomes_of(before, len(plans)), variables_in(plans))
         run_stored(
             store,
             plans,
@@ -308,15 +357,33 @@ def run_into(
             retry=retry,
             time_limit=time_limit,
         )
-        if store.missing(len(plans), ensemble.samples, ensemble.first):  # the time was over
+        stored = StoredRun(folder)
+        state = stored.status()
+        if time_limit is not None and _missing(state) and not state.damaged:
             return StoredRun(path)
+        _refuse_incomplete(folder, state)
         if to_file:
-            StoredRun(path).export(path)
+            stored.export(path)
             if not store.failures:
                 empty(folder)
     if to_file and not (folder / MANIFEST).exists():
-        shutil.rmtree(folder)
+        with suppress(OSError):  # somebody else's files are in it
+            (folder / LOCK).unlink(missing_ok=True)
+            folder.rmdir()
     return StoredRun(path)
+
+
+def _missing(state: Status) -> int:
+    return state.samples - state.done - len(state.failures)
+
+
+def _refuse_incomplete(folder: Path, state: Status) -> None:
+    if state.damaged or _missing(state):
+        raise StoreError(
+            f"{folder}: {state.done} of {state.samples} samples are stored: others were damaged or"
+            f" removed while the run went on ({'; '.join(state.damaged[:3]) or 'gone'}); the same"
+            " command computes them again"
+        )
 
 
 def _outcomes_of(result: xr.Dataset, points: int) -> list[Outcome]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import stiction as st
 from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
@@ -18,6 +19,7 @@ from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.prepared import Setting
+from stiction.equilibrium.single_patch_test import block_factor
 from stiction.equilibrium.window_bound import smallest_window, window_mode
 
 
@@ -70,6 +72,16 @@ def test_growing_factor_is_the_cholesky_factor(groups):
     back_substitute(factor, size, forward, solution)
     # The condition number is below 100, so that 1e-12 is generous.
     np.testing.assert_allclose(matrix @ solution, 1.0, atol=1e-12)
+
+
+def test_factor_of_a_run_of_nodes():
+    column = stiffness_column(256, 0.1, 1e9)
+    factor = block_factor(column, 60)
+    ours = np.zeros((60, 60))
+    for r in range(60):
+        ours[r, : r + 1] = factor[row_start(r) : row_start(r) + r + 1]
+    reference = np.linalg.cholesky(scipy.linalg.toeplitz(column[:60]))
+    np.testing.assert_allclose(ours, reference, atol=1e-13 * reference.max())
 
 
 @pytest.mark.parametrize("position", [0, 17, 40])

@@ -160,7 +160,7 @@ CASES = {
             {"strength": np.ones(256), "residual_strength": 2.0},
             method=st.LocalCriterion(),
         ),
-        ["tau_p", "residual_strength", "node 0"],
+        ["tau_p", "residual_strength", "sample 0 is nowhere"],
     ),
     "samples of one and of another": (
         lambda: st.onset(

@@ -35,7 +35,7 @@ def exact():
     return st.onset(PROBLEM, TAU_P, method=st.Equilibrium())
 
 
-@pytest.mark.parametrize("stop", ["sliding", "onset", "arrest"])
+@pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
 def test_a_load_that_goes_down_and_up_again_is_no_instability(exact, stop):
     run = simulate(load=DETOUR, stop=stop)
     assert run.attrs["stopped"] == ("onset" if stop == "onset" else "sliding")

@@ -11,8 +11,12 @@ import pytest
 
 import stiction as st
 from stiction.cli import app as room
+from stiction.ensemble import distributed as dask_room
 from stiction.ensemble import resume
-from stiction.ensemble.distributed import Cluster, dask_executor, slurm_cluster
+from stiction.ensemble.distributed import Cluster, dask_executor
+from stiction.ensemble.slurm import slurm_cluster, slurm_jobs
+from stiction.ensemble.trouble import WorkerError
+from stiction.ensemble.work import do_work
 from stiction.stored_run import StoredRun, run_into
 
 STUDY = {
@@ -150,7 +154,7 @@ def test_without_the_extra_a_message_says_how_to_get_it(monkeypatch, arguments, 
 
 
 @pytest.mark.slow
-def test_the_job_script_of_slurm():
+def test_the_job_script_of_slurm(tmp_path, monkeypatch):
     needs("dask_jobqueue")
     study = copy.deepcopy(STUDY) | {
         "cluster": {
@@ -161,16 +165,23 @@ def test_the_job_script_of_slurm():
             "walltime": "02:30:00",
             "queue": "short",
             "account": "friction",
-            "options": {
-                "interface": "lo",
-                "job_extra_directives": ["--exclusive"],
-                "scheduler_options": {"dashboard_address": None},
-            },
+            "interface": "lo",
+            "options": {"job_extra_directives": ["--exclusive"]},
         }
     }
     settings = st.Study.from_dict(study).cluster
-    with slurm_cluster(settings) as cluster:
+    needs("cryptography")
+    monkeypatch.chdir(tmp_path)
+    with slurm_cluster(settings) as (cluster, _):
         script = cluster.job_script()
+        assert cluster.scheduler_address.startswith("tls://127.0.0.1:")
+        assert cluster.scheduler.http_server.address == "127.0.0.1"
+        (folder,) = tmp_path.iterdir()
+        assert folder.stat().st_mode & 0o077 == 0  # the key is for its owner
+    assert not list(tmp_path.iterdir())
+    assert "--interface lo" in script
+    assert "--protocol tls" in script
+    assert "--dashboard-address 127.0.0.1:0" in script
     for line in (
         "#SBATCH -p short",
         "#SBATCH -A friction",
@@ -187,8 +198,98 @@ def test_the_job_script_of_slurm():
 @pytest.mark.slow
 def test_settings_that_slurm_refuses():
     needs("dask_jobqueue")
-    with pytest.raises(st.InputError, match="cluster: dask-jobqueue refuses"):
-        slurm_cluster(Cluster(jobs=1))
+    with (
+        pytest.raises(st.InputError, match="cluster: dask-jobqueue refuses"),
+        slurm_cluster(Cluster(jobs=1, interface="lo", tls=False)),
+    ):
+        pass
+    with (
+        pytest.raises(st.InputError, match="cluster.interface: missing; .* lo"),
+        slurm_cluster(Cluster(jobs=1, cores=1, memory="1GB")),
+    ):
+        pass
+
+
+@pytest.fixture
+def fake_slurm(tmp_path, monkeypatch):
+    """Commands of SLURM on PATH that say what a test tells them to."""
+
+    def make(**commands):
+        for name, script in commands.items():
+            path = tmp_path / "bin" / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(f"#!/bin/sh\n{script}\n")
+            path.chmod(0o755)
+        monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+        monkeypatch.chdir(tmp_path)
+
+    return make
+
+
+JOB = {"cores": 1, "memory": "1GB", "interface": "lo", "tls": False}
+
+
+@pytest.mark.slow
+def test_slurm_refuses_a_job_in_its_own_words(fake_slurm):
+    needs("dask_jobqueue")
+    fake_slurm(sbatch="echo 'sbatch: error: invalid partition specified: long' >&2; exit 1")
+    with (
+        pytest.raises(st.InputError, match="SLURM refuses the job.*invalid partition.*long"),
+        slurm_jobs(Cluster(**JOB, queue="long")),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_no_sbatch(fake_slurm):
+    needs("dask_jobqueue")
+    fake_slurm(true="")
+    with pytest.raises(st.InputError, match="no `sbatch`"), slurm_jobs(Cluster(**JOB)):
+        pass
+
+
+@pytest.mark.slow
+def test_jobs_that_end_at_once_and_jobs_that_never_begin(fake_slurm, tmp_path):
+    needs("dask_jobqueue")
+    (tmp_path / "log").write_text("no such python\n")
+    ended = f"JobState=FAILED Reason=NonZeroExitCode ExitCode=127:0 StdErr={tmp_path / 'log'}"
+    fake_slurm(
+        sbatch="echo Submitted batch job 12", squeue="", scontrol=f"echo {ended}", scancel=""
+    )
+    words = "no worker is left.*job 12: JobState FAILED.*ExitCode 127:0; it wrote: no such python"
+    with pytest.raises(WorkerError, match=words), dask_executor(slurm=Cluster(**JOB)):
+        pass
+    fake_slurm(squeue="echo 12 PENDING Resources")
+    words = "no worker for 1.5 s: SLURM says: job 12 is PENDING .Resources."
+    settings = Cluster(**JOB, start_timeout=1.5)
+    with pytest.raises(WorkerError, match=words), dask_executor(slurm=settings):
+        pass
+
+
+@pytest.mark.parametrize("name", ["queue", "account", "memory", "walltime", "interface"])
+def test_a_name_cannot_add_lines_to_the_job_script(name):
+    with pytest.raises(st.InputError, match=f"{name}: must be one word"):
+        Cluster(**{name: "short\n#SBATCH --wrap=x"})
+    with pytest.raises(st.InputError, match="line ends"):
+        Cluster(options={"job_extra_directives": ["--exclusive\n#SBATCH -p long"]})
+
+
+def test_a_worker_with_other_versions_refuses_to_work():
+    plan = st.Study.from_dict(STUDY).plans[0]
+    with pytest.raises(WorkerError, match="numpy 1.0.*install the same versions"):
+        do_work(plan, 0, 0, 1, "", "stiction 0, numpy 1.0, numba 0")
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers(monkeypatch):
+    distributed = needs("distributed")
+    monkeypatch.setattr(dask_room, "SCHEDULER_SECONDS", 1.0)
+    with (
+        distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster,
+        pytest.raises(WorkerError, match="no worker for 1 s.*dask worker"),
+        dask_executor(cluster.scheduler_address),
+    ):
+        pass
 
 
 def test_mistakes_in_the_cluster_table_are_named():
@@ -201,4 +302,4 @@ def test_mistakes_in_the_cluster_table_are_named():
 def test_the_cluster_is_no_part_of_the_result():
     with_cluster = st.Study.from_dict(STUDY | {"cluster": {"jobs": 3}})
     assert with_cluster.attributes == st.Study.from_dict(STUDY).attributes
-    assert with_cluster.to_dict()["cluster"] == {"jobs": 3}
+    assert with_cluster.to_dict()["cluster"]["jobs"] == 3

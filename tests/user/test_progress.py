@@ -245,7 +245,9 @@ def test_design_stress_and_curve_when_time_is_up(system, monkeypatch):
     assert "raise time_limit" in curve.attrs["cut_short"]
 
 
-def test_simulations_and_onsets_speak_too(hasty, system, capsys):
+def test_simulations_and_onsets_speak_too(hasty, system, capsys, monkeypatch):
+    monkeypatch.setattr(_progress, "AFTER", 0.0)  # with its kernels compiled it is a matter of .1 s
+    monkeypatch.setattr(_progress, "LONG", 0.01)
     problem, field = system
     profiles = field.profiles(problem.interface, field.draws(problem.interface, 200, 0))
     told = []

@@ -16,6 +16,7 @@ import pytest
 import xarray as xr
 
 import stiction as st
+from stiction import stored_run
 from stiction.ensemble import resume, scheduler, store, work
 from stiction.ensemble.files import Lock
 from stiction.ensemble.trouble import StoreError, WorkerError
@@ -158,12 +159,14 @@ def test_damaged_chunks_are_found_and_computed_again(tmp_path, often, reference,
     victim = sorted((tmp_path / "run" / "chunks").iterdir())[1]
     damage(victim)
     state = StoredRun(tmp_path / "run").status()
-    assert state.damaged == (f"chunks/{victim.name}",)
+    assert [text.split()[0] for text in state.damaged] == [f"chunks/{victim.name}"]
     assert state.done < state.samples
-    with pytest.warns(UserWarning, match=f"{victim.name}.*checksum.*missing"):
+    with pytest.warns(UserWarning, match=f"{victim.name}: (is gone|fails its checksum).*missing"):
         part = StoredRun(tmp_path / "run").dataset()
     assert int(part["critical_stress"].isnull().sum()) == state.samples - state.done
-    with pytest.warns(UserWarning, match=f"{victim.name}.*checksum.*computed again"):
+    with pytest.warns(
+        UserWarning, match=f"{victim.name}: (is gone|fails its checksum).*computed again"
+    ):
         result = make_study().run(out=tmp_path / "run", workers=1)
     assert result.identical(reference)
     after = sizes(tmp_path / "run")
@@ -176,7 +179,7 @@ def test_a_torn_list_and_files_aside_do_no_harm(tmp_path, often, reference):
     listed = tmp_path / "run" / "chunks.jsonl"
     lines = listed.read_bytes()
     listed.write_bytes(lines[: len(lines) - 37])
-    (tmp_path / "run" / "chunks" / "000777.nc.part").write_bytes(b"half a chunk")
+    (tmp_path / "run" / "chunks" / "000777-0123abcd.nc.part").write_bytes(b"half a chunk")
     (tmp_path / "run" / "chunks.jsonl.part").write_bytes(b"half a list")
     assert make_study().run(out=tmp_path / "run").identical(reference)
     assert not list((tmp_path / "run" / "chunks").glob("*.part"))
@@ -299,13 +302,12 @@ def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
     [
         (lambda path: path.write_text("text"), "is a file"),
         (lambda path: (path.mkdir(), (path / "thesis.tex").write_text("text")), "thesis.tex"),
-        (lambda path: (path.mkdir(), (path / "manifest.json").write_text("{")), "cannot be read"),
         (
             lambda path: (path.mkdir(), (path / "manifest.json").write_text('{"format": 99}')),
             "format 99",
         ),
     ],
-    ids=["a file", "other files", "broken manifest", "a later format"],
+    ids=["a file", "other files", "a later format"],
 )
 def test_unusable_folders_are_refused_before_any_work(tmp_path, monkeypatch, prepare, words):
     prepare(tmp_path / "run")
@@ -353,7 +355,7 @@ def small_disk(tmp_path):
 
 def test_a_full_disk(small_disk, often, reference, monkeypatch):
     ballast = small_disk / "ballast"
-    ballast.write_bytes(b"\x00" * (1 << 19))
+    ballast.write_bytes(b"\x00" * (900 << 10))  # a chunk of a hundred samples takes some 8 kB
     with pytest.raises(StoreError, match="the disk is full"):
         make_study().run(out=small_disk / "run", workers=1)
     state = StoredRun(small_disk / "run").status()
@@ -382,8 +384,8 @@ def test_a_read_only_disk(small_disk, monkeypatch):
 
 def test_a_version_that_differs_is_said(tmp_path, often, monkeypatch):
     make_study(samples=40).run(out=tmp_path / "run")
-    monkeypatch.setattr(st, "__version__", "99.0")
-    with pytest.warns(UserWarning, match=r"begun with version .*, this is 99\.0"):
+    monkeypatch.setattr(stored_run, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
+    with pytest.warns(UserWarning, match=r"begun with stiction .*, this is stiction 99\.0, numpy"):
         make_study(samples=60).run(out=tmp_path / "run")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -396,7 +398,7 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     alive, most = set(), 0
 
     class Counting:
-        def submit(self, function, plan, point, first, count, mark):
+        def submit(self, function, plan, point, first, count, *marks):
             nonlocal most
             from concurrent.futures import Future
 

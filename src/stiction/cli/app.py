@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from stiction import __version__
+from stiction.cli.common import echo
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
@@ -33,7 +35,7 @@ app = typer.Typer(
 
 def _say_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"stiction {__version__}")
+        echo(f"stiction {__version__}")
         raise typer.Exit
 
 
@@ -54,7 +56,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*args, **kwargs)
         except KeyboardInterrupt:
-            typer.echo("interrupted", err=True)
+            echo("interrupted", err=True)
             raise typer.Exit(130) from None
 
     return wrapped
@@ -77,19 +79,46 @@ for command in (
 
 
 def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-    typer.echo(f"warning: {message}", err=True)
+    echo(f"warning: {message}", err=True)
+
+
+def _of_the_system(error: OSError) -> str:
+    """What the system said, with the file it was about."""
+    where = f"{error.filename}: " if error.filename else ""
+    return f"{where}{error.strerror or error}"
 
 
 def main() -> None:
-    """Entry point: the user's mistakes end with a message and exit code 2, not a traceback."""
+    """Entry point: mistakes and a full disk end with a message, not a traceback.
+
+    Exit code 2 for the user's mistakes; 1 where something went wrong on the way.
+    """
     logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
     warnings.showwarning = _show_warning
     try:
-        app(standalone_mode=True)
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()
     except InputError as error:
         for text in error.problems:
-            typer.echo(f"error: {text}", err=True)
+            echo(f"error: {text}", err=True)
         sys.exit(2)
     except (RunError, TimeoutError) as error:
-        typer.echo(f"error: {error}", err=True)
+        echo(f"error: {error}", err=True)
         sys.exit(1)
+    except MemoryError as error:
+        echo(f"error: there is not enough memory for this: {error}", err=True)
+        sys.exit(1)
+    except OSError as error:
+        echo(f"error: {_of_the_system(error)}", err=True)
+        _drop_output()
+        sys.exit(1)
+
+
+def _drop_output() -> None:
+    """Leave nothing that the interpreter would try to write at its end, to a full disk again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

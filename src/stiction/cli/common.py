@@ -27,8 +27,23 @@ TimeLimit = Annotated[
 ]
 
 
+def echo(text: Any = "", *, err: bool = False) -> None:
+    """Print what may come from a file: nothing in it can steer the terminal.
+
+    Control characters other than line ends and tabs, and what is no valid UTF-8, are written as
+    their escapes.
+    """
+    safe = "".join(
+        char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in str(text)
+    )
+    typer.echo(safe, err=err)
+
+
 def writable(path: Path, what: str) -> Path:
     """Refuse an output that cannot be written before any work is done."""
+    from stiction._checks import as_path
+
+    as_path("--out", path)
     folder = path.absolute().parent
     if path.is_dir():
         raise InputError(f"--out: {path} is a folder; give a file name for {what}")
@@ -41,6 +56,9 @@ def writable(path: Path, what: str) -> Path:
 
 def writable_folder(path: Path) -> Path:
     """A folder for several files, made if need be, or refused before any work is done."""
+    from stiction._checks import as_path
+
+    as_path("--out", path)
     if path.exists() and not path.is_dir():
         raise InputError(f"--out: {path} is a file; give the name of a folder")
     try:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from stiction._progress import Meter, duration
-from stiction.cli.common import StudyFile, writable
+from stiction.cli.common import StudyFile, echo, writable
 from stiction.cli.profile import (
     FillGaps,
     Interpolate,
@@ -76,7 +76,8 @@ def onset(
         interpolate=interpolate,
         fill_gaps=fill_gaps,
     )
-    problem.sample(profile)
+    # Each method refuses, and warns, for itself.
+    problem.sample(profile, accept=("barriers", "overstress", "constant"))
     results: dict[str, Any] = {}
     refused: list[tuple[str, str]] = []
     for one in methods:
@@ -87,7 +88,7 @@ def onset(
             refused.append((one.type, str(error)))
     _print_table(results, problem.load.normal_pressure is not None)
     for name, text in refused:
-        typer.echo(f"{name} does not apply: {text}")
+        echo(f"{name} does not apply: {text}")
     if not results:
         raise typer.Exit(1)
     _print_gaps(results)
@@ -98,7 +99,7 @@ def onset(
             write_onset_figure(
                 problem, profile.values, {n: r for n, (r, _) in results.items()}, out
             )
-        typer.echo(f"figure: {out}")
+        echo(f"figure: {out}")
 
 
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
@@ -152,7 +153,7 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
     widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
     for line in [head, *rows]:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-        typer.echo("  ".join(cells).rstrip())
+        echo("  ".join(cells).rstrip())
 
 
 def _in_gap(result: Any) -> bool:
@@ -168,12 +169,12 @@ def _print_gaps(results: dict[str, Any]) -> None:
     if not spans:
         return
     places = ", ".join(f"{a * 1e3:.4f} to {b * 1e3:.4f} mm" for a, b in spans)
-    typer.echo(
+    echo(
         f"not measured, filled with straight lines: x = {places}; a weaker place there is not seen"
     )
     inside = [name for name, (result, _) in results.items() if _in_gap(result)]
     if inside:
-        typer.echo(
+        echo(
             f"* the onset lies in a gap of the profile ({', '.join(inside)}): the strength there"
             " was filled in, not measured"
         )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from stiction.cli.common import Workers
+from stiction.cli.common import Workers, echo
 
 
 def paper(
@@ -53,4 +53,4 @@ def paper(
         only=only,
         progress=True,
     )
-    typer.echo(f"report: {report}")
+    echo(f"report: {report}")

@@ -9,21 +9,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from stiction._progress import Meter
-from stiction.cli.common import StudyFile, TimeLimit, Workers
+from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, writable_folder
 from stiction.errors import InputError
 
 Event = Literal["critical_stress", "first_instability"]
-
-
-def _folder(path: Path) -> Path:
-    """Make the folder before any work is done, or say why that cannot be."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        (path / ".writable").touch()
-        (path / ".writable").unlink()
-    except OSError as error:
-        raise InputError(f"--out: {path} cannot be written: {error.strerror}") from None
-    return path
 
 
 def _one_interface(study: Any, path: Path) -> None:
@@ -42,14 +31,14 @@ def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
     """Print an answer for the interface as a whole and, where it differs, for its first patch."""
     whole, first = answers["critical_stress"], answers.get("first_instability")
     if first is None:
-        typer.echo(str(whole))
+        echo(str(whole))
         return
     if f"{value(first):.3g}" == f"{value(whole):.3g}":
-        typer.echo(f"{whole}\n  to three digits the same for the first instability")
+        echo(f"{whole}\n  to three digits the same for the first instability")
         return
-    typer.echo(f"as a whole:        {whole}")
-    typer.echo(f"first instability: {first}")
-    typer.echo(
+    echo(f"as a whole:        {whole}")
+    echo(f"first instability: {first}")
+    echo(
         "  the first patch runs away, arrested or not, before the interface lets go as a whole or"
         " just then:\n  the first instability is the conservative answer"
     )
@@ -105,6 +94,8 @@ def reliability(
     from stiction.reliability.result import bounded
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
+    from stiction.report.style import save_figure
+    from stiction.stored_run import write_result
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
@@ -121,12 +112,12 @@ def reliability(
     mistakes += [] if probability is None else check_probability("--probability", probability)
     if mistakes:
         raise InputError(mistakes)
-    _folder(out)
+    writable_folder(out)
 
     def save(figure: Any, name: str) -> None:
         with Meter(f"drawing {name}"):
             for ending in ("png", "pdf"):
-                figure.savefig(out / f"{name}.{ending}")
+                save_figure(figure, out / f"{name}.{ending}")
 
     curve = failure_curve(
         problem,
@@ -139,9 +130,7 @@ def reliability(
         event=event,
         **others,
     )
-    aside = out / "failure_curve.nc.part"
-    curve.to_netcdf(aside)
-    aside.replace(out / "failure_curve.nc")
+    write_result(curve, out / "failure_curve.nc")
     table = figures.curve_table(curve)
     table.write_csv(out)
     save(figures.curve_figure(curve), "failure_curve")
@@ -151,12 +140,10 @@ def reliability(
     widths = [max(len(row[i]) for row in cells) for i in range(len(table.columns))]
     for row in cells:
         line = "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        typer.echo(line)
+        echo(line)
     lowest = curve.attrs["lower_bound"]
     bound = f"bound {lowest:.7g} Pa; " if bounded(lowest) else ""
-    typer.echo(
-        f"{bound}{curve.attrs['evaluations']} evaluations; {method.label}, {curve.attrs['event']}"
-    )
+    echo(f"{bound}{curve.attrs['evaluations']} evaluations; {method.label}, {curve.attrs['event']}")
     if stress is not None:
         probabilities = {
             event: failure_probability(
@@ -166,7 +153,7 @@ def reliability(
         }
         _both(probabilities, lambda answer: answer.probability)
         found = probabilities["critical_stress"]
-        typer.echo(f"  {found.algorithm}: {found.reason}")
+        echo(f"  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
             spot = figures.weak_spot_figure(
                 found.failing_profiles, problem.nucleation_length, stress
@@ -200,4 +187,4 @@ def reliability(
         )
         figures.tail_table(several).write_csv(out)
         save(figures.tail_figure(several), "failure_tails")
-    typer.echo(f"written to {out}")
+    echo(f"written to {out}")

@@ -8,45 +8,54 @@ from typing import Annotated
 import typer
 
 from stiction._progress import Meter, duration
-from stiction.cli.common import RunPath, size, writable, writable_folder
+from stiction.cli.common import RunPath, echo, size, writable, writable_folder
 
 SHOWN = 20
 
 
-def status(run: RunPath) -> None:
-    """Say how far a run is, which samples failed and which chunks are damaged.
-
-    Every chunk is read and compared with its checksum.
-    """
+def status(
+    run: RunPath,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Read everything and compare it with its checksums; else whether chunks are"
+            " there in their sizes.",
+        ),
+    ] = False,
+) -> None:
+    """Say how far a run is, which samples failed and which chunks are damaged."""
     from stiction.stored_run import StoredRun
     from stiction.study.sweep import name_point
 
     stored = StoredRun(run)
     with Meter(f"checking {run}"):
-        state, study = stored.status(), stored.study
+        state, study = stored.status(verify=verify), stored.study
     share = 100.0 * state.done / state.samples
-    typer.echo(f"{run}" + (f": {study.title}" if study.title else ""))
-    typer.echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
-    typer.echo(f"  chunks    {state.chunks}, {size(state.bytes)}")
+    echo(f"{run}" + (f": {' '.join(study.title.split())}" if study.title else ""))
+    echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
+    echo(f"  chunks    {state.chunks}, {size(state.bytes)}")
     if state.seconds:
-        typer.echo(f"  computed  {duration(state.seconds)} of one core")
+        echo(f"  computed  {duration(state.seconds)} of one core")
     if state.active:
-        typer.echo("  a run is writing to it now")
+        echo("  a run is writing to it now")
     if study.sweep and not state.complete:
         open_points = [
             p for p in study.points if state.done_by_point[p.number] < (study.ensemble.samples)
         ]
         for point in open_points[:SHOWN]:
             done = state.done_by_point[point.number]
-            typer.echo(f"  {name_point(point)}: {done} of {study.ensemble.samples}")
+            echo(f"  {name_point(point)}: {done} of {study.ensemble.samples}")
         if len(open_points) > SHOWN:
-            typer.echo(f"  and {len(open_points) - SHOWN} more points that are not complete")
-    for file in state.damaged[:SHOWN]:
-        typer.echo(f"  damaged   {file}: running the study again computes it again")
+            echo(f"  and {len(open_points) - SHOWN} more points that are not complete")
+    for text in state.damaged[:SHOWN]:
+        echo(f"  damaged   {text}; running the study again computes it again")
+    if state.verified and not state.damaged:
+        echo("  verified  everything that is stored is what was written")
     if state.failures:
-        typer.echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
+        echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
         for failure in state.failures[:SHOWN]:
-            typer.echo(f"    {failure}")
+            echo(f"    {failure}")
 
 
 def export(
@@ -77,8 +86,8 @@ def export(
         state = stored.status()
     missing = state.samples - state.done
     if missing:
-        typer.echo(f"warning: {missing} of {state.samples} samples are missing (NaN)", err=True)
-    typer.echo(f"{state.done} samples written to {out}")
+        echo(f"warning: {missing} of {state.samples} samples are missing (NaN)", err=True)
+    echo(f"{state.done} samples written to {out}")
 
 
 def plot(
@@ -96,7 +105,7 @@ def plot(
     with Meter("drawing the figures"):
         paths = list(write_figures(stored, folder))
     for path in paths:
-        typer.echo(str(path))
+        echo(str(path))
 
 
 def report(
@@ -113,7 +122,7 @@ def report(
     path = writable(out or _beside(run, "report.html"), "the report")
     with Meter("writing the report"):
         write_report(stored, path)
-    typer.echo(f"report: {path}")
+    echo(f"report: {path}")
 
 
 def _beside(run: Path, name: str) -> Path:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from stiction._progress import Meter
-from stiction.cli.common import StudyFile, writable_folder
+from stiction.cli.common import StudyFile, echo, writable_folder
 from stiction.cli.profile import (
     FillGaps,
     Interpolate,
@@ -18,6 +19,11 @@ from stiction.cli.profile import (
     XUnit,
     profile_of,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from stiction.problem import Problem
 
 
 def rupture(
@@ -38,7 +44,9 @@ def rupture(
     loading_rate: Annotated[
         float, typer.Option(help="Pa/s, unless the study's method is a rupture.")
     ] = 2e7,
-    film: Annotated[bool, typer.Option("--film", help="Also a film, rupture.gif.")] = False,
+    film: Annotated[
+        bool, typer.Option("--film", help="Also a film: rupture.gif, and .mp4 if there is ffmpeg.")
+    ] = False,
     every: Annotated[int, typer.Option(help="Explicit steps between frames kept.")] = 5,
     unit: Unit = None,
     x_unit: XUnit = None,
@@ -47,16 +55,24 @@ def rupture(
     interpolate: Interpolate = False,
     fill_gaps: FillGaps = False,
 ) -> None:
-    """Simulate one interface from its first slip to global sliding.
+    """Simulate one interface from its first slip to global sliding, or as far as the study says.
 
     Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
     Writes `rupture.nc` (slip, slip rate and stress over time and x), `rupture.png` and `.pdf`
     (slip rate in space and time, load, strength), `front.png` and `.pdf` (where the rupture front
-    is and how fast), and with --film an animation.
+    is and how fast), and with --film an animation. Speeds of the front are apparent: the distance
+    between nodes over the time between their weakening.
     """
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
-    from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
+    from stiction.report.rupture_figures import (
+        can_write_mp4,
+        front_figure,
+        rupture_figure,
+        rupture_film,
+    )
+    from stiction.report.style import save_figure
+    from stiction.stored_run import write_result
     from stiction.study.study import Study, read_setup
 
     writable_folder(out)
@@ -80,22 +96,54 @@ def rupture(
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
     result = simulate_rupture(problem, profiles, method=method, every=every)
-    result.to_netcdf(out / "rupture.nc")
-    typer.echo(
-        f"critical stress {float(result.critical_stress) * 1e-6:.6f} MPa,"
-        f" kinetic stress {round(float(result.kinetic_stress) * 1e-6, 6) + 0.0:.6f} MPa\n"
-        f"onset at x = {float(result.critical_position) * 1e3:.3f} mm after"
-        f" {float(result.onset_time):.5g} s; fastest front {float(result.rupture_speed):.0f} m/s"
-        f" (c_R {problem.solid.rayleigh_wave_speed:.0f}, c_s {problem.solid.shear_wave_speed:.0f},"
-        f" c_d {problem.solid.dilatational_wave_speed:.0f}); ended by: {result.attrs['stopped']}"
-    )
+    write_result(result, out / "rupture.nc")
+    echo(_summary(result, problem))
     with Meter("drawing the figures"):
         for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
             figure = draw(result, problem)
             for ending in ("png", "pdf"):
-                figure.savefig(out / f"{name}.{ending}")
+                save_figure(figure, out / f"{name}.{ending}")
     if film:
         with Meter("drawing the film"):
-            path = rupture_film(result, problem, out / "rupture.gif")
-        typer.echo(f"film: {path}")
-    typer.echo(f"written to {out}")
+            echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+            if can_write_mp4():
+                echo(f"film: {rupture_film(result, problem, out / 'rupture.mp4')}")
+            else:
+                echo("no rupture.mp4: the program ffmpeg was not found")
+    echo(f"written to {out}")
+
+
+def _megapascals(stress: Any) -> str:
+    # Rounded first, and without the sign of a zero.
+    return f"{round(float(stress) * 1e-6, 6) + 0.0:.6f} MPa"
+
+
+def _summary(result: xr.Dataset, problem: Problem) -> str:
+    """What the run amounts to, in lines; what is not known at its end is left out."""
+    solid = problem.solid
+    loads = f"critical stress {_megapascals(result.critical_stress)}"
+    if np.isfinite(result.kinetic_stress):
+        loads += (
+            f", kinetic stress {_megapascals(result.kinetic_stress)},"
+            f" stress drop {_megapascals(result.stress_drop)}"
+        )
+    lines = [
+        loads,
+        f"onset at x = {float(result.critical_position) * 1e3:.3f} mm after"
+        f" {float(result.onset_time):.5g} s",
+    ]
+    if np.isfinite(result.median_rupture_speed):
+        lines.append(
+            f"front speed {float(result.median_rupture_speed):.0f} m/s (median;"
+            f" c_R {solid.rayleigh_wave_speed:.0f}, c_s {solid.shear_wave_speed:.0f},"
+            f" c_d {solid.dilatational_wave_speed:.0f})"
+        )
+    if np.isfinite(result.rupture_speed):
+        fastest = float(result.rupture_speed)
+        text = f"largest apparent speed over 2 h_n {fastest:.0f} m/s"
+        if fastest > solid.dilatational_wave_speed:
+            text += ": above c_d, because patches ahead of the front slip before it comes"
+        lines.append(text)
+    energy = float(result.radiated_energy[-1])
+    lines.append(f"radiated energy {energy:.4g} J/m; ended by: {result.attrs['stopped']}")
+    return "\n".join(lines)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from stiction._progress import Meter, duration
-from stiction.cli.common import StudyFile, TimeLimit, Workers, size, summary
+from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, size, summary
 from stiction.errors import InputError
 
 SHOWN = 12
@@ -59,6 +59,13 @@ def run(
         bool, typer.Option("--retry", help="Compute stored samples that failed again.")
     ] = False,
     time_limit: TimeLimit = None,
+    no_lock: Annotated[
+        bool,
+        typer.Option(
+            "--no-lock",
+            help="For file systems without locks: do not keep other runs out of RUN.",
+        ),
+    ] = False,
 ) -> None:
     """Run the study of a file, or what is missing of it.
 
@@ -69,6 +76,7 @@ def run(
     Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
     or the command; 3: the time limit was reached; 130: interrupted.
     """
+    from stiction._checks import as_path
     from stiction.stored_run import StoredRun, check_target, run_into
     from stiction.study.study import Study
 
@@ -76,7 +84,7 @@ def run(
         raise InputError("--workers, --scheduler, --slurm: give one of them")
     loaded = Study.from_toml(study)
     loaded.to_dict()
-    check_target(out)
+    check_target(as_path("--out", out))
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
@@ -86,6 +94,7 @@ def run(
                 executor=executor,
                 retry=retry,
                 time_limit=time_limit,
+                lock=not no_lock,
             )
     except KeyboardInterrupt:
         try:
@@ -93,19 +102,20 @@ def run(
             done = f"{state.done} of {state.samples} samples are stored in {out}"
         except RuntimeError:
             done = "nothing is stored yet"
-        typer.echo(f"interrupted: {done}; the same command goes on", err=True)
+        echo(f"interrupted: {done}; the same command goes on", err=True)
         raise typer.Exit(130) from None
     names = ["critical_stress", "friction_coefficient"]
     result = stored.dataset(only=names)
     _show_results(loaded, result)
     if "cut_short" in result.attrs:
         text = f"time limit reached: {result.attrs['cut_short']}, stored in {out}"
-        typer.echo(f"{text}; the same command goes on", err=True)
+        echo(f"{text}; the same command goes on", err=True)
         raise typer.Exit(3)
-    samples = len(loaded.plans) * loaded.ensemble.samples
-    typer.echo(f"{samples - len(stored.failures)} samples in {out}")
-    if stored.failures:
-        _show_failures(stored.failures, f"stiction run {study} --out {out} --retry")
+    state = stored.status()
+    echo(f"{state.done} samples in {out}")
+    if state.failures:
+        _show_failures(state.failures, f"stiction run {study} --out {out} --retry")
+    if not state.complete:
         raise typer.Exit(1)
 
 
@@ -118,26 +128,26 @@ def _executor(study: Any, scheduler: str | None, slurm: bool) -> Any:
 
 
 def _show_failures(failures: Any, command: str) -> None:
-    typer.echo(f"{len(failures)} samples failed:", err=True)
+    echo(f"{len(failures)} samples failed:", err=True)
     for failure in failures[:SHOWN]:
-        typer.echo(f"  {failure}", err=True)
+        echo(f"  {failure}", err=True)
     if len(failures) > SHOWN:
-        typer.echo(f"  and {len(failures) - SHOWN} more", err=True)
-    typer.echo(f"compute them again with: {command}", err=True)
+        echo(f"  and {len(failures) - SHOWN} more", err=True)
+    echo(f"compute them again with: {command}", err=True)
 
 
 def _show_results(study: Any, result: Any) -> None:
     from stiction.study.sweep import name_point
 
     if not study.sweep:
-        typer.echo(summary(result))
+        echo(summary(result))
         return
     dims = [axis.dim for axis in study.axes]
     flat = result.stack(point=dims)
     for point in study.points[:SHOWN]:
-        typer.echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
+        echo(f"{name_point(point)}:\n  " + summary(flat.isel(point=point.number)))
     if len(study.points) > SHOWN:
-        typer.echo(f"and {len(study.points) - SHOWN} more points")
+        echo(f"and {len(study.points) - SHOWN} more points")
 
 
 def check(
@@ -150,14 +160,14 @@ def check(
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
-    typer.echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
+    echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     for name, text in _description(loaded):
-        typer.echo(f"  {name:20s} {text}")
+        echo(f"  {name:20s} {text}")
     if probe:
         with Meter("timing a few samples"):
             cost = _cost(loaded)
         for name, text in cost:
-            typer.echo(f"  {name:20s} {text}")
+            echo(f"  {name:20s} {text}")
 
 
 def _description(study: Any) -> list[tuple[str, str]]:
@@ -234,4 +244,4 @@ def schema() -> None:
     """Print the JSON schema of a study file, for editors that complete and check TOML."""
     from stiction.study.study import study_schema
 
-    typer.echo(json.dumps(study_schema(), indent=2))
+    echo(json.dumps(study_schema(), indent=2))

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stiction._checks import check_choice, check_instance
 from stiction._typing import Array
 from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.grid_weights import grid_weights, transform
@@ -19,8 +20,7 @@ Weights = Literal["exact", "rounded"]
 
 def weight_of(weights: Weights) -> Weight:
     """The exact weight or the printed, rounded one."""
-    if weights not in ("exact", "rounded"):
-        raise InputError(f"weights: must be 'exact' or 'rounded', got {weights!r}")
+    check_choice("weights", weights, ("exact", "rounded"))
     return exact_weight() if weights == "exact" else rounded_weight()
 
 
@@ -100,6 +100,7 @@ def nucleation_stress(problem: Problem, tau_p: Any, *, weights: Weights = "exact
         If the profile does not fit the problem, the weakening rate varies along the interface, or
         h_n is longer than the interface.
     """
+    check_instance("problem", problem, Problem)
     rows = problem.sample(tau_p)
     if problem.friction.weakening_rate is None:
         rate = float(uniform_rates(rows)[0])

@@ -14,7 +14,7 @@ from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 
-FORMAT = 2
+FORMAT = 3
 
 _NAMES = {
     "nodes": "number of nodes",
@@ -40,7 +40,8 @@ def identity(run: Run) -> dict[str, NDArray[Any]]:
     medium, rows = run.medium, run.rows
     # When to stop may differ between the parts of one run; how to step may not.
     control = run.control.copy()
-    control[[monitor.SLID_STOP, monitor.DROP_STOP, monitor.END_TIME]] = 0.0
+    stops = [monitor.SLID_STOP, monitor.EVENT_STOP, monitor.REST_STOP, monitor.END_TIME]
+    control[stops] = 0.0
     values: dict[str, Any] = {
         "nodes": medium.nodes,
         "spacing": medium.spacing,

@@ -16,7 +16,9 @@ from stiction.problem import Problem
 
 Floats = NDArray[np.float64]
 
-LARGEST_POISSON_RATIO = 0.49
+LARGEST_RATIO = 7.15  # of c_d to c_s: nu = 0.49 in plane strain
+SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
+STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,6 +42,8 @@ class Medium:
         G*|k|/2 and G|k|/2, Pa/m.
     table, gain, fresh : arrays
         Of the explicit step, see `layout.step_table`.
+    shear_modulus, effective_modulus : float
+        G and G*, Pa.
     """
 
     nodes: int
@@ -54,6 +58,7 @@ class Medium:
     gain: Floats
     fresh: Floats
     shear_modulus: float
+    effective_modulus: float
 
 
 def prepare_medium(
@@ -66,16 +71,25 @@ def prepare_medium(
 ) -> Medium:
     """Tables for a problem; raises `InputError` if the step is above the stability limit."""
     solid, interface, mode = problem.solid, problem.interface, problem.mode
-    if mode == "II" and not 0.0 <= solid.poisson_ratio <= LARGEST_POISSON_RATIO:
+    if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
+        valid = (
+            "nu <= 0.49 in plane strain (the dilatational wave becomes infinitely fast at 0.5)"
+            if solid.plane == "strain"
+            else "nu >= -0.99 in plane stress (the solid loses its stiffness at -1)"
+        )
         raise InputError(
-            f"solid.poisson_ratio: elastodynamics in mode II needs 0 <= nu <= "
-            f"{LARGEST_POISSON_RATIO} (the dilatational wave becomes infinitely fast at 0.5), "
-            f"got {solid.poisson_ratio}"
+            f"solid.poisson_ratio: elastodynamics in mode II needs {valid}, got "
+            f"{solid.poisson_ratio}"
         )
     eta = solid.wave_speed_ratio
     kernel = kernel_sum(mode, eta, tolerance, memory_range)
     speed = solid.shear_wave_speed
     limit = courant_limit(mode, eta, kernel) * interface.spacing / speed
+    if limit == 0.0:
+        raise InputError(
+            f"kernel_tolerance: with an error of {kernel.error:.2g} in the memory kernel waves grow"
+            f" at any time step; got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
+        )
     step = courant * limit if time_step is None else time_step
     if step > limit:
         raise InputError(
@@ -102,4 +116,5 @@ def prepare_medium(
         gain=gain,
         fresh=fresh,
         shear_modulus=solid.shear_modulus,
+        effective_modulus=problem.effective_modulus,
     )

@@ -16,14 +16,14 @@ def fracture_energy(slip: Floats, strength: Floats, residual: Floats, weakening:
     slip : (..., nodes) array
         m.
     strength, residual, weakening : (nodes,) arrays
-        tau_p, tau_r (Pa), W (Pa/m).
+        tau_p (infinite where nothing breaks), tau_r (Pa), W (Pa/m).
 
     Returns
     -------
     (..., nodes) array
         (tau_p - tau_r) d - W d^2/2 up to d_c, then Gamma = (tau_p - tau_r)^2/(2 W).
     """
-    excess = strength - residual
+    excess = np.where(np.isfinite(strength), strength - residual, 0.0)
     weakened = np.minimum(slip, excess / weakening)
     energy: Floats = weakened * (excess - 0.5 * weakening * weakened)
     return energy

@@ -8,17 +8,25 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory_layout import advance_memory, pack
 from stiction.dynamics.monitor import (
     ALL_SLID,
+    AT_REST,
     BAD_NODE,
+    BREAKABLE,
     CALM_COUNT,
-    CALM_RATE,
+    CALM_SLIP,
     CALM_STEPS,
+    CALM_STRESS,
+    CALM_TOP,
     DONE,
-    DROP_STOP,
     DROPPED,
+    EVENT_DROP,
+    EVENT_STOP,
+    EXPLICIT_ONLY,
     EXPLICIT_STEPS,
+    FIRST_STRESS,
     KINETIC,
     LOAD,
     NOT_FINITE,
@@ -29,29 +37,19 @@ from stiction.dynamics.monitor import (
     REC_TIME,
     REC_TOP_RATE,
     REC_WORK,
+    REST_STOP,
     SLID,
     SLID_STOP,
+    STEADY_STRESS,
     STEP,
     TIME,
     TO_IMPLICIT,
     TOP_RATE,
     WORK,
     observe,
+    settle,
 )
-
-
-@jit
-def load_at(times: Array, values: Array, t: float) -> Any:
-    """Piecewise linear load history, continued beyond its last point with its last slope."""
-    low, high = 0, times.size - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if times[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    slope = (values[high] - values[low]) / (times[high] - times[low])
-    return values[low] + slope * (t - times[low])
+from stiction.dynamics.scale import follow_scale
 
 
 @jit
@@ -96,6 +94,8 @@ def explicit_steps(
     rows: Array,
     load_times: Array,
     load_values: Array,
+    scale_loads: Array,
+    scales: Array,
     control: Array,
     record: Array,
 ) -> Any:
@@ -114,6 +114,8 @@ def explicit_steps(
         Z = G/(2 c_s) (Pa s/m), dx (m), <p>, <tau_i>.
     rows : (6, nodes) array
         tau_p, tau_r, W, d_c, p, tau_i.
+    scale_loads, scales : arrays
+        Stress scale against the load, Pa.
     control : array
         Thresholds, see `track`.
     record : (>= count, columns) array, or with no rows to keep nothing.
@@ -168,7 +170,8 @@ def explicit_steps(
         for i in range(n):
             if guess[i] > top:
                 top, node = guess[i], i
-            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+            # d_c = 0 where nothing weakens: there the first slip counts.
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
                 increment = 0.5 * step * (rate[i] + guess[i])
                 past = slip[i] - 0.5 * critical[i]
                 arrival[i] = time - step * min(1.0, past / max(increment, 1e-300))
@@ -183,9 +186,11 @@ def explicit_steps(
         watch[WORK] += work * spacing
         watch[EXPLICIT_STEPS] += 1.0
         watch[STEP] = step
+        rise = abs(load - load_before)
         load_before = load
+        scale = follow_scale(watch, control, scale_loads, scales, load)
         fall = observe(watch, time, load, mean_stress, radiated, node)
-        if slid == n and watch[KINETIC] == -np.inf:
+        if slid >= control[BREAKABLE] and watch[KINETIC] == -np.inf:
             watch[KINETIC] = mean_stress
         if keep:
             record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
@@ -197,9 +202,19 @@ def explicit_steps(
             record[taken, REC_STEP], record[taken, REC_WORK] = step, watch[WORK]
         if slid >= control[SLID_STOP]:
             return taken + 1, ALL_SLID
-        if fall > control[DROP_STOP]:
+        if control[EVENT_STOP] > 0.0 and fall > watch[EVENT_DROP]:
             return taken + 1, DROPPED
-        watch[CALM_STEPS] = watch[CALM_STEPS] + 1.0 if top < control[CALM_RATE] else 0.0
+        # Waves make slip rates come and go; creep is slow, or as fast as it was.
+        quiet = top < control[CALM_STRESS] * scale / impedance + control[CALM_SLIP] * rise / step
+        steady = 0.5 * watch[CALM_TOP] <= top <= 2.0 * watch[CALM_TOP]
+        if quiet or (steady and top < control[STEADY_STRESS] * scale / impedance):
+            watch[CALM_STEPS] += 1.0
+        else:
+            watch[CALM_STEPS], watch[CALM_TOP] = 0.0, top
         if watch[CALM_STEPS] >= control[CALM_COUNT]:
-            return taken + 1, TO_IMPLICIT
+            settle(watch, mean_stress, radiated)
+            if control[REST_STOP] > 0.0 and watch[FIRST_STRESS] > -np.inf:
+                return taken + 1, AT_REST
+            if not control[EXPLICIT_ONLY] > 0.0:
+                return taken + 1, TO_IMPLICIT
     return count, DONE

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._checks import as_names
 from stiction.dynamics import monitor
 from stiction.dynamics.energies import fracture_energy, strain_energy
 from stiction.dynamics.integrator import Run, State
@@ -50,11 +51,8 @@ TIME = Variable("s", "time from zero load", ("time",))
 
 def check_variables(names: Sequence[str]) -> None:
     """Refuse unknown names of fields."""
-    if isinstance(names, str) or not isinstance(names, Collection):
-        raise InputError(f"variables: must be a list of names, got {names!r}")
-    problems = [
-        unknown_name("variables", str(name), FIELDS) for name in names if name not in FIELDS
-    ]
+    known = as_names("variables", names)
+    problems = [unknown_name("variables", name, FIELDS) for name in known if name not in FIELDS]
     if problems:
         raise InputError(problems)
 

@@ -9,14 +9,16 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.dynamics.complementarity import solve_increment
-from stiction.dynamics.explicit import load_at
+from stiction.dynamics.loading import load_at
 from stiction.dynamics.monitor import (
     ALL_SLID,
     BAD_NODE,
+    BREAKABLE,
     DONE,
-    DROP_STOP,
     DROPPED,
     END_TIME,
+    EVENT_DROP,
+    EVENT_STOP,
     GROWTH,
     IMPLICIT_STEPS,
     KINETIC,
@@ -37,10 +39,13 @@ from stiction.dynamics.monitor import (
     REC_WORK,
     REJECTED_STEPS,
     RESIDUAL,
+    SCALE,
     SLID,
     SLID_STOP,
     SLIP_STEP,
+    SMALL_DROP,
     SMALLEST_STEP,
+    STEADY_STRESS,
     STEP,
     TIME,
     TO_EXPLICIT,
@@ -48,6 +53,9 @@ from stiction.dynamics.monitor import (
     WORK,
     observe,
 )
+from stiction.dynamics.scale import follow_scale
+
+_ROUND_OFF = 1e-14  # of the largest stress: what a few transforms leave, ten times over
 
 
 @jit
@@ -155,6 +163,8 @@ def implicit_steps(
     load_times: Array,
     load_values: Array,
     turns: Any,
+    scale_loads: Array,
+    scales: Array,
     control: Array,
     record: Array,
 ) -> Any:
@@ -167,8 +177,9 @@ def implicit_steps(
     `turns` are the times at which the load begins to fall or to rise again, s.
     Sizes are multiplied or divided by powers of sqrt 2, so that tables are reused while the size
     stays. A step is repeated at half the size if no slip increments are found (negative
-    curvature: the patches are unstable at this size), a node slips too much, or the interface
-    accelerates too much for the load at onset to be accurate.
+    curvature: the patches are unstable at this size), a node weakens too much, or the interface
+    accelerates too much for the load at onset to be accurate. Creep of nodes at their residual
+    strength does not count, nor the weakening of nodes that weaken by next to nothing.
     """
     n = slip.size
     modes = pace.size
@@ -180,6 +191,8 @@ def implicit_steps(
     symbol, inverse = np.empty(modes + 1), np.empty(modes + 1)
     state = np.zeros(n, np.int64)
     profile, initial, critical = rows[4], rows[5], rows[3]
+    weakening = rows[2]
+    breakable = int(control[BREAKABLE])
     root = np.sqrt(2.0)
     tabulated, paired = -1.0, -1.0
     taken = 0
@@ -188,7 +201,8 @@ def implicit_steps(
         size = step
         while True:
             rise = load_at(load_times, load_values, watch[TIME] + size) - watch[LOAD]
-            if size <= control[SMALLEST_STEP] or abs(rise) <= control[LOAD_STEP]:
+            small = control[LOAD_STEP] * watch[SCALE]
+            if size <= control[SMALLEST_STEP] or abs(rise) <= small:
                 break
             size /= root
             step = size
@@ -231,15 +245,26 @@ def implicit_steps(
             )
         pushed = np.fft.irfft(pushed_hat, n)
         u = np.empty(n)
+        level = 0.0
         for i in range(n):
             pushed[i] += load * profile[i] + initial[i]
+            level = max(level, abs(pushed[i]))
             u[i] = past[i] * size
             state[i] = 1 if rate[i] > 0.0 else 0
-        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, control[RESIDUAL])
+        scale = watch[SCALE]
+        # Round-off of the transforms bounds what can be asked for.
+        accuracy = max(control[RESIDUAL] * scale, _ROUND_OFF * level)
+        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, accuracy)
         largest, total = 0.0, 0.0
         if solved:
+            least = control[SMALL_DROP] * scale
+            creep = control[STEADY_STRESS] * scale * size / impedance
             for i in range(n):
-                largest = max(largest, u[i] / critical[i])
+                if slip[i] < critical[i] and u[i] > 0.0:
+                    lost = weakening[i] * min(u[i], critical[i] - slip[i])
+                    largest = max(largest, lost / max(weakening[i] * critical[i], least))
+                elif u[i] > creep and critical[i] > 0.0:
+                    largest = max(largest, u[i] / critical[i])
                 total += u[i]
             if not np.isfinite(total):
                 watch[BAD_NODE] = 0.0
@@ -250,10 +275,9 @@ def implicit_steps(
         radiated *= impedance / n
         before = watch[RADIATED]
         # A step that raises the load by next to nothing cannot put the onset wrong.
-        matters = abs(load - watch[LOAD]) > control[NEGLIGIBLE]
-        racing = radiated > control[NOTICED] and radiated > control[GROWTH] * max(
-            before, control[NOTICED]
-        )
+        matters = abs(load - watch[LOAD]) > control[NEGLIGIBLE] * scale
+        noticed = control[NOTICED] * scale
+        racing = radiated > noticed and radiated > control[GROWTH] * max(before, noticed)
         # At the smallest size, waves of an arrested event alone do not call for explicit steps.
         shorter = 0.5 * size >= control[SMALLEST_STEP] or largest > 0.1 * control[SLIP_STEP]
         racing = racing and matters and shorter and share > 0.0
@@ -287,7 +311,7 @@ def implicit_steps(
                 slid += 1
             if rate[i] > top:
                 top, node = rate[i], i
-            if np.isnan(arrival[i]) and slip[i] >= 0.5 * critical[i]:
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
                 beyond = slip[i] - 0.5 * critical[i]
                 arrival[i] = time - size * min(1.0, beyond / max(u[i], 1e-300))
         mean_stress = medium[3] + load * medium[2] - radiated
@@ -296,8 +320,9 @@ def implicit_steps(
         watch[IMPLICIT_STEPS] += 1.0
         watch[STEP] = watch[PAST_STEP] = size
         watch[RADIATED] = radiated
+        follow_scale(watch, control, scale_loads, scales, load)
         fall = observe(watch, time, load, mean_stress, radiated, node)
-        if slid == n and watch[KINETIC] == -np.inf:
+        if slid >= breakable and watch[KINETIC] == -np.inf:
             watch[KINETIC] = mean_stress
         if record.shape[0] > 0:
             record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
@@ -310,13 +335,13 @@ def implicit_steps(
         taken += 1
         if slid >= control[SLID_STOP]:
             return taken, step, ALL_SLID
-        if fall > control[DROP_STOP]:
+        if control[EVENT_STOP] > 0.0 and fall > watch[EVENT_DROP]:
             return taken, step, DROPPED
         if last or watch[TIME] >= control[END_TIME]:
             return taken, step, DONE
         if clipped:
             continue
-        growing = radiated > control[NOTICED] and radiated > np.sqrt(control[GROWTH]) * before
+        growing = radiated > noticed and radiated > np.sqrt(control[GROWTH]) * before
         if largest > control[SLIP_STEP]:
             step = size / root
         elif largest < 0.25 * control[SLIP_STEP] and not growing:

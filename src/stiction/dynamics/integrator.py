@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from stiction.dynamics import monitor
 from stiction.dynamics.discretization import Medium
-from stiction.dynamics.explicit import explicit_steps, load_at
+from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import implicit_steps
-from stiction.dynamics.loading import History
+from stiction.dynamics.loading import History, load_at
 from stiction.dynamics.memory_layout import LANES, blocks, carry_memory, scale_memory
+from stiction.dynamics.scale import follow_scale, stress_scale
 
 Floats = NDArray[np.float64]
+
+_OVERSTRESSED = 1e-6  # of the stress scale: above the strength by so much, slip begins with waves
 
 NOTHING = np.empty((0, monitor.COLUMNS))
 
@@ -86,9 +89,15 @@ class Run:
     Attributes
     ----------
     rows : (6, nodes) array
-        tau_p, tau_r, W, d_c, p, tau_i.
+        tau_p (infinite where nothing breaks), tau_r, W, d_c, p, tau_i.
     constants : (4,) array
         Z, dx, <p>, <tau_i>.
+    steepest_rate : float
+        Largest weakening rate of nodes that may break, Pa/m.
+    least_load : float
+        Load below which nothing runs away: the mean strength of the weakest nodes that make up
+        half a nucleation length, Pa. A few nodes of next to no strength do not count, nor do
+        nodes that do not weaken.
     """
 
     medium: Medium
@@ -96,6 +105,8 @@ class Run:
     constants: Floats
     history: History
     control: Floats
+    steepest_rate: float
+    least_load: float
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Static stress of a slip at a load, Pa: what an interface at rest carries."""
@@ -104,8 +115,25 @@ class Run:
         shared: Floats = np.fft.irfft(stress_hat, self.medium.nodes)
         return shared + load * self.rows[4] + self.rows[5]
 
+    def scale_at(self, load: float) -> float:
+        """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
+        return float(load_at(*self.scale, max(load, self.least_load)))
+
+    @functools.cached_property
+    def first_load(self) -> float:
+        """Load at which the first node reaches its strength, if nothing has slipped, Pa."""
+        return float(np.min((self.rows[0] - self.rows[5]) / self.rows[4]))
+
+    @functools.cached_property
+    def scale(self) -> History:
+        """Stress scale against the load, Pa, see `stress_scale`."""
+        return stress_scale(self.rows)
+
     def start(self, time: float, slip: Floats | None = None) -> State:
-        """State of rest (or of an equilibrium with this slip) at a time, with an empty memory."""
+        """State of rest (or of an equilibrium with this slip) at a time, with an empty memory.
+
+        Where the stress is above the strength by more than round-off, explicit steps come first.
+        """
         n, pairs = self.medium.nodes, self.medium.kernel.poles.size
         count = blocks(n)
         delta = np.zeros(n) if slip is None else np.array(slip, dtype=np.float64)
@@ -126,14 +154,13 @@ class Run:
         watch[monitor.PEAK_NODE] = int(np.argmax(stress - limit))
         watch[monitor.FIRST_STRESS] = watch[monitor.KINETIC] = -np.inf  # not yet
         watch[monitor.BAD_NODE] = -1.0
-        watch[monitor.EVENT_DROP] = self.control[monitor.EVENT_DROP_SIZE]
-        watch[monitor.PEAK_WIDTH] = self.control[monitor.PEAK_WIDTH_SIZE]
+        scale = follow_scale(watch, self.control, *self.scale, max(load, self.least_load))
         watch[monitor.TOP_RATE] = rate.max()
         watch[monitor.SLID] = np.count_nonzero(delta >= self.rows[3])
-        arrival = np.where(delta >= 0.5 * self.rows[3], time, np.nan)
+        arrival = np.where((delta > 0.0) & (delta >= 0.5 * self.rows[3]), time, np.nan)
         size = self.control[monitor.SMALLEST_STEP]
         slope = self.slope(time)
-        first = 0.1 * self.control[monitor.LOAD_STEP] / slope if slope > 0.0 else size
+        first = 0.1 * self.control[monitor.LOAD_STEP] * scale / slope if slope > 0.0 else size
         return State(
             slip=delta,
             rate=rate,
@@ -144,7 +171,10 @@ class Run:
             carried=np.zeros(count * 2 * LANES),
             arrival=arrival,
             watch=watch,
-            explicit=bool(self.control[monitor.EXPLICIT_ONLY] > 0.0),
+            explicit=bool(
+                self.control[monitor.EXPLICIT_ONLY] > 0.0
+                or self.medium.impedance * rate.max() > _OVERSTRESSED * scale
+            ),
             step=min(max(size, first), self.control[monitor.LARGEST_STEP]),
         )
 
@@ -173,7 +203,8 @@ class Run:
             not state.explicit
             and state.time >= times[-1]
             and values[-1] <= values[-2]
-            and self.medium.impedance * state.rate.max() <= self.control[monitor.RESIDUAL]
+            and self.medium.impedance * state.rate.max()
+            <= self.control[monitor.RESIDUAL] * state.watch[monitor.SCALE]
         )
 
     def _to_explicit(self, state: State) -> None:
@@ -182,6 +213,7 @@ class Run:
         carry_memory(state.memory, self.medium.table, state.carried, pairs)
         state.explicit = True
         state.watch[monitor.CALM_STEPS] = 0.0
+        state.watch[monitor.CALM_TOP] = state.rate.max()
 
     def _to_implicit(self, state: State) -> None:
         scale_memory(state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False)
@@ -194,8 +226,8 @@ class Run:
     def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
-        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED or
-        NOT_FINITE of `track`. Rows of `record` are filled, one a step.
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
+        or NOT_FINITE of `track`. Rows of `record` are filled, one a step.
         """
         taken = 0
         while taken < count:
@@ -223,7 +255,8 @@ class Run:
         taken, reason = explicit_steps(
             count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,
-            medium.stiffness, self.constants, self.rows, *self.history, self.control, record,
+            medium.stiffness, self.constants, self.rows, *self.history, *self.scale, self.control,
+            record,
         )  # fmt: skip
         return int(taken), int(reason)
 
@@ -233,7 +266,7 @@ class Run:
             count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
             medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
-            *self.history, self.turns, self.control, record,
+            *self.history, self.turns, *self.scale, self.control, record,
         )  # fmt: skip
         state.step = float(size)
         return int(taken), int(reason)

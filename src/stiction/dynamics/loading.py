@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._jit import jit
 from stiction._model import describe
+from stiction._typing import Array
 from stiction.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -16,6 +18,20 @@ History = tuple[Floats, Floats]
 
 _SMOOTHNESS = 1e-7  # of the range of the load: how far straight pieces may miss a callable
 _MOST_PIECES = 200_000
+
+
+@jit
+def load_at(times: Array, values: Array, t: float) -> Any:
+    """Piecewise linear load history, continued beyond its last point with its last slope."""
+    low, high = 0, times.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    slope = (values[high] - values[low]) / (times[high] - times[low])
+    return values[low] + slope * (t - times[low])
 
 
 def uniform_rate(rate: float) -> History:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,31 +11,41 @@ from pydantic import BeforeValidator, Field
 
 from stiction._model import Count, Positive, _number, model
 from stiction.dynamics import monitor
+from stiction.dynamics.checks import (
+    SLOWEST,
+    check_finite,
+    check_pace,
+    resolves_steps,
+    warn_if_coarse,
+    warn_if_reversed_before,
+    warn_if_unresolved,
+)
 from stiction.dynamics.discretization import Medium, prepare_medium
 from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
 from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, uniform_rate
-from stiction.errors import InputError, warn_accuracy
-from stiction.problem import Problem
+from stiction.errors import InputError
+from stiction.problem import SMALLEST_EIGENVALUE, Problem
 from stiction.results import Variable, onset_variables
-from stiction.sample import Sample
+from stiction.sample import Sample, steepest_rate
 
 Floats = NDArray[np.float64]
 Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
 
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300.0
-_SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
-_COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the mean of tau_p - tau_r
+_CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
+_STEADY_STRESS = 1e-2  # Z V of creep, likewise
+_SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
 _MORE: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
     "onset_time": Variable("s", "time from zero load when the mean stress was largest"),
-    "kinetic_stress": Variable("Pa", "mean stress when all nodes had reached their residual"),
+    "kinetic_stress": Variable("Pa", "mean stress when all that can break had broken"),
     "stress_drop": Variable("Pa", "critical stress less kinetic stress"),
     "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
-    "radiated_energy": Variable("J/m", "energy radiated until every node had weakened"),
+    "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
     "arrested_events": Variable("1", "instabilities that stopped before the whole interface slid"),
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
@@ -43,6 +53,12 @@ _MORE: dict[str, Variable] = {
     "implicit_steps": Variable("1", "implicit steps taken"),
     "explicit_steps": Variable("1", "explicit steps taken"),
 }
+Stop = Literal["sliding", "onset", "rest"]
+# Not known yet when a run stops at its onset.
+_LATER = (
+    "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
+    "arrested_events", "rupture_speed", "median_rupture_speed",
+)  # fmt: skip
 
 
 @model(kw_only=True)
@@ -50,8 +66,10 @@ class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
     Implicit steps of adaptive size follow the interface while it creeps, explicit ones its
-    rupture; the run goes from the first slip to the moment when every node has reached its
-    residual strength.
+    rupture; the run goes from the first slip to the moment when every node that can break has
+    reached its residual strength, or as far as `stop` says. Strength may be infinite where nothing
+    ever breaks, and the initial stress may be above the strength: such a patch breaks at once, at
+    zero load.
 
     Parameters
     ----------
@@ -60,6 +78,7 @@ class Rupture:
     kernel_tolerance : float
         Error allowed in the memory kernel C(T) by its sum of exponentials (1). The sum is fitted
         once a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
+        Refused where the error makes waves grow at any time step, from some 1e-3 on.
     memory_range : float
         That error holds up to T = |k| c_s t of this size (1); older slip rate decays faster than
         it should.
@@ -68,11 +87,19 @@ class Rupture:
     time_step : float, optional
         Explicit time step, s, instead of `courant`.
     slip_step : float
-        Slip of any node in one implicit step, in units of its d_c.
+        Slip of any node in one implicit step, in units of its d_c, as long as it weakens.
     load_step : float
-        Rise of the load in one implicit step, in units of the mean of tau_p - tau_r.
+        Rise of the load in one implicit step, in units of the stress scale (see Notes).
     event_drop : float
         Fall of the mean stress that counts as an instability, in the same units.
+    stop : {"sliding", "onset", "rest"}
+        "sliding": when every node that can break is at its residual strength. "onset": when the
+        first instability has begun; critical values are those of that maximum of the mean stress,
+        even if the instability would be arrested later, and what comes after it is nan (kinetic
+        stress, stress drop, moment, energies, arrested events, rupture speeds). "rest": when
+        everything has come to rest after an instability, or slides; critical values are then
+        those of the largest mean stress so far, kinetic stress and stress drop are nan unless
+        it slides, and the rest is that of the arrested event.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -89,10 +116,13 @@ class Rupture:
     factor that carries it statically, `applied_load` the one applied at that moment, somewhat
     higher; the difference is radiated. An instability begins when the mean stress has fallen by
     `event_drop` below its last maximum, not counting what the load itself goes down.
-    `kinetic_stress` and the energies are those of the first step after which every node is at its
-    residual strength; the interface slides fast then, and radiated energy and moment grow by some
-    2 % in that step. Slip never reverses: a node whose slip rate would become
-    negative sticks, keeps its weakened strength, and slips again only when the stress reaches it.
+    The stress scale is the mean over nodes of tau_p - tau_r, no node counting for more than three
+    times the drop tau_0 p + tau_i - tau_r that the largest load so far provides there: barriers
+    that nothing breaks do not count.
+    `kinetic_stress` and the energies are those of the first step after which all that can break is
+    at its residual strength; the interface slides fast then, and radiated energy and moment grow by
+    some 2 % in that step. Slip never reverses: a node whose slip rate would become negative sticks,
+    keeps its weakened strength, and slips again only when the stress reaches it.
     Boundary integral in Fourier space: Breitenfeld and Geubelle (1998).
     """
 
@@ -105,8 +135,11 @@ class Rupture:
     load_step: Fraction = 1e-3
     event_drop: Fraction = 1e-4
     implicit: bool = True
+    stop: Stop = "sliding"
     max_steps: Count = 5_000_000
     type: Literal["rupture"] = "rupture"
+    # What else `Problem.rows` may let through.
+    accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
 
     @property
     def chunk_size(self) -> int:
@@ -162,129 +195,83 @@ class Rupture:
     def _one(self, problem: Problem, run: Run) -> dict[str, float]:
         time = first_slip(run)
         check_pace(run, time)
+        warn_if_reversed_before(run, time)
         state = run.start(time)
         _, reason = run.advance(state, self.max_steps)
         check_finite(run, state, reason)
-        if reason != monitor.ALL_SLID:
+        if reason == monitor.DONE:
+            slid, breakable = state.watch[monitor.SLID], run.control[monitor.BREAKABLE]
             raise InputError(
-                f"max_steps: {self.max_steps} steps were taken before every node had reached its "
-                f"residual strength (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa); "
-                "raise max_steps or the loading rate"
+                f"max_steps: {self.max_steps} steps were taken before the run came to stop="
+                f"{self.stop!r} (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa, with "
+                f"{slid:.0f} of {breakable:.0f} nodes at their residual strength); raise max_steps "
+                "or the loading rate, stop at 'onset' or 'rest', or give barriers that never break "
+                "an infinite strength"
             )
-        return summary(problem, run, state)
-
-
-def warn_if_coarse(problem: Problem, rows: Sample) -> None:
-    """Warn where the nucleation length is not resolved, with the error to expect."""
-    resolution = (
-        problem.nucleation_length_of(float(rows.weakening_rate.max())) / problem.interface.spacing
-    )
-    if resolution < 15.0:
-        # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
-        # at 8, 16 and 32 nodes.
-        percent = 3.0 * (16.0 / resolution) ** 2.4
-        expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-        warn_accuracy(
-            f"the nucleation length spans {resolution:.1f} nodes: expect {expected} error in slip "
-            "just after onset (3 % at 16 nodes, 0.6 % at 32; the critical load is far less "
-            "sensitive)"
-        )
-
-
-def _resolves_steps(run: Run, time: float) -> bool:
-    """Whether the time since zero load, as a float, tells explicit steps apart."""
-    return float(np.spacing(time)) <= 0.01 * run.medium.step
-
-
-def check_pace(run: Run, time: float) -> None:
-    """Refuse or warn of loading that explicit steps or floating-point times cannot follow.
-
-    Parameters
-    ----------
-    run : Run
-    time : float
-        When it starts, s.
-
-    Raises
-    ------
-    InputError
-    """
-    if time > _SLOWEST:
-        raise InputError(
-            f"loading_rate: the first slip would come after {time:.3g} s, more than {_SLOWEST:g} s;"
-            " load faster (the onset no longer depends on the rate)"
-        )
-    if not _resolves_steps(run, time):
-        warn_accuracy(
-            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
-            f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
-            "and energies are not affected"
-        )
-    drop = float(np.mean(run.rows[0] - run.rows[1]))
-    rise = run.slope(time) * run.medium.step / drop
-    if rise > _COARSE:
-        step = run.medium.step
-        text = (
-            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the mean of tau_p - tau_r; use time_step={step * _COARSE / rise:.2g} or less, or "
-            "load more slowly"
-        )
-        if rise > _COARSEST:
-            raise InputError(text)
-        warn_accuracy(f"{text} (the onset is sampled coarsely)")
+        warn_if_unresolved(problem, run, state)
+        found = summary(problem, run, state)
+        if self.stop == "onset":
+            found |= dict.fromkeys(_LATER, np.nan)
+        return found
 
 
 def make_run(method: Rupture, medium: Medium, rows: Sample, sample: int, history: History) -> Run:
     """The run of one sample."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
+    finite = np.isfinite(strength)
     critical = (strength - residual) / weakening
     table = np.stack([strength, residual, weakening, critical, rows.load_profile, initial])
-    drop = float(np.mean(strength - residual))
     control = np.zeros(monitor.CONTROLS)
-    smallest = _SWITCH * medium.step
-    control[monitor.SLID_STOP] = medium.nodes
-    control[monitor.DROP_STOP] = np.inf
-    control[monitor.CALM_RATE] = 0.25 * method.slip_step * critical.min() / smallest
-    control[monitor.CALM_COUNT] = _CALM_STEPS if method.implicit else np.inf
+    control[monitor.BREAKABLE] = np.count_nonzero(finite)
+    set_stop(control, method.stop)
+    # Calm: for as long as shear waves need to cross the interface, nothing slips faster than a
+    # crack of half its length does when the load alone drives it, or nothing faster than before.
+    control[monitor.CALM_STRESS], control[monitor.STEADY_STRESS] = _CALM_STRESS, _STEADY_STRESS
+    length = medium.nodes * medium.spacing
+    control[monitor.CALM_SLIP] = length / medium.effective_modulus
+    crossing = 2.0 * np.pi / medium.pace[0] / medium.step
+    control[monitor.CALM_COUNT] = max(_CALM_STEPS, np.ceil(crossing))
     control[monitor.SLIP_STEP] = method.slip_step
-    control[monitor.LOAD_STEP] = method.load_step * drop
-    control[monitor.SMALLEST_STEP] = smallest
-    control[monitor.RESIDUAL] = 1e-9 * drop
-    control[monitor.LARGEST_STEP], control[monitor.END_TIME] = _SLOWEST, np.inf
-    control[monitor.EVENT_DROP_SIZE] = method.event_drop * drop
-    control[monitor.PEAK_WIDTH_SIZE] = 1e-5 * drop
-    control[monitor.NOTICED] = 1e-7 * drop
+    control[monitor.SMALL_DROP] = _SMALL_DROP
+    control[monitor.LOAD_STEP] = method.load_step
+    control[monitor.SMALLEST_STEP] = _SWITCH * medium.step
+    control[monitor.RESIDUAL] = 1e-9
+    control[monitor.LARGEST_STEP], control[monitor.END_TIME] = SLOWEST, np.inf
+    control[monitor.EVENT_DROP_SIZE] = method.event_drop
+    control[monitor.PEAK_WIDTH_SIZE] = 1e-5
+    control[monitor.NOTICED] = 1e-7
     control[monitor.GROWTH] = _GROWTH
-    control[monitor.NEGLIGIBLE] = 5e-7 * drop
+    control[monitor.NEGLIGIBLE] = 5e-7
     control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     constants = np.array(
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
     )
-    return Run(medium, table, constants, history, control)
+    steepest = steepest_rate(strength[None], residual[None], weakening[None])
+    half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
+    weakens = finite & (critical > 0.0)
+    loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
+    weakest = min(max(round(half / medium.spacing), 1), loads.size)
+    least = float(np.partition(loads, weakest - 1)[:weakest].mean())
+    return Run(medium, table, constants, history, control, steepest, least)
+
+
+def set_stop(control: Floats, stop: str) -> None:
+    """Where a run returns: at one of `Stop`, or, for "time", only at its end time."""
+    control[monitor.SLID_STOP] = np.inf if stop == "time" else control[monitor.BREAKABLE]
+    control[monitor.EVENT_STOP] = stop == "onset"
+    control[monitor.REST_STOP] = stop == "rest"
 
 
 def first_slip(run: Run) -> float:
     """When the first node reaches its strength, s."""
-    strength, profile, initial = run.rows[0], run.rows[4], run.rows[5]
-    return first_reach(run.history, float(np.min((strength - initial) / profile)))
-
-
-def check_finite(run: Run, state: State, reason: int) -> None:
-    """Raise `FloatingPointError` that says when and where a run became non-finite."""
-    if reason == monitor.NOT_FINITE:
-        node = int(state.watch[monitor.BAD_NODE])
-        raise FloatingPointError(
-            f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
-            f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
-            f"{state.steps} steps; the last finite state is kept"
-        )
+    return first_reach(run.history, run.first_load)
 
 
 def front_speed(problem: Problem, run: Run, state: State, lengths: float) -> Floats:
     """Apparent speed of the front, m/s, over a window in units of the shortest h_n, (nodes,)."""
-    shortest = problem.nucleation_length_of(float(run.rows[2].max()))
-    if not _resolves_steps(run, state.time):
+    shortest = problem.nucleation_length_of(run.steepest_rate)
+    if not resolves_steps(run, state.time):
         return np.full(run.medium.nodes, np.nan)
     window = min(max(lengths * shortest, 8.0 * run.medium.spacing), 0.25 * problem.interface.extent)
     return rupture_speed(state.arrival, run.medium.spacing, window)

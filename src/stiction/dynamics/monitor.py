@@ -16,38 +16,55 @@ LOCAL_STRESS, IN_EVENT, FIRST_STRESS, ARRESTED = 8, 9, 10, 11
 EVENT_DROP, TOP_RATE, SLID, BAD_NODE = 12, 13, 14, 15
 EXPLICIT_STEPS, IMPLICIT_STEPS, REJECTED_STEPS, CALM_STEPS = 16, 17, 18, 19
 STEP, LOCAL_RADIATED, RADIATED, PAST_STEP = 20, 21, 22, 23
-KINETIC = 24  # Pa, mean stress when every node first was at its residual; -inf before
+KINETIC = 24  # Pa, mean stress when all that can break first had broken; -inf before
 PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
-FIELDS = 26
+SCALE = 26  # Pa, stress scale of the largest load so far
+CALM_TOP = 27  # m/s, largest slip rate when the row of calm steps began
+FIELDS = 28
 
 # Why a compiled phase returned.
-DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED = range(6)
+DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
 
 # Columns of the record of every step.
 REC_TIME, REC_LOAD, REC_MEAN_STRESS, REC_MEAN_SLIP, REC_TOP_RATE, REC_STEP, REC_WORK = range(7)
 COLUMNS = 7
 
 
-# Thresholds of the `control` array.
+# Thresholds of the `control` array; stresses in units of the stress scale (see `scale`).
 (
     SLID_STOP,  # nodes at the residual strength at which to return
-    DROP_STOP,  # fall of the mean stress below its last maximum at which to return, Pa
-    CALM_RATE,  # top slip rate below which an explicit step counts as calm, m/s
-    CALM_COUNT,  # calm steps in a row after which implicit steps take over
-    SLIP_STEP,  # largest slip of a node in one implicit step, in units of its d_c
-    LOAD_STEP,  # largest rise of the load factor in one implicit step, Pa
-    SMALLEST_STEP,  # implicit step below which explicit steps take over, s
-    RESIDUAL,  # stress residual at which an implicit step counts as solved, Pa
-    LARGEST_STEP,  # s
+    EVENT_STOP,  # 1 to return at an event
+    REST_STOP,  # 1 to return when all is at rest after an event
     END_TIME,  # s
-    EVENT_DROP_SIZE,  # fall of the mean stress that counts as an event, Pa
+    BREAKABLE,  # nodes that can break at all
+    CALM_STRESS,  # radiated stress Z V of the fastest node below which a step counts as calm
+    CALM_SLIP,  # or slip per load that it may make, m/Pa: creep that the load alone drives
+    STEADY_STRESS,  # or Z V below which it counts as calm if V has not changed by a factor 2
+    CALM_COUNT,  # calm steps in a row after which implicit steps take over
+    SLIP_STEP,  # loss of strength of a node in one implicit step, in units of tau_p - tau_r
+    SMALL_DROP,  # nodes that weaken by less than this count as weakening by this
+    LOAD_STEP,  # largest rise of the load factor in one implicit step
+    SMALLEST_STEP,  # implicit step below which explicit steps take over, s
+    LARGEST_STEP,  # s
+    RESIDUAL,  # stress residual at which an implicit step counts as solved
+    EVENT_DROP_SIZE,  # fall of the mean stress that counts as an event
     EXPLICIT_ONLY,  # 1 to take no implicit steps
-    NOTICED,  # radiated stress Z <V> from which the growth of one implicit step is limited, Pa
+    NOTICED,  # radiated stress Z <V> from which the growth of one implicit step is limited
     GROWTH,  # by this factor
-    PEAK_WIDTH_SIZE,  # Pa, initial value of PEAK_WIDTH
-    NEGLIGIBLE,  # rise of the load in a step for which that does not matter, Pa
-) = range(16)
-CONTROLS = 16
+    PEAK_WIDTH_SIZE,  # so close below its maximum the mean stress still is at it
+    NEGLIGIBLE,  # rise of the load in a step for which that does not matter
+) = range(21)
+CONTROLS = 21
+
+
+@jit
+def settle(watch: Array, mean_stress: float, radiated: float) -> None:
+    """An event that is under way is over and was arrested: everything is at rest, or creeps."""
+    if watch[IN_EVENT] > 0.0:
+        watch[IN_EVENT] = 0.0
+        if watch[KINETIC] == -np.inf:  # after global sliding there is nothing left to arrest
+            watch[ARRESTED] += 1.0
+        watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
 
 
 @jit
@@ -77,10 +94,7 @@ def observe(
         watch[PEAK_NODE] = node
     if watch[IN_EVENT] > 0.0:
         if mean_stress > watch[LOCAL_STRESS] or radiated < 0.1 * watch[EVENT_DROP]:
-            watch[IN_EVENT] = 0.0
-            if watch[KINETIC] == -np.inf:  # after global sliding there is nothing left to arrest
-                watch[ARRESTED] += 1.0
-            watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
+            settle(watch, mean_stress, radiated)
     elif mean_stress > watch[LOCAL_STRESS]:
         watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
     elif fall > watch[EVENT_DROP]:

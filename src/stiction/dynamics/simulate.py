@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import os
 from collections.abc import Callable, Sequence
-from numbers import Integral, Real
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -14,22 +12,29 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import as_path, is_finite, is_whole
 from stiction._model import describe, real_array, to_plain
 from stiction._progress import Meter
 from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
+from stiction.dynamics.checks import (
+    check_finite,
+    check_pace,
+    warn_if_coarse,
+    warn_if_reversed,
+    warn_if_reversed_before,
+    warn_if_unresolved,
+)
 from stiction.dynamics.frames import Frames, check_variables
 from stiction.dynamics.integrator import NOTHING, Run, State
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
-    check_finite,
-    check_pace,
     first_slip,
     front_speed,
     make_run,
+    set_stop,
     summary,
-    warn_if_coarse,
 )
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.errors import InputError, warn_accuracy
@@ -40,10 +45,10 @@ from stiction.profiles import at_nodes
 from stiction.results import Variable
 from stiction.sample import named_profiles
 
-Stop = Literal["sliding", "onset", "arrest", "time"]
+Stop = Literal["sliding", "onset", "rest", "time"]
 
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are streamed
-_NEAR_ONSET = 0.02  # fall of the mean stress, in units of tau_p - tau_r, that counts as 'around'
+_NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
 
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
@@ -92,24 +97,29 @@ def _note(now: Progress) -> str:
     )
 
 
+_MOST_EVERY = 10**6
+"""The record of the steps between two frames is kept in memory."""
+
+
 def _finite(value: Any) -> bool:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    return number and math.isfinite(float(value))
+    return isinstance(value, Real) and is_finite(value)
 
 
 def _check(options: dict[str, Any]) -> None:
     problems = []
     for name in ("every", "every_implicit", "every_near_onset", "checkpoint_every", "chunk"):
         value = options[name]
-        whole = isinstance(value, Integral) and not isinstance(value, bool)
-        if value is not None and not (whole and value >= 1):
-            problems.append(f"{name}: must be a whole number of steps, at least 1, got {value!r}")
+        if value is None and name == "every_near_onset":
+            continue
+        if not is_whole(value, 1) or value > _MOST_EVERY:
+            given = describe(value)
+            problems.append(f"{name}: must be a whole number of steps, 1 to 10**6, got {given}")
     for name in ("interval", "end_time"):
         value = options[name]
         if value is not None and not (_finite(value) and value > 0.0):
             problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
-    if options["stop"] not in get_args(Stop):
-        problems.append(f"stop: must be one of {get_args(Stop)}, got {options['stop']!r}")
+    if options["stop"] is not None and options["stop"] not in get_args(Stop):
+        problems.append(f"stop: must be one of {get_args(Stop)}, got {describe(options['stop'])}")
     elif options["stop"] == "time" and options["end_time"] is None:
         problems.append("end_time: needed with stop='time', got None")
     if (options["initial_slip"] is None) != (options["initial_load"] is None):
@@ -118,13 +128,22 @@ def _check(options: dict[str, Any]) -> None:
         problems.append(f"initial_load: must be a number, Pa, got {options['initial_load']!r}")
     for name in ("store", "checkpoint", "restart"):
         value = options[name]
-        if value is not None and not isinstance(value, str | os.PathLike):
-            problems.append(f"{name}: must be a path, got {describe(value)}")
-        elif name == "checkpoint" and value is not None and Path(value).is_dir():
+        if value is None:
+            continue
+        try:
+            as_path(name, value)
+        except InputError as error:
+            problems += error.problems
+            continue
+        if name == "checkpoint" and Path(value).is_dir():
             problems.append(f"checkpoint: {str(value)!r} is a folder; name a file")
     told = options["progress"]
     if told is not None and not isinstance(told, bool) and not callable(told):
         problems.append(f"progress: must be true, false or callable, got {describe(told)}")
+    if not isinstance(options["steps"], bool | np.bool_):
+        problems.append(f"steps: must be True or False, got {describe(options['steps'])}")
+    if not isinstance(options["problem"], Problem):
+        problems.append(f"problem: must be a Problem, got {describe(options['problem'])}")
     if not isinstance(options["method"], Rupture):
         problems.append(
             "method: must be a method object st.Rupture(loading_rate=...), got "
@@ -138,6 +157,7 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
     if slip is None or load is None:
         time = first_slip(run)
         check_pace(run, time)
+        warn_if_reversed_before(run, time)
         return run.start(time)
     nodes = run.medium.nodes
     try:
@@ -172,7 +192,7 @@ def simulate_rupture(
     every_near_onset: int | None = None,
     interval: float | None = None,
     steps: bool = True,
-    stop: Stop = "sliding",
+    stop: Stop | None = None,
     end_time: float | None = None,
     store: str | Path | None = None,
     chunk: int = 64,
@@ -187,7 +207,9 @@ def simulate_rupture(
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
+        Peak strength (Pa) of one sample, infinite where nothing ever breaks, or several profiles
+        by name, as in `onset`. Where the initial stress is above the strength, slip begins at
+        once.
     method : Rupture
         Loading rate and numerical options.
     load : callable or (times, values), optional
@@ -199,18 +221,17 @@ def simulate_rupture(
         Fields to keep.
     every, every_implicit, every_near_onset : int
         Steps between frames: explicit ones, implicit ones (while the interface creeps), and
-        explicit ones until the mean stress has fallen by 2 % of the mean strength drop (if
+        explicit ones until the mean stress has fallen by 2 % of the stress scale of `Rupture` (if
         given). Since steps shorten as the interface accelerates, frames are dense in time around
         onset anyhow.
     interval : float, optional
         s; at most one frame in each interval of this length, counted from zero load.
     steps : bool
         Keep time, load, mean stress, ... of every step, over 'step'.
-    stop : {"sliding", "onset", "arrest", "time"}
-        When every node is at its residual strength; when the mean stress has fallen by
-        `method.event_drop`; when an instability has come to rest (or every node is at its
-        residual strength after all); or only at `end_time`. Unless it waits for `end_time`, a run
-        also ends where nothing slips and the load has stopped rising for good ("rest").
+    stop : {"sliding", "onset", "rest", "time"}, optional
+        As `method.stop`, which holds if left out; or "time", only at `end_time`. Unless it waits
+        for `end_time`, a run also ends where nothing slips and the load has stopped rising for
+        good ("rest").
     end_time : float, optional
         s; the run never goes beyond it (except for a part of the last explicit step).
     store : path, optional
@@ -243,18 +264,15 @@ def simulate_rupture(
     _check(dict(locals()))
     check_variables(variables)
     given, measured = gather(problem, named_profiles(profiles), "refuse")
-    rows = problem.sample(given)
+    rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
-    warn_of_units(problem, float(rows.strength.mean()), float(rows.residual_strength.mean()))
+    warn_of_units(problem, rows.mean_strength, float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, history)
-    drop = float(np.mean(run.rows[0] - run.rows[1]))
-    if stop == "time":
-        run.control[monitor.SLID_STOP] = np.inf
-    if stop == "onset":
-        run.control[monitor.DROP_STOP] = method.event_drop * drop
+    stop = stop or method.stop
+    set_stop(run.control, stop)
     if end_time is not None:
         run.control[monitor.END_TIME] = end_time
     if restart is None:
@@ -289,13 +307,14 @@ def simulate_rupture(
     before = state.time
     next_checkpoint = state.steps + checkpoint_every
     reason = "max_steps"
-    near = _NEAR_ONSET * drop
+    reversed_ = False
     record = np.empty((max(every, every_implicit, every_near_onset or 1), monitor.COLUMNS))
     meter = Meter("rupture", show=progress is True, unit="steps").start()
     try:
         while state.steps < method.max_steps:
             count = every if state.explicit else every_implicit
             falling = state.watch[monitor.LOCAL_STRESS] - state.mean_stress
+            near = _NEAR_ONSET * state.watch[monitor.SCALE]
             if every_near_onset is not None and state.explicit and falling < near:
                 count = every_near_onset
             count = min(count, method.max_steps - state.steps)
@@ -304,6 +323,7 @@ def simulate_rupture(
             frames.add_steps(part[:taken])
             if code == monitor.NOT_FINITE:
                 check_finite(run, state, code)
+            reversed_ = reversed_ or warn_if_reversed(run, state)
             ended = _reason(code, run, state, stop)
             if ended or interval is None or state.time // interval > before // interval:
                 frames.add(state)
@@ -330,6 +350,7 @@ def simulate_rupture(
     finally:
         meter.stop()
     attributes["stopped"] = reason
+    warn_if_unresolved(problem, run, state)
     flush()  # before the checkpoint, which counts on the frames up to it
     if checkpoint is not None and not reason.startswith("not finite"):
         write_checkpoint(checkpoint, run, state)
@@ -356,8 +377,8 @@ def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
         return "sliding"
     if code == monitor.DROPPED:
         return "onset"
-    if stop == "arrest" and state.watch[monitor.ARRESTED] > 0.0:
-        return "arrest"
+    if code == monitor.AT_REST:
+        return "rest"
     if run.ended(state):
         return "time"
     if stop != "time" and run.resting(state):

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import as_names, as_path, check_flag
 from stiction.dynamics.frames import FIELDS, SCALARS, STEPS, TIME
 from stiction.errors import InputError
 from stiction.results import Variable, to_dataset
@@ -55,7 +56,7 @@ class Stream:
     """
 
     def __init__(self, folder: str | Path, *, resume: bool = False) -> None:
-        self.folder = Path(folder)
+        self.folder = as_path("store", folder)
         self.chunks: dict[str, int] = {}  # and the last step each of them holds
         manifest = self.folder / _MANIFEST
         if manifest.exists() and resume:
@@ -139,7 +140,10 @@ def open_rupture(
     InputError
         If the folder is not such a store.
     """
-    root = Path(folder)
+    root = as_path("store", folder)
+    if variables is not None:
+        variables = as_names("variables", variables)
+    check_flag("steps", steps)
     parts = []
     for name in _read_manifest(root)["chunks"]:
         with xr.open_dataset(root / name, engine="netcdf4") as data:

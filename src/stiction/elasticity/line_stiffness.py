@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import ZERO, jit, jit_sums
+from stiction._jit import ZERO, jit
+from stiction._lanes import multiply_add
 from stiction._typing import Array
 
 
@@ -40,7 +41,7 @@ def coupling_strip(column: Array) -> Array:
     return np.ascontiguousarray(np.tile(column[1::2], 3))
 
 
-@jit_sums
+@jit
 def _add_four(
     target: Array,
     strip: Array,
@@ -59,7 +60,10 @@ def _add_four(
     c = strip[p2 : p2 + half]
     d = strip[p3 : p3 + half]
     for q in range(half):
-        target[q] += z0 * a[q] + z1 * b[q] + z2 * c[q] + z3 * d[q]
+        more = multiply_add(z0, a[q], target[q])
+        more = multiply_add(z1, b[q], more)
+        more = multiply_add(z2, c[q], more)
+        target[q] = multiply_add(z3, d[q], more)
 
 
 @jit

@@ -12,10 +12,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import check_count, check_progress, is_real, is_whole, too_many_samples
 from stiction._model import describe, names_to_keep, to_plain, whole
 from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.assemble import Gathered, GridAxis
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.points import differing_in
 from stiction.ensemble.scheduler import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
 from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
@@ -97,12 +99,29 @@ def _keep_of_method(
     return method, problems
 
 
-def check_count(name: str, value: Any, smallest: int) -> int:
-    """`value` as an int (1e4 too), if it is a whole number of at least `smallest`."""
-    count = whole(value)
-    if count is None or count < smallest:
-        raise InputError(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
-    return count
+def _check_keep(
+    keep: Any, keep_samples: Any, keep_limit: Any
+) -> tuple[tuple[str, ...], tuple[int, ...] | None]:
+    """What is to be kept, and of which samples, or what is wrong with it."""
+    problems: list[str] = []
+    names: tuple[str, ...] = ()
+    try:
+        names = names_to_keep(keep)
+    except InputError as error:
+        problems += error.problems
+    known = keep_samples is None or (
+        isinstance(keep_samples, list | tuple | range | np.ndarray)
+        and np.ndim(keep_samples) == 1
+        and all(is_whole(sample, 0) for sample in keep_samples)
+    )
+    if not known:
+        given = describe(keep_samples)
+        problems.append(f"keep_samples: must be a list of sample numbers, got {given}")
+    if not (is_real(keep_limit) and keep_limit > 0.0):
+        problems.append(f"keep_limit: must be a positive number, got {describe(keep_limit)}")
+    if problems:
+        raise InputError(problems)
+    return names, None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
 
 
 def check_run(
@@ -110,6 +129,9 @@ def check_run(
 ) -> tuple[int, int, int | None]:
     """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
     samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
+    problems = too_many_samples(samples, first)
+    if problems:
+        raise InputError(problems)
     if workers is not None:
         workers = check_count("workers", workers, 1)
     if executor is not None and not hasattr(executor, "submit"):
@@ -145,7 +167,7 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
     pairs = list(
         dict.fromkeys(
             (field, plan.problem.interface)
-            for plan in plans
+            for plan in differing_in(plans, "random", "problem.interface")
             for field in plan.random.properties.values()
         )
     )
@@ -237,7 +259,7 @@ def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
 
 def method_name(plans: Sequence[Plan]) -> str:
     """For the progress bar."""
-    names = {plan.method.label for plan in plans}
+    names = {plan.method.label for plan in differing_in(plans, "method")}
     return str(names.pop()) if len(names) == 1 else "samples"
 
 
@@ -311,9 +333,10 @@ def monte_carlo(
     AccuracyWarning
         If the time limit was reached.
     """
-    chosen = None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-    plan = make_plan(problem, random, method, seed, names_to_keep(keep), chosen)
+    names, chosen = _check_keep(keep, keep_samples, keep_limit)
+    check_progress(progress)
     samples, first, workers = check_run(samples, first, workers, executor, time_limit)
+    plan = make_plan(problem, random, method, seed, names, chosen)
     check_size(wide_bytes(plan, samples, first), keep_limit)
     return run_plans(
         [plan],

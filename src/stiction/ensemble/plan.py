@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._typing import Array
-from stiction.evaluation import Method, Values, solve, variables_of
+from stiction.evaluation import Method, Values, accepted, solve, variables_of
 from stiction.problem import Problem
 from stiction.random.draws import BLOCK
 from stiction.random.random_interface import RandomInterface
@@ -82,7 +82,9 @@ def _solver(problem: Problem, method: Method) -> Any:
 def compute(plan: Plan, first: int, samples: int) -> Values:
     """Results of samples first .. first + samples - 1; a plain function, for any executor."""
     profiles = plan.profiles(first, samples)
-    values = solve(_solver(plan.problem, plan.method), plan.problem.sample(profiles))
+    accept = (*accepted(plan.method), "constant")  # of which `check_residual` has warned
+    sample = plan.problem.sample(profiles, accept=accept)
+    values = solve(_solver(plan.problem, plan.method), sample)
     return values | {name: profiles[name] for name in plan.keep if name in profiles}
 
 

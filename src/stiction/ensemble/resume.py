@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from stiction._progress import Meter, Show
 from stiction.ensemble.monte_carlo import method_name
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.points import variables_in
 from stiction.ensemble.scheduler import share_out, usable_cores
 from stiction.ensemble.store import Store
 from stiction.ensemble.work import Failure, Outcome
@@ -52,8 +53,8 @@ def run_stored(
     """
     spans = store.missing(len(plans), samples, first, retry=retry)
     to_do = sum(span.samples for span in spans)
-    variables = {name: v for plan in plans for name, v in plan.variables.items()}
-    alive = {span.point for chunk in store.chunks for span in chunk.done}
+    variables = variables_in(plans)
+    alive = {point for chunk in store.chunks for point in chunk.done[:, 0].tolist()}
     lost: dict[int, int] = {}
     buffer: list[Outcome] = []
     flushed = time.monotonic()

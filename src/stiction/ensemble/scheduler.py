@@ -7,13 +7,14 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, NamedTuple
 
 from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.trouble import WorkerError
+from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome, do_work, process_mark
 from stiction.random.draws import BLOCK
 
@@ -88,7 +89,8 @@ class Slots:
     def __call__(self) -> int:
         if self._client is not None and time.monotonic() - self._asked > 2.0:
             self._asked = time.monotonic()
-            self._fixed = max(1, sum(self._client.nthreads().values()))
+            with suppress(OSError):  # a scheduler that is gone: its pieces of work say so
+                self._fixed = max(1, sum(self._client.nthreads().values()))
         return self._fixed
 
 
@@ -132,13 +134,14 @@ def share_out(
         if executor is None:
             executor = stack.enter_context(ThreadPoolExecutor(workers))
         slots, mark = Slots(executor, workers), process_mark()
+        watch = getattr(executor, "watch", lambda: None)  # raises when nobody is left to wait for
         running: dict[Future[Outcome], Span] = {}
         try:
             while waiting or running:
                 limit = 2 * slots()
                 while waiting and len(running) < limit:
                     span = cut(slots())
-                    future = executor.submit(do_work, plans[span.point], *span, mark)
+                    future = executor.submit(do_work, plans[span.point], *span, mark, versions())
                     running[future] = span
                 done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -146,6 +149,7 @@ def share_out(
                     sizer.learn(outcome)
                     yield outcome
                 if not done:
+                    watch()
                     yield None
         finally:
             for future in running:
@@ -155,6 +159,8 @@ def share_out(
 def _result(future: Future[Any], span: Span, plans: Sequence[Plan]) -> Outcome:
     try:
         outcome: Outcome = future.result()
+    except WorkerError:  # it was refused, and says why
+        raise
     except Exception as error:
         last = span.first + span.samples - 1
         raise WorkerError(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan, chunks, compute
+from stiction.ensemble.versions import refuse_other_versions
 from stiction.errors import InputError
 from stiction.evaluation import Values
 
@@ -94,7 +95,9 @@ def _calm_blas(process: int) -> None:
     threadpool_limits(limits=1, user_api="blas")
 
 
-def do_work(plan: Plan, point: int, first: int, samples: int, parent: str = "") -> Outcome:
+def do_work(
+    plan: Plan, point: int, first: int, samples: int, parent: str = "", expected: str = ""
+) -> Outcome:
     """Compute samples first .. first + samples - 1 of a plan; a plain function, for any executor.
 
     Parameters
@@ -103,7 +106,16 @@ def do_work(plan: Plan, point: int, first: int, samples: int, parent: str = "") 
     point, first, samples : int
     parent : str
         `process_mark` of the process that hands out the work.
+    expected : str
+        `versions` there. Every piece is checked, because workers of a cluster come and go.
+
+    Raises
+    ------
+    WorkerError
+        If the versions here are others.
     """
+    if expected:
+        refuse_other_versions(expected)
     if parent and parent != process_mark():
         _calm_blas(os.getpid())
     begin = time.perf_counter()

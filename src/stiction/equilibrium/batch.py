@@ -12,7 +12,7 @@ from stiction.equilibrium.linear_program import solve_program
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.window_bound import Windows, window_bound
-from stiction.equilibrium.workspace import Grid, Room, Sample, make_room
+from stiction.equilibrium.workspace import Grid, Room, Sample, make_room, make_sample
 
 LOAD, GAP, PATCHES, POSITION, LENGTH, FATE = range(6)
 COLUMNS = 6
@@ -93,9 +93,13 @@ def solve_batch(
     reach: int,
     spacing: float,
     modulus: float,
+    caution: float,
     results: Array,
     slips: Array,
+    stiffs: Array,
+    aheads: Array,
     multipliers: Array,
+    all_slips: bool,
 ) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
@@ -115,9 +119,14 @@ def solve_batch(
         From `block_factor`.
     spacing, modulus : float
         m and Pa.
+    caution : float
+        Factor on the length at which a rupture counts as unstoppable.
     results : (samples, COLUMNS) array, output
-    slips, multipliers : (samples or 0, n) arrays, output
-        Filled if they have rows.
+    slips, stiffs, multipliers : (samples, n) arrays, output
+        d, K d and y at the first instability; K d where the fate is left undecided, and d only
+        there unless `all_slips`.
+    aheads : (samples, n) array, output
+        Where the fate is left undecided, a lower bound of the slip after the jump.
     """
     samples, n = excess.shape
     room = make_room(n)
@@ -125,19 +134,15 @@ def solve_batch(
     stiff = np.empty(n)
     multiplier = np.empty(n)
     product = np.empty(n)
-    critical = np.empty(n)
     work = np.empty((6, n))
     for row in range(samples):
-        for i in range(n):
-            critical[i] = (excess[row, i] - floor[row, i]) / rate[row, i]
-            room.diagonal[i] = grid.column[0] - rate[row, i]
-        sample = Sample(excess[row], floor[row], profile, rate[row], critical)
+        sample = make_sample(excess[row], floor[row], profile, rate[row])
         windows = usual
         for i in range(n):
+            room.diagonal[i] = grid.column[0] - sample.rate[i]
             if rate[row, i] != usual_rate:
                 windows = others
-                break
-        bound, start, choice = window_bound(excess[row], profile, rate[row], windows, work)
+        bound, start, choice = window_bound(excess[row], profile, sample.rate, windows, work)
         width = 0 if choice < 0 else windows.widths[choice]
         start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, profile)
         # If it does not succeed, the certificate says so.
@@ -151,23 +156,22 @@ def solve_batch(
         _, length, centre = main_patch(multiplier)
         line[POSITION] = centre * spacing
         line[LENGTH] = length * spacing
-        if slips.shape[0] > 0:
-            for i in range(n):
-                slips[row, i] = slip[i]
-        if multipliers.shape[0] > 0:
-            for i in range(n):
-                multipliers[row, i] = multiplier[i]
+        for i in range(n):
+            multipliers[row, i] = multiplier[i]
+        if all_slips:
+            slips[row] = slip
         line[FATE] = UNDECIDED
         for i in range(n):
-            if slip[i] > critical[i] * (2.0 - AT_FLOOR):
+            if slip[i] > sample.critical[i] * (2.0 - AT_FLOOR) and sample.critical[i] > 0.0:
                 line[FATE] = FLOOR_REACHED
         if line[FATE] == UNDECIDED:
-            escape = escape_run(sample, load, spacing, modulus)
+            escape = caution * escape_run(sample, load, spacing, modulus)
+            tried = slip.copy()
             line[FATE] = runs_away(
                 sample,
                 wide_column,
                 load,
-                slip,
+                tried,
                 stiff,
                 multiplier,
                 product,
@@ -176,3 +180,7 @@ def solve_batch(
                 reach,
                 work,
             )
+            if line[FATE] == UNDECIDED:
+                slips[row] = slip
+                stiffs[row] = stiff
+                aheads[row] = tried

@@ -6,7 +6,10 @@ numbers: half the memory of a square, and no two rows compete for the same cache
 
 from __future__ import annotations
 
-from stiction._jit import jit, jit_sums
+import numpy as np
+
+from stiction._jit import jit
+from stiction._lanes import LANES, add, load, multiply_add, total, totals, zeros
 from stiction._typing import Array
 
 GROUP = 4
@@ -20,29 +23,45 @@ def row_start(row: int) -> int:
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
-@jit_sums
+@jit
 def dot(first: Array, second: Array, count: int) -> float:
     """Sum of products; numpy's own takes threads for long arrays, and then depends on how many."""
-    total = 0.0
-    for t in range(count):
-        total += first[t] * second[t]
-    return total
+    a = zeros()
+    b = zeros()
+    c = zeros()
+    d = zeros()
+    t = 0
+    while t + 4 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        c = multiply_add(load(first, t + 2 * LANES), load(second, t + 2 * LANES), c)
+        d = multiply_add(load(first, t + 3 * LANES), load(second, t + 3 * LANES), d)
+        t += 4 * LANES
+    if t + 2 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        t += 2 * LANES
+    if t + LANES <= count:
+        c = multiply_add(load(first, t), load(second, t), c)
+        t += LANES
+    rest = 0.0
+    while t < count:
+        rest = multiply_add(first[t], second[t], rest)
+        t += 1
+    return total(add(add(a, b), add(c, d))) + rest
 
 
-@jit_sums
+@jit
 def _solve_one(factor: Array, start: int, size: int) -> None:
     """Forward substitution of one new row, in place."""
     row = factor[start : start + size]
     for k in range(size):
         base = row_start(k)
         known = factor[base : base + k + 1]
-        total = 0.0
-        for t in range(k):
-            total += known[t] * row[t]
-        row[k] = (row[k] - total) / known[k]
+        row[k] = (row[k] - dot(known, row, k)) / known[k]
 
 
-@jit_sums
+@jit
 def _solve_four(factor: Array, size: int) -> None:
     """Forward substitution of four new rows that follow row `size` - 1, in place.
 
@@ -62,19 +81,37 @@ def _solve_four(factor: Array, size: int) -> None:
         u = factor[base : base + k + 1]
         base = row_start(k + 1)
         v = factor[base : base + k + 2]
-        u0 = u1 = u2 = u3 = 0.0
-        v0 = v1 = v2 = v3 = 0.0
-        for t in range(k):
+        whole = k - k % LANES
+        p0 = p1 = p2 = p3 = zeros()
+        q0 = q1 = q2 = q3 = zeros()
+        for t in range(0, whole, LANES):
+            p = load(u, t)
+            q = load(v, t)
+            y = load(x0, t)
+            p0 = multiply_add(p, y, p0)
+            q0 = multiply_add(q, y, q0)
+            y = load(x1, t)
+            p1 = multiply_add(p, y, p1)
+            q1 = multiply_add(q, y, q1)
+            y = load(x2, t)
+            p2 = multiply_add(p, y, p2)
+            q2 = multiply_add(q, y, q2)
+            y = load(x3, t)
+            p3 = multiply_add(p, y, p3)
+            q3 = multiply_add(q, y, q3)
+        u0, u1, u2, u3 = totals(p0, p1, p2, p3)
+        v0, v1, v2, v3 = totals(q0, q1, q2, q3)
+        for t in range(whole, k):
             a = u[t]
             b = v[t]
-            u0 += a * x0[t]
-            u1 += a * x1[t]
-            u2 += a * x2[t]
-            u3 += a * x3[t]
-            v0 += b * x0[t]
-            v1 += b * x1[t]
-            v2 += b * x2[t]
-            v3 += b * x3[t]
+            u0 = multiply_add(a, x0[t], u0)
+            u1 = multiply_add(a, x1[t], u1)
+            u2 = multiply_add(a, x2[t], u2)
+            u3 = multiply_add(a, x3[t], u3)
+            v0 = multiply_add(b, x0[t], v0)
+            v1 = multiply_add(b, x1[t], v1)
+            v2 = multiply_add(b, x2[t], v2)
+            v3 = multiply_add(b, x3[t], v3)
         inverse = 1.0 / u[k]
         x0[k] = (x0[k] - u0) * inverse
         x1[k] = (x1[k] - u1) * inverse
@@ -89,17 +126,10 @@ def _solve_four(factor: Array, size: int) -> None:
     if k < size:
         base = row_start(k)
         u = factor[base : base + k + 1]
-        u0 = u1 = u2 = u3 = 0.0
-        for t in range(k):
-            a = u[t]
-            u0 += a * x0[t]
-            u1 += a * x1[t]
-            u2 += a * x2[t]
-            u3 += a * x3[t]
-        x0[k] = (x0[k] - u0) / u[k]
-        x1[k] = (x1[k] - u1) / u[k]
-        x2[k] = (x2[k] - u2) / u[k]
-        x3[k] = (x3[k] - u3) / u[k]
+        x0[k] = (x0[k] - dot(u, x0, k)) / u[k]
+        x1[k] = (x1[k] - dot(u, x1, k)) / u[k]
+        x2[k] = (x2[k] - dot(u, x2, k)) / u[k]
+        x3[k] = (x3[k] - dot(u, x3, k)) / u[k]
 
 
 @jit
@@ -166,13 +196,13 @@ def append(
             members[size + r] = node
             if pivot <= tolerance * diagonal[node]:
                 return size + r
-            row[size + r] = pivot**0.5
+            row[size + r] = np.sqrt(pivot)
         size += group
         done += group
     return size
 
 
-@jit_sums
+@jit
 def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns: Array) -> None:
     """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
 
@@ -189,12 +219,12 @@ def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns
         start = row_start(r)
         row = factor[start : start + r + 1]
         # The column that is rotated into the factor: zero below the entry that rises.
-        extra = amount**0.5 if r == position else 0.0
+        extra = np.sqrt(amount) if r == position else 0.0
         for k in range(position, r):
             entry = row[k]
-            row[k] = turns[0, k] * entry + turns[1, k] * extra
-            extra = turns[0, k] * extra - turns[1, k] * entry
-        pivot = (row[r] * row[r] + extra * extra) ** 0.5
+            row[k] = multiply_add(turns[1, k], extra, turns[0, k] * entry)
+            extra = multiply_add(turns[0, k], extra, -turns[1, k] * entry)
+        pivot = np.sqrt(row[r] * row[r] + extra * extra)
         turns[0, r] = row[r] / pivot
         turns[1, r] = extra / pivot
         row[r] = pivot
@@ -211,19 +241,16 @@ def extend_forward(
         forward[r] = (values[members[r]] - dot(row, forward, r)) / row[r]
 
 
-@jit_sums
+@jit
 def substitute(factor: Array, size: int, values: Array, forward: Array) -> None:
     """Solve L forward = values, both in the order of the rows."""
     for r in range(size):
         start = row_start(r)
         row = factor[start : start + r + 1]
-        total = 0.0
-        for t in range(r):
-            total += row[t] * forward[t]
-        forward[r] = (values[r] - total) / row[r]
+        forward[r] = (values[r] - dot(row, forward, r)) / row[r]
 
 
-@jit_sums
+@jit
 def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> None:
     """Solve L^T solution = right, rows of L taken four at a time; `right` is used up."""
     i = size
@@ -246,7 +273,10 @@ def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> 
         solution[i + 2] = z2
         solution[i + 3] = z3
         for t in range(i):
-            right[t] -= z0 * r0[t] + z1 * r1[t] + z2 * r2[t] + z3 * r3[t]
+            less = multiply_add(-z0, r0[t], right[t])
+            less = multiply_add(-z1, r1[t], less)
+            less = multiply_add(-z2, r2[t], less)
+            right[t] = multiply_add(-z3, r3[t], less)
     while i > 0:
         i -= 1
         start = row_start(i)
@@ -254,4 +284,4 @@ def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> 
         z = right[i] / row[i]
         solution[i] = z
         for t in range(i):
-            right[t] -= z * row[t]
+            right[t] = multiply_add(-z, row[t], right[t])

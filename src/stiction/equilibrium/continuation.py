@@ -12,12 +12,11 @@ from stiction.equilibrium.instability_jump import (
     AT_FLOOR,
     SLIDING,
     UNDECIDED,
-    escape_run,
     jump,
-    step_to_floor,
 )
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.prepared import Setting
+from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.stable_path import CROWDED, REACHED, advance
 from stiction.equilibrium.window_test import runs_away_frozen
 from stiction.equilibrium.workspace import Sample, make_room
@@ -50,7 +49,8 @@ class Event:
 class State:
     """Where the path is: load, slip, K d, and whether it has ended in global sliding.
 
-    `direction` is that of the last instability, and `first` the state at the first one.
+    `direction` is that of the last instability, and `first` the state at the first one. `ahead` is
+    a slip that is known to lie below the equilibrium to which the present instability leads.
     """
 
     load: float
@@ -60,12 +60,18 @@ class State:
     sliding: bool = False
     events: list[Event] = field(default_factory=list)
     first: State | None = None
+    ahead: Array | None = None
 
 
 def residual_nodes(sample: Sample, slip: Array) -> Array:
-    """Which nodes have reached their floor, (n,) bool."""
-    reached: Array = slip >= AT_FLOOR * sample.critical
+    """Which nodes have reached their floor, (n,) bool; those of constant strength are none."""
+    reached: Array = (slip >= AT_FLOOR * sample.critical) & (sample.critical > 0.0)
     return reached
+
+
+def exceeds(sample: Sample, slip: Array) -> bool:
+    """Whether a slip that knows of no floor goes beyond one."""
+    return bool(np.any((slip > OVERSHOOT * sample.critical) & (sample.critical > 0.0)))
 
 
 def at_rest(sample: Sample) -> State:
@@ -81,17 +87,29 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
     before, stiff_before = state.slip.copy(), state.stiff.copy()
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
-    escape = MARGIN * escape_run(sample, state.load, setting.spacing, setting.modulus)
-    unbounded = not np.isfinite(step_to_floor(sample, state.slip, state.direction, np.inf))
-    if unbounded or runs_away_frozen(
+    escape = setting.escape(sample, state.load)
+    if state.ahead is None:
+        fate = runs_away(
+            sample, setting.wide_column, state.load, state.slip, state.stiff, state.direction,
+            setting.stiffness(state.direction), escape, setting.block, setting.reach,
+            np.empty((6, n)),
+        )  # fmt: skip
+    else:
+        state.slip, state.ahead, fate = state.ahead, None, UNDECIDED
+    escape *= MARGIN
+    if fate == UNDECIDED and runs_away_frozen(
         setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
     ):
         fate = SLIDING
-    else:
+    if fate == UNDECIDED:
         fate = jump(
             sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
             make_room(n),
         )  # fmt: skip
+    if fate == ARRESTED and not np.any(
+        residual_nodes(sample, state.slip) & ~residual_nodes(sample, before)
+    ):
+        fate = UNDECIDED  # round-off: only nodes that reach their floor can stop an instability
     if fate == UNDECIDED:
         warn_accuracy(
             "the jump of an unstable patch did not settle; it is counted as global sliding"
@@ -118,8 +136,7 @@ def leap(setting: Setting, sample: Sample, state: State) -> bool:
     found = setting.programme(strength, rate)
     if found is None or found.load < state.load:
         return False
-    weak = ~residual
-    if np.any(found.slip[weak] > OVERSHOOT * sample.critical[weak]):
+    if exceeds(sample, np.where(residual, 0.0, found.slip)):
         return False
     state.load, state.slip, state.stiff = found.load, found.slip, found.stiff
     state.direction = found.multiplier

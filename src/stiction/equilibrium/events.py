@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import check_instance
 from stiction._model import to_plain
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
@@ -54,6 +55,7 @@ def equilibrium_events(
     The patch jumps to the least equilibrium at the same load: an overdamped interface would stop
     there. Inertia may carry a rupture through; only `Rupture` decides that.
     """
+    check_instance("problem", problem, Problem)
     rows = problem.sample(profiles)
     _, events = Solver(problem).solve(rows)
     found = [(sample, event) for sample, several in events.items() for event in several]

@@ -85,7 +85,7 @@ def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     count = 0
     for q in range(2 * n):
         i = q if q < n else q - n
-        if slip[i] >= AT_FLOOR * sample.critical[i]:
+        if slip[i] > 0.0 and slip[i] >= AT_FLOOR * sample.critical[i]:
             run += 1
             count += 1
         else:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import check_instance
 from stiction._model import real_array, to_plain
 from stiction._typing import Array
 from stiction.equilibrium.continuation import State, at_rest, follow, residual_nodes
@@ -102,6 +103,7 @@ def equilibrium_path(
         If there is more than one profile or the loads do not rise, and as `onset` does.
     """
     given = _check_loads(loads)
+    check_instance("problem", problem, Problem)
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")

@@ -7,21 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction._typing import Array
-from stiction.elasticity.line_stiffness import coupling_strip, stiffness_column
+from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
 from stiction.equilibrium.batch import certificate, start_from_bound
+from stiction.equilibrium.instability_jump import escape_run
 from stiction.equilibrium.linear_program import OVERFULL, SOLVED, solve_program
 from stiction.equilibrium.linear_program_cg import LargeProgram, Solution
 from stiction.equilibrium.single_patch_test import block_factor
 from stiction.equilibrium.window_bound import Windows, exact_window, window_bound, windows_between
 from stiction.equilibrium.workspace import Grid, Sample, make_room
+from stiction.errors import InputError
 from stiction.problem import Problem
 
-LONGEST_RUN = 512
+LONGEST_RUN = 2048
 """Nodes up to which the quick test for arrest follows a run."""
 LARGE_GRID = 4096
 """Nodes from which on the large path may be faster."""
 MANY_NODES = 600
 """Nodes weaker than the upper bound of the load from which on it is."""
+WIDEST_PATCH = 256
+"""Nodes in the nucleation length beyond which a large grid takes too long: the slipping nodes are
+too many for a dense factor, and a patch is as wide as a segment of the preconditioner."""
 PATIENCE = 1000
 """Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
 
@@ -40,21 +45,30 @@ class Setting:
     Parameters
     ----------
     problem : Problem
+    nodes : slice
+        Nodes of the problem that are taken: all, or every second one.
+    prove_sliding : bool
+        Whether no length of a rupture counts as unstoppable.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(
+        self, problem: Problem, nodes: slice = slice(None), prove_sliding: bool = False
+    ) -> None:
         self.problem = problem
-        self.nodes = problem.interface.size
-        self.spacing = problem.interface.spacing
+        self.caution = np.inf if prove_sliding else 1.0
+        every = nodes.step or 1
+        self.nodes = problem.interface.size // every
+        self.spacing = problem.interface.spacing * every
         self.modulus = problem.effective_modulus
         self.unit = np.pi * self.modulus / problem.interface.extent
+        rate = problem.friction.weakening_rate
+        if rate is not None:
+            self.refuse_too_fine(float(np.max(rate)))
         column = stiffness_column(self.nodes, problem.interface.extent, self.modulus)
         self.grid = Grid(column, coupling_strip(column))
         self.wide_column = np.tile(column, 3)
-        self.profile = np.array(
-            np.broadcast_to(problem.load.profile, (self.nodes,)), dtype=np.float64
-        )
-        rate = problem.friction.weakening_rate
+        profile = np.broadcast_to(problem.load.profile, problem.interface.shape)
+        self.profile = np.array(profile[nodes], dtype=np.float64)
         uniform = rate is not None and np.ptp(rate) == 0.0
         self.usual_rate = float(np.max(rate)) if uniform else np.nan
         none = Windows(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((1, 1)))
@@ -62,6 +76,34 @@ class Setting:
         self._none = none
         self.reach = min(LONGEST_RUN, self.nodes - 1)
         self.block = block_factor(column, self.reach)
+
+    def refuse_too_fine(self, steepest_rate: float) -> None:
+        """`InputError` where a grid is so much too fine that it would take minutes."""
+        resolution = self.problem.nucleation_length_of(steepest_rate) / self.spacing
+        if self.nodes < LARGE_GRID or resolution <= WIDEST_PATCH:
+            return
+        share = int(np.ceil(resolution / WIDEST_PATCH))
+        raise InputError(
+            f"interface.nodes: the nucleation length spans {resolution:.4g} of {self.nodes} nodes;"
+            f" on grids of {LARGE_GRID} nodes or more Equilibrium takes at most {WIDEST_PATCH} of"
+            " them (it would need minutes a sample, and 64 leave an error of 3e-5). Take"
+            f" every {share}th node or fewer, interface.nodes <= {self.nodes // (2 * share) * 2}"
+        )
+
+    def escape(self, sample: Sample, load: float) -> float:
+        """Residual nodes in a row that count as unstoppable."""
+        return self.caution * float(escape_run(sample, load, self.spacing, self.modulus))
+
+    def stiffness(self, field: Array) -> Array:
+        """K times a field, (n,) array."""
+        result = np.empty(self.nodes)
+        members = np.flatnonzero(field)
+        room = np.empty((2, self.nodes // 2))
+        apply_stiffness(
+            self.grid.strip, self.grid.column[0], members, members.size, field[members], room,
+            result,
+        )  # fmt: skip
+        return result
 
     def windows(self, rates: Array) -> Windows:
         """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""

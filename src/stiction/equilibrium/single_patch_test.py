@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import ZERO, jit, jit_sums
+from stiction._jit import jit
+from stiction._lanes import multiply_add
 from stiction._typing import Array
-from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
+from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.instability_jump import (
     AT_FLOOR,
     SLIDING,
     UNDECIDED,
     step_to_floor,
     strength_at,
+    unsupported,
 )
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.workspace import Sample
@@ -31,20 +33,34 @@ SHARE = 1e-3
 
 @jit
 def block_factor(column: Array, width: int) -> Array:
-    """Cholesky factor of the leading block of K, for runs of up to `width` nodes."""
+    """Cholesky factor of the leading block of K, for runs of up to `width` nodes.
+
+    The block is a Toeplitz matrix: its factor follows column by column from two vectors, in
+    `width`^2 operations (the algorithm of Schur; Kailath and Sayed, 1999).
+    """
     factor = np.empty(row_start(width + 4))
-    members = np.empty(width + 4, np.int64)
-    nodes = np.arange(width)
-    diagonal = np.full(column.shape[0], column[0])
-    append(factor, ZERO, members, nodes, width, column, diagonal, 0.0)
+    upper = column[:width] / np.sqrt(column[0])
+    lower = upper.copy()
+    for k in range(width):
+        if k > 0:
+            # One step down, and the hyperbolic rotation that clears entry k of the second vector.
+            for r in range(width - 1, k - 1, -1):
+                upper[r] = upper[r - 1]
+            turn = lower[k] / upper[k]
+            length = np.sqrt((1.0 - turn) * (1.0 + turn))
+            for r in range(k, width):
+                upper[r] = (upper[r] - turn * lower[r]) / length
+                lower[r] = length * lower[r] - turn * upper[r]
+        for r in range(k, width):
+            factor[row_start(r) + k] = upper[r]
     return factor
 
 
-@jit_sums
+@jit
 def _add_scaled(target: Array, source: Array, first: int, count: int, factor: float) -> None:
     part = source[first : first + count]
     for i in range(count):
-        target[i] += factor * part[i]
+        target[i] = multiply_add(factor, part[i], target[i])
 
 
 @jit
@@ -70,8 +86,10 @@ def runs_away(
         First column of K, three times over.
     load : float
         tau_0, Pa.
-    slip, stiff : (n,) arrays, changed
-        d of the state that became unstable, and K d.
+    slip : (n,) array, changed
+        d of the state that became unstable; afterwards a lower bound of the next equilibrium.
+    stiff : (n,) array
+        K d of that state.
     direction, stiff_direction : (n,) arrays
         In which it is unstable, and K times it.
     escape : float
@@ -90,7 +108,7 @@ def runs_away(
     if not np.isfinite(step):
         return SLIDING
     first, length, _ = main_patch(direction)
-    if escape > width or length > width:
+    if (np.isfinite(escape) and escape > width) or length > width:
         return UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     origin = (first - (n - length) // 2) % n
@@ -142,7 +160,7 @@ def runs_away(
             fastest = max(fastest, solution[t])
             run = run + 1 if slip[i] >= AT_FLOOR * sample.critical[i] else 0
             longest = max(longest, run)
-        if longest >= escape:
+        if longest >= escape or unsupported(sample, load, slip):
             return SLIDING
         if fastest < SHARE * largest:
             return UNDECIDED

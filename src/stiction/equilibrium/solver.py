@@ -8,24 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._typing import Array
-from stiction.equilibrium import batch
+from stiction.equilibrium import batch, discretization
 from stiction.equilibrium.batch import solve_batch
 from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.continuation import (
-    OVERSHOOT,
     Event,
     State,
     at_rest,
+    exceeds,
     fall,
     follow,
     residual_nodes,
 )
-from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED, escape_run
+from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED
 from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.prepared import LARGE_GRID, Setting
 from stiction.equilibrium.single_patch_test import runs_away
-from stiction.equilibrium.workspace import Sample
+from stiction.equilibrium.workspace import Sample, make_sample
 from stiction.errors import warn_accuracy
 from stiction.problem import Problem
 from stiction.sample import Sample as Samples
@@ -40,7 +40,7 @@ def sample_of(rows: Samples, row: int) -> Sample:
     excess = np.ascontiguousarray(rows.strength[row] - initial)
     floor = np.ascontiguousarray(rows.residual_strength[row] - initial)
     rate = np.array(rows.weakening_rate[row])
-    return Sample(excess, floor, np.array(rows.load_profile), rate, (excess - floor) / rate)
+    return make_sample(excess, floor, np.array(rows.load_profile), rate)
 
 
 class Solver:
@@ -51,12 +51,30 @@ class Solver:
     problem : Problem
     sensitivity, slip : bool
         Whether to return these as well.
+    discretization_error : bool
+        Whether to estimate it, from the onsets on every second node.
+    prove_sliding : bool
+        Whether to follow jumps until no balance of forces is left.
+    nodes : slice
+        Nodes of the problem that the rows have.
     """
 
-    def __init__(self, problem: Problem, sensitivity: bool = False, slip: bool = False) -> None:
-        self.setting = Setting(problem)
+    def __init__(
+        self,
+        problem: Problem,
+        sensitivity: bool = False,
+        slip: bool = False,
+        discretization_error: bool = False,
+        prove_sliding: bool = False,
+        nodes: slice = slice(None),
+    ) -> None:
+        self.setting = Setting(problem, nodes, prove_sliding)
         self.sensitivity = sensitivity
         self.slip = slip
+        self.halves: list[Solver] = []
+        if discretization_error:
+            discretization.check(problem)
+            self.halves = [Solver(problem, nodes=slice(first, None, 2)) for first in (0, 1)]
 
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """The onset of each row; see `Equilibrium` for what comes back."""
@@ -64,21 +82,40 @@ class Solver:
 
     def solve(self, rows: Samples) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
         """The onset of each row, and the arrested events of the rows that have any."""
-        self.setting.problem.warn_if_coarse(
-            rows, 8.0, "single onsets are about 0.5 % off at 9 nodes and 1 to 2 % at 4"
-        )
-        count, nodes = rows.samples, self.setting.nodes
+        if not self.halves:
+            self.setting.problem.warn_if_coarse(rows, 8.0, discretization.ROUGHLY)
+        values, events = self._solve(rows)
+        if self.halves:
+            coarse = [
+                half._solve(rows.every_second(first))[0]["first_instability"]
+                for first, half in enumerate(self.halves)
+            ]
+            values["discretization_error"] = discretization.estimate(
+                values["first_instability"], coarse
+            )
+        return values, events
+
+    def _solve(self, rows: Samples) -> tuple[dict[str, NDArray[Any]], dict[int, list[Event]]]:
+        """The same without a word on the grid."""
+        self.setting.refuse_too_fine(float(rows.weakening_rate.max()))
+        count, nodes = rows.samples, rows.strength.shape[1]
         table = np.empty((count, batch.COLUMNS))
         multipliers = np.empty((count, nodes))
-        slips = np.empty((count if self.slip else 0, nodes))
-        known: dict[int, Solution] = {}
+        slips = np.empty((count, nodes))  # what is never written takes no memory
+        known: dict[int, State] = {}
         if nodes < LARGE_GRID:
-            self._batch(rows, table, slips, multipliers)
+            stiffs, aheads = np.empty((2, count, nodes))
+            self._batch(rows, table, slips, stiffs, aheads, multipliers)
+            for row in map(int, np.flatnonzero(table[:, batch.FATE] == UNDECIDED)):
+                known[row] = State(
+                    float(table[row, batch.LOAD]), slips[row].copy(), stiffs[row],
+                    multipliers[row].copy(), ahead=aheads[row],
+                )  # fmt: skip
         else:
             for row in range(count):
-                solution = self._one(rows, row, table, slips, multipliers)
-                if solution is not None and table[row, batch.FATE] == UNDECIDED:
-                    known[row] = solution
+                state = self._one(rows, row, table, slips, multipliers)
+                if state is not None:
+                    known[row] = state
         load = table[:, batch.LOAD].copy()
         first = load.copy()
         fate = table[:, batch.FATE].astype(np.int64)
@@ -87,7 +124,12 @@ class Solver:
         sliding_at = table[:, batch.POSITION].copy()
         for row in map(int, np.flatnonzero(fate != SLIDING)):
             sample = sample_of(rows, row)
-            state = self._follow(sample, fate[row] == batch.FLOOR_REACHED, known.get(row))
+            if row in known:
+                state = known[row]
+                fall(self.setting, sample, state)
+            else:
+                state = at_rest(sample)
+            follow(self.setting, sample, state)
             load[row] = state.load
             if state.events:
                 events[row] = state.events
@@ -120,17 +162,15 @@ class Solver:
             values["sensitivity"] = multipliers * mean_profile
         return values, events
 
-    def _follow(self, sample: Sample, from_rest: bool, solution: Solution | None) -> State:
-        """Follow one sample to global sliding, from rest or from its first instability."""
-        if not from_rest and solution is None:
-            solution = self.setting.programme(sample.excess, sample.rate)
-        if from_rest or solution is None:
-            return follow(self.setting, sample, at_rest(sample))
-        state = State(solution.load, solution.slip, solution.stiff, solution.multiplier)
-        fall(self.setting, sample, state)
-        return follow(self.setting, sample, state)
-
-    def _batch(self, rows: Samples, table: Array, slips: Array, multipliers: Array) -> None:
+    def _batch(
+        self,
+        rows: Samples,
+        table: Array,
+        slips: Array,
+        stiffs: Array,
+        aheads: Array,
+        multipliers: Array,
+    ) -> None:
         """Solve the programme of all rows in one compiled loop."""
         setting = self.setting
         rate = np.ascontiguousarray(rows.weakening_rate)
@@ -140,13 +180,16 @@ class Solver:
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
             setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column,
             setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
-            setting.modulus, table, slips, multipliers,
+            setting.modulus, setting.caution, table, slips, stiffs, aheads, multipliers, self.slip,
         )  # fmt: skip
 
     def _one(
         self, rows: Samples, row: int, table: Array, slips: Array, multipliers: Array
-    ) -> Solution | None:
-        """Solve the programme of one row on a large grid, and test quickly for arrest."""
+    ) -> State | None:
+        """Solve the programme of one row on a large grid, and test quickly for arrest.
+
+        Returns the first instability if it is to be followed from there.
+        """
         setting = self.setting
         sample = sample_of(rows, row)
         line = table[row]
@@ -167,16 +210,19 @@ class Solver:
         _, length, centre = main_patch(solution.multiplier)
         line[batch.POSITION] = centre * setting.spacing
         line[batch.LENGTH] = length * setting.spacing
-        if np.any(solution.slip > OVERSHOOT * sample.critical):
+        if exceeds(sample, solution.slip):
             line[batch.FATE] = batch.FLOOR_REACHED
-            return solution
+            return None
+        ahead = solution.slip.copy()
         line[batch.FATE] = runs_away(
-            sample, setting.wide_column, solution.load, solution.slip.copy(),
-            solution.stiff.copy(), solution.multiplier, stiff_multiplier,
-            escape_run(sample, solution.load, setting.spacing, setting.modulus), setting.block,
-            setting.reach, np.empty((6, setting.nodes)),
+            sample, setting.wide_column, solution.load, ahead, solution.stiff,
+            solution.multiplier, stiff_multiplier,
+            setting.escape(sample, solution.load), setting.block, setting.reach,
+            np.empty((6, setting.nodes)),
         )  # fmt: skip
-        return solution
+        if line[batch.FATE] == SLIDING:
+            return None
+        return State(solution.load, solution.slip, solution.stiff, solution.multiplier, ahead=ahead)
 
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""

@@ -34,7 +34,8 @@ def build(
     count = ZERO
     for i in range(slip.shape[0]):
         room.inside[i] = slip[i] > 0.0
-        residual[i] = room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i]
+        constant = sample.critical[i] == 0.0
+        residual[i] = constant or (room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i])
         strength[i] = sample.floor[i] if residual[i] else sample.excess[i]
         room.diagonal[i] = grid.column[0] - (0.0 if residual[i] else sample.rate[i])
         if room.inside[i]:

@@ -57,7 +57,7 @@ def runs_away_frozen(
     load : float
         tau_0, Pa.
     slip : (n,) array, changed
-        d after the first step along the unstable `direction`.
+        A lower bound of the next equilibrium, beyond the state that is unstable in `direction`.
     escape, steps : float, int
         As for `jump`.
 

@@ -11,13 +11,17 @@ from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import row_start
 
+FLAT = 1e-11
+"""Share of the mean strength by which it must fall to count as weakening. Less cannot be told from
+the round-off of K d; an instability of such nodes would be one of nothing, and never end."""
+
 
 class Sample(NamedTuple):
     """One strength profile; all arrays of shape (n,).
 
     `excess` is tau_p - tau_i and `floor` tau_r - tau_i (Pa): stress is counted from the initial
     one. `profile` is the load profile, `rate` the weakening rate W (Pa/m), and `critical` the slip
-    d_c (m) at which the floor is reached.
+    d_c (m) at which the floor is reached. Nodes of constant strength have both 0.
     """
 
     excess: Array
@@ -25,6 +29,26 @@ class Sample(NamedTuple):
     profile: Array
     rate: Array
     critical: Array
+
+
+@jit
+def make_sample(excess: Array, floor: Array, profile: Array, rate: Array) -> Sample:
+    """A sample in which nodes that are at their floor, but for round-off, do not weaken."""
+    n = excess.shape[0]
+    scale = 0.0
+    for i in range(n):
+        scale += max(abs(excess[i]), abs(floor[i]))
+    critical = np.empty(n)
+    moving = rate.copy()
+    bottom = floor.copy()
+    for i in range(n):
+        if excess[i] - floor[i] <= FLAT * scale / n:
+            bottom[i] = excess[i]
+            moving[i] = 0.0
+            critical[i] = 0.0
+        else:
+            critical[i] = (excess[i] - floor[i]) / rate[i]
+    return Sample(excess, bottom, profile, moving, critical)
 
 
 class Grid(NamedTuple):

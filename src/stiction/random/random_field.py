@@ -11,6 +11,7 @@ import numpy as np
 import pydantic
 from pydantic import model_validator
 
+from stiction._checks import check_choice, too_many_samples
 from stiction._model import Flag, Positive, describe, model, real_array, whole
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
@@ -277,18 +278,19 @@ class RandomField:
 
 
 def _which(of: str) -> str:
-    if of not in ("strength", "z"):
-        raise InputError(f"of: must be 'strength' or 'z', got {of!r}")
+    check_choice("of", of, ("strength", "z"))
     return of
 
 
 def _check_counts(**counts: Any) -> dict[str, int]:
     numbers = {name: whole(value) for name, value in counts.items()}
     problems = [
-        f"{name}: must be a whole number >= 0, got {counts[name]!r}"
+        f"{name}: must be a whole number >= 0, got {describe(counts[name])}"
         for name, number in numbers.items()
         if number is None or number < 0
     ]
+    if not problems:
+        problems = too_many_samples(counts["samples"], counts["first"])
     if problems:
         raise InputError(problems)
     return {name: int(counts[name]) for name in numbers}
@@ -301,18 +303,19 @@ MOST_MODES = 1 << 22
 def _modes(field: RandomField, interface: Interface) -> Modes:
     spacing = 2.0 * math.pi / interface.extent
     # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
-    count = math.floor(field.spectrum.cutoff / spacing * (1.0 + 1e-12))
+    most = field.spectrum.cutoff / spacing * (1.0 + 1e-12)
+    if not most <= MOST_MODES:
+        raise InputError(
+            f"spectrum: has {most:.10g} modes on an interface of {interface.length:g} m, at most"
+            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
+        )
+    count = math.floor(most)
     if count < 1 and not field.mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {interface.length:g} m: the first mode"
             f" is at {spacing:.3g} rad/m, the spectrum is truncated at"
             f" {field.spectrum.cutoff:.3g} rad/m; shorten the correlation length, lengthen the"
             " interface or raise the truncation"
-        )
-    if count > MOST_MODES:
-        raise InputError(
-            f"spectrum: has {count} modes on an interface of {interface.length:g} m, at most"
-            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
         )
     power = np.zeros(count + 1)
     power[1:] = field.spectrum.density(spacing * np.arange(1, count + 1))

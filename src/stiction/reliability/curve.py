@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction._checks import is_whole
 from stiction._model import describe, to_plain
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction._typing import Array
@@ -28,7 +29,6 @@ from stiction.reliability.limit_state import (
     Event,
     LimitState,
     make_limit_state,
-    whole_number,
 )
 from stiction.reliability.plain_monte_carlo import BATCH
 from stiction.reliability.result import say
@@ -154,13 +154,13 @@ def failure_curve(
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_probability("smallest", smallest) + check_time_limit(time_limit)
     meter = Meter("failure_curve", show=progress, time_limit=time_limit)
-    for name, value, least in (
-        ("points_per_decade", points_per_decade, 1),
-        ("plain_samples", plain_samples, 0),
+    for name, value, least, most in (
+        ("points_per_decade", points_per_decade, 1, 1000),
+        ("plain_samples", plain_samples, 0, 10**9),
     ):
-        if not whole_number(value, least):
-            text = f"{name}: must be a whole number >= {least}, got {describe(value)}"
-            problems.append(text)
+        if not is_whole(value, least) or value > most:
+            given = describe(value)
+            problems.append(f"{name}: must be a whole number from {least} to {most}, got {given}")
     state = make_limit_state(
         problem,
         random,

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stiction._checks import is_real
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction.criterion.method import LocalCriterion
@@ -34,7 +35,7 @@ from stiction.reliability.estimate import (
     check_target,
     usable_first_stage,
 )
-from stiction.reliability.limit_state import Event, LimitState, make_limit_state, real_number
+from stiction.reliability.limit_state import Event, LimitState, make_limit_state
 from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
 from stiction.reliability.result import above_bound, say
 from stiction.reliability.subset import Descent, descend
@@ -106,7 +107,7 @@ class DesignStress:
 
 def check_probability(name: str, value: Any) -> list[str]:
     """Why a number is no probability to sample for."""
-    if not real_number(value) or not 0.0 < value < 1.0:
+    if not is_real(value) or not 0.0 < value < 1.0:
         return [f"{name}: must lie between 0 and 1, got {describe(value)}"]
     if value < 1e-30:
         return [f"{name}: must be at least 1e-30, got {value!r}"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 import numpy as np
 
+from stiction._checks import is_finite, is_real, is_whole
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction._typing import Array
@@ -29,8 +29,6 @@ from stiction.reliability.limit_state import (
     Event,
     LimitState,
     make_limit_state,
-    real_number,
-    whole_number,
 )
 from stiction.reliability.plain_monte_carlo import tally
 from stiction.reliability.result import FailureProbability
@@ -48,14 +46,20 @@ FREQUENT = 0.01
 """From here on plain sampling needs no more evaluations than subset simulation."""
 
 
+LEAST_COV = 1e-6
+"""A smaller coefficient of variation would take more than 1e12 failures."""
+
+
 def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list[str]:
     """What is wrong with the options that all of the room share."""
     problems = []
-    if not (real_number(target_cov) and 0.0 < target_cov < math.inf):
-        problems.append(f"target_cov: must be a positive number, got {describe(target_cov)}")
-    if not (real_number(confidence) and 0.0 < confidence < 1.0):
+    if not (is_finite(target_cov) and target_cov >= LEAST_COV):
+        problems.append(
+            f"target_cov: must be a number >= {LEAST_COV:g}, got {describe(target_cov)}"
+        )
+    if not (is_real(confidence) and 0.0 < confidence < 1.0):
         problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
-    if max_evaluations is not None and not whole_number(max_evaluations, 100):
+    if max_evaluations is not None and not is_whole(max_evaluations, 100):
         problems.append(
             f"max_evaluations: must be a whole number >= 100, got {describe(max_evaluations)}"
         )
@@ -64,7 +68,7 @@ def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list
 
 def check_stress(name: str, value: Any) -> list[str]:
     """Why a number is no stress."""
-    if real_number(value) and math.isfinite(value):
+    if is_finite(value):
         return []
     return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
 
@@ -79,8 +83,10 @@ def usable_first_stage(state: LimitState) -> str | None:
 
 def check_algorithm(state: LimitState, algorithm: str, valid: tuple[str, ...]) -> list[str]:
     """Why an algorithm cannot be used here; no texts if it can."""
+    if not isinstance(algorithm, str):
+        return [f"algorithm: must be one of {', '.join(valid)}, got {describe(algorithm)}"]
     if algorithm not in valid:
-        return [unknown_name("algorithm", str(algorithm), valid)]
+        return [unknown_name("algorithm", algorithm, valid)]
     if state.method.type == "rupture" and algorithm not in ("auto", "plain"):
         return [f"algorithm: {algorithm!r} would take days by rupture; use 'plain' or 'auto'"]
     reason = None

@@ -7,16 +7,18 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._model import describe, whole
+from stiction._checks import is_whole
+from stiction._model import describe
 from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
 from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
+from stiction.evaluation import accepted
 from stiction.friction.law import SCALES
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
@@ -28,17 +30,6 @@ Event = Literal["critical_stress", "first_instability"]
 
 PIECE = 16
 """Fewest rows worth a thread of their own."""
-
-
-def whole_number(value: Any, least: int) -> bool:
-    """Whether a value is a whole number, and not less than `least`."""
-    number = whole(value)
-    return number is not None and number >= least
-
-
-def real_number(value: Any) -> bool:
-    """Whether a value is a number and neither text nor a truth value; NaN and infinity are."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -96,7 +87,8 @@ class LimitState:
 
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
-        return dict(self._solver(self.problem.sample(profiles)))
+        accept = (*accepted(self.method), "constant")  # of which `check_residual` has warned
+        return dict(self._solver(self.problem.sample(profiles, accept=accept)))
 
     def _stress(self, draws: Array) -> Array:
         # Rounding may leave a stress a hair below the bound.
@@ -208,14 +200,16 @@ def make_limit_state(
         What else is wrong, once there is a limit state.
     """
     found = list(problems)
-    if event not in ("critical_stress", "first_instability"):
-        found.append(f"event: must be 'critical_stress' or 'first_instability', got {event!r}")
-    if workers is not None and not whole_number(workers, 1):
+    if not isinstance(event, str) or event not in get_args(Event):
+        given = describe(event)
+        found.append(f"event: must be 'critical_stress' or 'first_instability', got {given}")
+    if workers is not None and not is_whole(workers, 1):
         found.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     state = None
     try:
         interface = make_plan(problem, random, method, seed).random
-        kind: Event = "first_instability" if event == "first_instability" else "critical_stress"
+        first = isinstance(event, str) and event == "first_instability"
+        kind: Event = "first_instability" if first else "critical_stress"
         state = LimitState(problem, interface, method, kind)
         found += check(state) if check else []
     except InputError as error:

@@ -15,7 +15,17 @@ from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed
 from stiction.problem import Problem
-from stiction.report.style import PAGE, PALE, QUIET, color, marker, new_figure, paper_style, series
+from stiction.report.style import (
+    PAGE,
+    PALE,
+    QUIET,
+    color,
+    marker,
+    new_figure,
+    paper_style,
+    save_figure,
+    series,
+)
 
 _GAP: dict[str, Any] = {"facecolor": PALE, "alpha": 0.6, "linewidth": 0.0, "zorder": 0.0}
 NAMES = {
@@ -105,4 +115,4 @@ def write_onset_figure(
 ) -> None:
     """`draw_onset` as a file."""
     with paper_style():
-        draw_onset(problem, tau_p, results).savefig(path)
+        save_figure(draw_onset(problem, tau_p, results), path)

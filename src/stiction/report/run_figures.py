@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from stiction.report.style import PAGE, color, new_figure, panel, paper_style, series
+from stiction.errors import InputError
+from stiction.report.style import PAGE, color, new_figure, panel, paper_style, save_figure, series
 from stiction.statistics.densities import density
 from stiction.statistics.quantiles import quantiles
 from stiction.stored_run import StoredRun
@@ -235,10 +236,20 @@ def _shown(step: xr.DataArray) -> str:
 
 
 def write_figures(stored: StoredRun, folder: Path) -> Iterator[Path]:
-    """Write every figure as PNG and PDF, and say where."""
+    """Write every figure as PNG and PDF, and say where.
+
+    Raises
+    ------
+    InputError
+        If nothing is stored yet.
+    StoreError
+        If one cannot be written.
+    """
+    if not stored.status().done:
+        raise InputError(f"{stored.path}: no sample is stored yet")
     with paper_style():
         for drawn in run_figures(stored):
             for ending in ("png", "pdf"):
                 path = folder / f"{drawn.name}.{ending}"
-                drawn.figure.savefig(path)
+                save_figure(drawn.figure, path)
                 yield path

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.animation import FFMpegWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
@@ -49,6 +48,12 @@ def _need(run: xr.Dataset, *names: str) -> None:
             f"run: has no {', '.join(missing)}; keep it with simulate_rupture(variables=...), or "
             "read a stored run with open_rupture"
         )
+
+
+def _shown_strength(run: xr.Dataset) -> Floats:
+    """Peak strength, MPa, with gaps where it is infinite."""
+    strength = run["peak_strength"].values / _MEGA
+    return np.where(np.isfinite(strength), strength, np.nan)
 
 
 def _edges(centres: Floats) -> Floats:
@@ -126,12 +131,13 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         beside = figure.add_subplot(grid[2, 0], sharey=whole)
         bar = figure.add_subplot(grid[1:, 2])
 
-        strength = run["peak_strength"].values / _MEGA
+        strength = _shown_strength(run)
         top.plot(x * _MILLI, strength, color=INK, linewidth=0.9)
-        height = strength.max() + 0.04 * np.ptp(strength)
+        lowest, highest = np.nanmin(strength), np.nanmax(strength)
+        height = highest + 0.04 * (highest - lowest)
         _nucleation_arrow(top, problem, run, height)
         top.set_ylabel(r"$\tau_p$ (MPa)")
-        top.set_ylim(strength.min() - 0.05, height + 0.25 * np.ptp(strength))
+        top.set_ylim(lowest - 0.05, height + 0.25 * (highest - lowest))
 
         before = _BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
         near = np.flatnonzero(times >= onset - before)
@@ -219,13 +225,13 @@ def _pictures(times: Floats, count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, times.size - 1, min(count, times.size)).round().astype(int))
 
 
-def _save(path: Path, figure: Figure, lines: list[Any], show: Any, shown: Any, rate: int) -> None:
+def _write_gif(
+    path: Path, figure: Figure, moving: list[Any], show: Any, shown: Any, rate: int
+) -> None:
     """Draw the pictures one by one; only the moving parts are drawn again."""
     canvas = FigureCanvasAgg(figure)
-    figure.canvas.draw()
-    figure.set_layout_engine("none")  # the panels must not move between pictures
-    for line in lines:
-        line.set_animated(True)
+    for part in moving:
+        part.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(figure.bbox)
 
@@ -233,36 +239,34 @@ def _save(path: Path, figure: Figure, lines: list[Any], show: Any, shown: Any, r
         for i in shown:
             show(i)
             canvas.restore_region(background)
-            for line in lines:
-                figure.draw_artist(line)
+            for part in moving:
+                figure.draw_artist(part)
             yield Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
 
-    if path.suffix == ".gif":
-        # One palette for all pictures keeps the still parts still.
-        images = [picture.quantize(64, dither=Image.Dither.NONE) for picture in pictures()]
-        images[0].save(
-            path, save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0
-        )
-        return
-    width, height = canvas.get_width_height()
-    command = [
-        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
-        "-s", f"{width}x{height}", "-r", str(rate), "-i", "-",
-        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", str(path),
-    ]  # fmt: skip
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
-        assert process.stdin is not None
-        for picture in pictures():
-            process.stdin.write(picture.tobytes())
-        process.stdin.close()
-        if process.wait() != 0:
-            raise OSError(f"ffmpeg could not write {str(path)!r}")
+    # One palette for all pictures keeps the still parts still.
+    images = [picture.quantize(64, dither=Image.Dither.NONE) for picture in pictures()]
+    images[0].save(
+        path, save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0
+    )
+
+
+def _write_mp4(path: Path, figure: Figure, show: Any, shown: Any, rate: int) -> None:
+    writer = FFMpegWriter(fps=rate)
+    with writer.saving(figure, str(path), figure.dpi):
+        for i in shown:
+            show(i)
+            writer.grab_frame()
+
+
+def can_write_mp4() -> bool:
+    """Whether the program ffmpeg is there (or where matplotlib's `animation.ffmpeg_path` says)."""
+    return bool(FFMpegWriter.isAvailable())
 
 
 def _check_name(path: Path) -> None:
     if path.suffix not in (".gif", ".mp4"):
         raise InputError(f"film: the name must end in .gif or .mp4, got {path.name!r}")
-    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+    if path.suffix == ".mp4" and not can_write_mp4():
         raise InputError(f"film: {path.name!r} needs the program ffmpeg; use a .gif instead")
 
 
@@ -282,7 +286,7 @@ def rupture_film(
         From `simulate_rupture`, with `slip_rate`, `shear_stress`.
     problem : Problem
     path : path
-        Ends in .gif, or in .mp4 where ffmpeg is installed.
+        Ends in .gif, or in .mp4 where ffmpeg is installed (matplotlib's writer finds it).
     pictures : int
         At most so many; they are spread evenly over the frames of the run, which lie closer in
         time as the interface accelerates.
@@ -305,7 +309,7 @@ def rupture_film(
     times, onset = run["time"].values, float(run["onset_time"])
     stress = run["shear_stress"].values / _MEGA
     slip_rate = np.maximum(run["slip_rate"].values, 1e-9)
-    strength = run["peak_strength"].values / _MEGA
+    strength = _shown_strength(run)
     mean = run["mean_stress"].values / _MEGA
     with paper_style():
         figure = new_figure(PAGE * 0.9, 3.8)
@@ -313,8 +317,9 @@ def rupture_film(
         above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
         (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
         above.set_ylabel("stress (MPa)")
-        margin = 0.06 * np.ptp(strength)
-        above.set_ylim(min(0.0, stress.min()) - margin, max(strength.max(), stress.max()) + margin)
+        highest = np.nanmax(strength)
+        margin = 0.06 * (highest - np.nanmin(strength))
+        above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
         above.legend(loc="upper right", ncols=2)
         (moving,) = below.semilogy(x, slip_rate[0], color=ACCENT)
         below.set_ylim(1e-7, 100.0)
@@ -331,5 +336,11 @@ def rupture_film(
                 rf"$\langle\tau\rangle$ = {mean[i]:.3f} MPa"
             )
 
-        _save(target, figure, [line, moving, clock], show, _pictures(times, pictures), rate)
+        figure.canvas.draw()
+        figure.set_layout_engine("none")  # the panels must not move between pictures
+        shown = _pictures(times, pictures)
+        if target.suffix == ".gif":
+            _write_gif(target, figure, [line, moving, clock], show, shown, rate)
+        else:
+            _write_mp4(target, figure, show, shown, rate)
     return target

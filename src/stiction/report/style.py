@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from stiction.ensemble.files import write_whole
 
 COLUMN = 3.375
 PAGE = 6.75
@@ -69,6 +73,19 @@ def paper_style() -> Iterator[None]:
     """Draw inside this: fonts, widths and ticks of a printed page."""
     with matplotlib.rc_context(_RC):
         yield
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    data = io.BytesIO()
+    figure.savefig(data, format=path.suffix[1:])
+    write_whole(path, data.getvalue())
 
 
 def new_figure(width: float, height: float) -> Figure:

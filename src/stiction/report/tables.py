@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from stiction.ensemble.files import write_whole
 
 
 @dataclass(frozen=True)
@@ -42,12 +45,13 @@ class Table:
         return cls(name, title, tuple(columns), fixed)
 
     def write_csv(self, folder: Path) -> Path:
-        """Write full precision to folder/name.csv."""
+        """Write full precision to folder/name.csv, whole or not at all."""
         path = folder / f"{self.name}.csv"
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(self.columns)
-            writer.writerows(self.rows)
+        text = io.StringIO(newline="")
+        writer = csv.writer(text)
+        writer.writerow(self.columns)
+        writer.writerows(self.rows)
+        write_whole(path, text.getvalue().encode())
         return path
 
     def cells(self) -> list[list[str]]:

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from stiction._brief import brief
+from stiction._checks import is_real
 from stiction._jit import jit
+from stiction._model import describe
 from stiction.errors import InputError
 from stiction.statistics.estimates import as_sample
 
@@ -99,6 +101,14 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     spread = largest - smallest
     if spread == 0.0:
         raise InputError(f"values: all are equal to {smallest:g}; they have no density")
+    if (
+        not isinstance(bounds, tuple | list)
+        or len(bounds) != 2
+        or not all(end is None or (is_real(end) and end == end) for end in bounds)
+    ):
+        raise InputError(
+            f"bounds: must be two numbers or None, (low, high), got {describe(bounds)}"
+        )
     low, high = bounds
     problems = []
     if low is not None and smallest < low:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._checks import numbers
 from stiction.errors import InputError
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
     InputError
         If there are fewer than `fewest`, or one is not finite.
     """
-    array = np.asarray(values, dtype=np.float64).ravel()
+    array = numbers("values", values).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
     if not np.all(np.isfinite(array)):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import simpson
 
+from stiction._checks import check_flag, check_instance
 from stiction.criterion.eigenproblem import Weight
 from stiction.criterion.nucleation import Weights, multiplier_of, weight_of
 from stiction.errors import InputError
@@ -120,7 +121,8 @@ def nucleation_statistics(
     correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the
     Gaussian field.
     """
-    load, initial = _uniform_load(problem)
+    load, initial = _uniform_load(problem, strength)
+    check_flag("infinite", infinite)
     weight = weight_of(weights)
     total = math.pi / 2.0 * float(weight.sine[0])
     if infinite:
@@ -168,7 +170,7 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
     For xi_0 << h_n the correlation acts as a delta function, and the double integral becomes
     (2/h_n) int g^2 ds int C dx (Albertini et al., 2020, Eq. B.5, with its constant).
     """
-    load, initial = _uniform_load(problem)
+    load, initial = _uniform_load(problem, strength)
     xi = getattr(strength.spectrum, "correlation_length", None)
     if xi is None:
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
@@ -201,7 +203,9 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
     )
 
 
-def _uniform_load(problem: Problem) -> tuple[float, float]:
+def _uniform_load(problem: Problem, strength: RandomField) -> tuple[float, float]:
+    check_instance("problem", problem, Problem)
+    check_instance("strength", strength, RandomField)
     problems = [
         f"load.{name}: varies along the interface, so tau_n is not stationary; sample it with"
         " st.monte_carlo instead"

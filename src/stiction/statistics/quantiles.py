@@ -10,6 +10,8 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from stiction._brief import brief
+from stiction._checks import is_real, numbers
+from stiction._model import describe
 from stiction.errors import InputError
 from stiction.statistics.estimates import as_sample
 
@@ -69,12 +71,15 @@ def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Qua
     Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
     """
     ordered = np.sort(as_sample(values, 1))
-    p = np.atleast_1d(np.asarray(probability, dtype=np.float64))
+    p = np.atleast_1d(numbers("probability", probability))
     problems = []
     if p.ndim != 1 or not np.all((p > 0.0) & (p < 1.0)):
-        problems.append(f"probability: must be between 0 and 1, exclusive, got {probability!r}")
-    if not 0.0 < confidence < 1.0:
-        problems.append(f"confidence: must be between 0 and 1, exclusive, got {confidence!r}")
+        problems.append(
+            f"probability: must be between 0 and 1, exclusive, got {describe(probability)}"
+        )
+    if not (is_real(confidence) and 0.0 < confidence < 1.0):
+        given = describe(confidence)
+        problems.append(f"confidence: must be between 0 and 1, exclusive, got {given}")
     if problems:
         raise InputError(problems)
     n = ordered.size

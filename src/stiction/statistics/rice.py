@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._brief import brief
+from stiction._checks import check_count, numbers, too_many_samples
 from stiction._jit import jit
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
@@ -127,9 +128,11 @@ def rice_distribution(
         If the problem has no nucleation stress, its load is not uniform, the profiles are few or
         the levels do not rise.
     """
-    _uniform_load(problem)
-    if isinstance(profiles, bool) or not isinstance(profiles, int) or profiles < 16:
-        raise InputError(f"profiles: must be a whole number >= 16, got {profiles!r}")
+    _uniform_load(problem, strength)
+    profiles = check_count("profiles", profiles, 16)
+    too_many = too_many_samples(profiles, 0)
+    if too_many:
+        raise InputError([text.replace("samples", "profiles", 1) for text in too_many])
 
     # A dip that only just reaches down between two nodes is a crossing as well.
     factor = math.ceil(ENOUGH_POINTS * problem.interface.spacing / problem.nucleation_length)
@@ -149,7 +152,7 @@ def rice_distribution(
             low, high = min(low, float(tau_n.min())), max(high, float(tau_n.max()))
         levels = np.linspace(low, high, LEVELS)
     else:
-        levels = np.ascontiguousarray(stress, dtype=np.float64)
+        levels = numbers("stress", stress)
         if levels.ndim != 1 or levels.size == 0 or not np.all(np.diff(levels) > 0.0):
             raise InputError("stress: must be a (m,) array of rising levels, Pa")
     crossings = np.zeros(levels.size + 1, dtype=np.int64)

@@ -6,6 +6,7 @@ import functools
 import json
 import operator
 import tomllib
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,13 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction._checks import (
+    as_path,
+    check_flag,
+    check_instance,
+    check_progress,
+    too_many_samples,
+)
 from stiction._model import (
     Count,
     Positive,
@@ -32,6 +40,7 @@ from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
 from stiction.ensemble.plan import Plan
+from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.errors import InputError, unknown_name
 from stiction.evaluation import methods
 from stiction.problem import Problem
@@ -42,9 +51,9 @@ from stiction.study.sweep import (
     Sweep,
     grid_axes,
     name_point,
+    part_with_values,
     points_of,
     unknown_keys,
-    with_values,
 )
 
 AnyMethod: Any = Annotated[
@@ -57,9 +66,14 @@ FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_r
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 
 
+MOST_KEPT = 10**6
+
+
 def _chosen(value: Any) -> Any:
     """A number of samples stands for the first ones."""
     count = whole(value)
+    if count is not None and count > MOST_KEPT:
+        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
     if count is not None and count > 0:
         return tuple(range(count))
     if not isinstance(value, list | tuple):
@@ -148,21 +162,44 @@ class Study:
     title: str = ""
 
     @model_validator(mode="after")
-    def _fits_together(self) -> Study:
-        plans = self.plans
-        nodes = {plan.problem.interface.size for plan in plans}
-        if len(nodes) > 1 and any(plan.wide for plan in plans):
+    def _fits_together(self, info: pydantic.ValidationInfo) -> Study:
+        if (info.context or {}).get("trusted"):
+            return self
+        self._check_points()
+        some = differing_in(self.plans, "method", "problem.load", "problem.interface", "random")
+        nodes = {plan.problem.interface.shape for plan in some}
+        if len(nodes) > 1 and any(plan.wide for plan in some):
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
         ensemble = self.ensemble
-        size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in plans)
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
+        if problems:
+            raise InputError([f"ensemble.{text}" for text in problems])
+        size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
         try:
-            check_size(size, ensemble.keep_limit or KEEP_LIMIT)
+            check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
         return self
+
+    def _check_points(self) -> None:
+        """Make every plan once; what is wrong is said once, with the points where it is."""
+        problems: dict[str, list[int]] = {}
+        for number in range(len(self.plans)):
+            try:
+                self.plans[number]
+            except InputError as error:
+                for text in error.problems:
+                    problems.setdefault(text, []).append(number)
+        if problems and not self.sweep:
+            raise InputError(problems)
+        if problems:
+            points = self.points
+            raise InputError(
+                [_at_points(text, [points[n] for n in where]) for text, where in problems.items()]
+            )
 
     @property
     def points(self) -> list[Point]:
@@ -170,35 +207,26 @@ class Study:
         return points_of(self.sweep)
 
     @cached_property
-    def plans(self) -> list[Plan]:
-        """What is to be computed, one plan a point."""
-        if not self.sweep:
-            return [self._plan()]
-        base = {name: getattr(self, name) for name in Study.__dataclass_fields__}
-        single = object.__new__(Study)
-        single.__dict__.update(base | {"sweep": ()})
-        plans: list[Plan] = []
-        problems: dict[str, list[Point]] = {}
-        for point in self.points:
-            try:
-                plans.append(with_values(single, point.values).plans[0])
-            except InputError as error:
-                for text in error.problems:
-                    problems.setdefault(text, []).append(point)
-        if problems:
-            raise InputError([_at_points(text, points) for text, points in problems.items()])
-        return plans
+    def plans(self) -> Sequence[Plan]:
+        """What is to be computed, one plan a point, made when it is asked for."""
+        base = _Parts(**{name: getattr(self, name) for name in _PARTS})
+        keys = [axis.keys for axis in self.sweep]
 
-    def _plan(self) -> Plan:
-        given, random = self.ensemble, as_random_interface(self.random)
-        return make_plan(
-            self.problem, random, self.method, given.seed, given.keep, given.keep_samples
-        )
+        def part(name: str, steps: tuple[int, ...]) -> Any:
+            values = {
+                key: axis.steps[step][i]
+                for axis, step in zip(self.sweep, steps, strict=True)
+                for i, key in enumerate(axis.keys)
+                if key.split(".")[0] == name
+            }
+            return part_with_values(base, name, values) if values else getattr(base, name)
+
+        return Plans(keys, [len(axis.steps) for axis in self.sweep], _PARTS, part, _plan)
 
     @property
     def axes(self) -> list[GridAxis]:
         """The axes of the sweep as dimensions of the result."""
-        variables = {name for plan in self.plans for name in plan.variables}
+        variables = set(variables_in(self.plans))
         return grid_axes(
             self.sweep, sorted(variables | {"sample", "kept_sample", "x", "y", "position"})
         )
@@ -223,6 +251,7 @@ class Study:
         progress: Show = True,
         retry: bool = False,
         time_limit: float | None = None,
+        lock: bool = True,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -237,6 +266,9 @@ class Study:
             and the same call goes on.
         retry : bool
             Compute stored samples that failed again.
+        lock : bool
+            Keep other runs out of the folder while this one writes; False for file systems that
+            have no locks.
 
         Returns
         -------
@@ -249,8 +281,10 @@ class Study:
             See `stiction.monte_carlo`; with `out`, samples that fail are listed in the attribute
             'failed_samples' instead.
         StoreError
-            If `out` cannot be used.
+            If `out` cannot be used, or what was stored is damaged before the end.
         """
+        check_flag("retry", retry)
+        check_progress(progress)
         if out is not None:
             from stiction.stored_run import run_into
 
@@ -262,6 +296,7 @@ class Study:
                 progress=progress,
                 retry=retry,
                 time_limit=time_limit,
+                lock=lock,
             )
             return stored.dataset()
         return run_plans(
@@ -291,22 +326,37 @@ class Study:
         return plain
 
     def to_toml(self, path: str | Path) -> None:
-        """Write it as a TOML file."""
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+        """Write it as a TOML file.
+
+        Raises
+        ------
+        InputError
+            If something in it exists in Python only, or the file cannot be written.
+        """
+        text = tomli_w.dumps(self.to_dict())
+        try:
+            as_path("path", path).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
     @classmethod
-    def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
+    def from_dict(
+        cls, given: dict[str, Any], *, folder: str | Path | None = None, trusted: bool = False
+    ) -> Study:
         """A study from plain dictionaries; file names of profiles are relative to `folder`.
 
-        A key that is swept need not have a value of its own.
+        A key that is swept need not have a value of its own. The points of a `trusted` study, one
+        that was valid when it was stored, are not looked at one by one.
         """
+        check_instance("study", given, dict)
+        folder = None if folder is None else as_path("folder", folder)
         _refuse_first_version(given)
         sweep, mistakes = _read_sweep(given, folder)
         if sweep:
             given = _completed(given, sweep)
         try:
             study: Study = pydantic.TypeAdapter(cls).validate_python(
-                given, context={"folder": folder}
+                given, context={"folder": folder, "trusted": trusted}
             )
         except pydantic.ValidationError as error:
             texts = explain(error, cls)
@@ -317,14 +367,20 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        return cls.from_dict(_read_toml(Path(path)), folder=Path(path).parent)
+        path = as_path("path", path)
+        return cls.from_dict(_read_toml(path), folder=path.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """The study that made a result."""
+        check_instance("result", result, xr.Dataset)
         if "study" not in result.attrs:
-            raise InputError(f"result: has no attribute 'study': {describe(type(result))}")
-        return cls.from_dict(json.loads(result.attrs["study"]))
+            raise InputError("result: has no attribute 'study'; it is not the result of a study")
+        try:
+            given = json.loads(result.attrs["study"])
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"result: its attribute 'study' is no JSON: {error}") from None
+        return cls.from_dict(given)
 
 
 def _refuse_first_version(given: Any) -> None:
@@ -347,6 +403,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
 
@@ -380,6 +438,27 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
     if problems:
         raise InputError(problems)
     return found["problem"], found.get("method")
+
+
+@model(kw_only=True)
+class _Parts:
+    """What a point of a sweep consists of, each part valid by itself."""
+
+    problem: Problem
+    random: AnyRandom
+    method: AnyMethod
+    ensemble: Ensemble
+
+
+_PARTS = tuple(_Parts.__dataclass_fields__)
+
+
+def _plan(parts: Mapping[str, Any]) -> Plan:
+    given = parts["ensemble"]
+    random = as_random_interface(parts["random"])
+    return make_plan(
+        parts["problem"], random, parts["method"], given.seed, given.keep, given.keep_samples
+    )
 
 
 def _at_points(text: str, points: list[Point]) -> str:

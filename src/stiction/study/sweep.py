@@ -16,6 +16,7 @@ import numpy as np
 import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from stiction._checks import is_whole
 from stiction._model import _models_in, describe, to_plain
 from stiction.ensemble.assemble import GridAxis
 from stiction.errors import InputError, unknown_name
@@ -75,8 +76,10 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
         value = given[name]
         if not _is_real(value) or not math.isfinite(value):
             problems.append(f"{key}.{name}: must be a finite number, got {describe(value)}")
-    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 2:
+    if not is_whole(count, 2):
         problems.append(f"{key}.count: must be a whole number >= 2, got {describe(count)}")
+    elif count > MOST_POINTS:
+        problems.append(f"{key}.count: must be at most {MOST_POINTS}, got {describe(count)}")
     if spacing not in ("linear", "log"):
         problems.append(f"{key}.spacing: must be 'linear' or 'log', got {describe(spacing)}")
     elif spacing == "log" and not problems and not (start > 0.0 and stop > 0.0):
@@ -260,6 +263,24 @@ def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
             table = table.setdefault(name, {})
         table[last] = _Leaf(value)
     return _replaced(owner, tree, "")
+
+
+def part_with_values(owner: Any, name: str, values: Mapping[str, Any]) -> Any:
+    """One field of a model object with dotted keys below it (or itself) replaced.
+
+    The other fields are not validated again, and need not fit.
+
+    Raises
+    ------
+    InputError
+    """
+    if name in values:
+        return getattr(with_values(owner, values), name)
+    inner = {key.removeprefix(f"{name}."): value for key, value in values.items()}
+    try:
+        return with_values(getattr(owner, name), inner)
+    except InputError as error:
+        raise InputError([f"{name}.{text}" for text in error.problems]) from None
 
 
 class _Leaf(NamedTuple):

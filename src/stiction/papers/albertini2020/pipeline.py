@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from stiction._files import write_atomically
 from stiction._model import describe
 from stiction._progress import Meter
 from stiction.errors import InputError
@@ -183,7 +184,5 @@ def _draw(figure: Any, data: Data, folder: Path) -> ShownFigure:
 
 def _write(path: Path, text: str) -> Path:
     """Written aside and renamed, so that a report is whole or not there."""
-    aside = path.with_name(path.name + ".part")
-    aside.write_text(text, encoding="utf-8")
-    aside.replace(path)
+    write_atomically(path, text.encode())
     return path

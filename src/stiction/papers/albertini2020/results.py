@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 
 from stiction import __version__
+from stiction._files import write_atomically
 from stiction._model import to_plain
 from stiction.papers.albertini2020.data import Data
 
@@ -21,7 +22,6 @@ def write_results(path: Path, data: Data) -> Path:
         Replaced as a whole if it is there.
     data : Data
     """
-    aside = path.with_name(path.name + ".part")
     root = xr.Dataset(
         attrs={
             "title": "Stochastic properties of static friction: the paper's studies",
@@ -31,14 +31,17 @@ def write_results(path: Path, data: Data) -> Path:
             "seed": data.seed,
         }
     )
-    root.to_netcdf(aside, mode="w")
-    for name, dataset in data.studies.items():
-        # The histogram and the profiles compress; what is random does not, and is kept whole.
-        encoding = {
-            str(key): {"zlib": True, "complevel": 1}
-            for key, variable in dataset.data_vars.items()
-            if variable.ndim > 1 and variable.dtype.kind == "i"
-        }
-        dataset.to_netcdf(aside, mode="a", group=name, encoding=encoding)
-    aside.replace(path)
+
+    def write(aside: Path) -> None:
+        root.to_netcdf(aside, mode="w")
+        for name, dataset in data.studies.items():
+            # The histogram and the profiles compress; what is random does not, and is kept whole.
+            encoding = {
+                str(key): {"zlib": True, "complevel": 1}
+                for key, variable in dataset.data_vars.items()
+                if variable.ndim > 1 and variable.dtype.kind == "i"
+            }
+            dataset.to_netcdf(aside, mode="a", group=name, encoding=encoding)
+
+    write_atomically(path, write)
     return path

@@ -7,7 +7,8 @@ from typing import Any, Literal
 
 from pydantic import model_validator
 
-from stiction._model import Positive, model
+from stiction._checks import check_instance, is_finite
+from stiction._model import Positive, describe, model
 from stiction.errors import InputError
 from stiction.friction.linear import SlipWeakening
 from stiction.interface import Interface
@@ -75,8 +76,10 @@ def strength(problem: Problem, correlation_ratio: float = 0.5) -> RandomField:
     InputError
         If the ratio is not positive, or h_n is not defined because W varies.
     """
-    if isinstance(correlation_ratio, bool) or not correlation_ratio > 0.0:
-        raise InputError(f"correlation_ratio: must be positive, got {correlation_ratio!r}")
+    check_instance("problem", problem, Problem)
+    if not (is_finite(correlation_ratio) and correlation_ratio > 0.0):
+        given = describe(correlation_ratio)
+        raise InputError(f"correlation_ratio: must be a positive number, got {given}")
     return RandomField(
         marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         spectrum=PowerLawSpectrum(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
+import warnings
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 import xarray as xr
 
 from stiction._model import to_plain
+from stiction._netcdf import DamagedError, read_dataset, write_dataset
 from stiction.papers.albertini2020.studies.context import Context
 
 FOLDER = "studies"
@@ -55,14 +58,17 @@ def _named(name: str) -> Any:
 
 
 def kept(study: Any, context: Context) -> xr.Dataset | None:
-    """The result of an earlier run; None if there is none that can be read."""
+    """The result of an earlier run; None if there is none, or, with a warning, a damaged one."""
     place = place_of(study, context)
     if place is None:
         return None
     path = place.with_suffix(".nc")
     try:
-        dataset = xr.load_dataset(path, engine="netcdf4")
-    except (OSError, ValueError):
+        dataset = read_dataset(path)
+    except FileNotFoundError:
+        return None
+    except (OSError, DamagedError) as error:
+        warnings.warn(f"{path}: {error}; this study is computed again", stacklevel=3)
         return None
     for text, count in json.loads(dataset.attrs.pop(_WARNINGS, "{}")).items():
         context.warnings[text] = count
@@ -76,9 +82,7 @@ def keep(study: Any, context: Context, dataset: xr.Dataset) -> None:
         return
     place.parent.mkdir(parents=True, exist_ok=True)
     own = {text: count for text, count in context.warnings.items() if text.startswith(study.title)}
-    aside = place.with_suffix(".part")
-    dataset.assign_attrs({_WARNINGS: json.dumps(own)}).to_netcdf(aside, engine="netcdf4")
-    aside.replace(place.with_suffix(".nc"))
-    for other in place.parent.glob(f"{study.name}-*.nc"):
-        if other.stem.rpartition("-")[0] == study.name and other.stem != place.name:
+    write_dataset(dataset.assign_attrs({_WARNINGS: json.dumps(own)}), place.with_suffix(".nc"))
+    for other in place.parent.glob("*.nc"):
+        if re.fullmatch(f"{study.name}-[0-9a-f]{{16}}", other.stem) and other.stem != place.name:
             other.unlink()

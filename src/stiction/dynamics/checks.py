@@ -1,0 +1,140 @@
+"""What a run is warned of or refused for: grids, rates of loading, loads that reverse."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import monitor
+from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.loading import load_at
+from stiction.errors import InputError, warn_accuracy
+from stiction.problem import FEWEST_NODES, Problem
+from stiction.sample import Sample
+
+SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
+_COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
+
+
+def warn_if_coarse(problem: Problem, rows: Sample) -> None:
+    """Warn where the nucleation length is not resolved, with the error to expect."""
+    resolution = problem.nucleation_length_of(rows.steepest_rate) / problem.interface.spacing
+    if resolution < 15.0:
+        # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
+        # at 8, 16 and 32 nodes.
+        percent = 3.0 * (16.0 / resolution) ** 2.4
+        expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
+        warn_accuracy(
+            f"the nucleation length{_where_steepest(rows)} spans {resolution:.1f} nodes: expect "
+            f"{expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32; the "
+            "critical load is far less sensitive)"
+        )
+
+
+def _where_steepest(rows: Sample) -> str:
+    """Which of several nucleation lengths is meant, for messages."""
+    if rows.uniform_weakening:
+        return ""
+    return f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
+
+
+def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
+    """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
+    rates = run.rows[2]
+    longest = problem.nucleation_length_of(1.0) / (FEWEST_NODES * run.medium.spacing)
+    steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
+    if steep.size:
+        warn_accuracy(
+            f"{steep.size} nodes slipped, the first at x = {steep[0] * run.medium.spacing:.6g} m, "
+            f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
+            " grid to resolve how they break; take more nodes, or infinite strength for barriers "
+            "that never break"
+        )
+
+
+def warn_if_reversed_before(run: Run, time: float) -> None:
+    """Warn if the load went below minus the strength before anything slipped."""
+    times, values = run.history
+    lowest = float(values[times <= time].min())
+    _warn_of_reverse(run, lowest * run.rows[4] + run.rows[5] < -run.rows[0], time, lowest)
+
+
+def warn_if_reversed(run: Run, state: State) -> bool:
+    """Warn if the stress is below minus the strength now; returns whether it is.
+
+    Where a rupture overshot, what has slipped may be left with a negative stress at a positive
+    load: that is not counted.
+    """
+    if state.stress.min() >= 0.0:
+        return False
+    strength = np.maximum(run.rows[0] - run.rows[2] * state.slip, run.rows[1])
+    below = state.stress < -strength - 1e-6 * state.watch[monitor.SCALE]
+    return _warn_of_reverse(
+        run, below & ((state.slip == 0.0) | (state.load < 0.0)), state.time, state.load
+    )
+
+
+def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: float) -> bool:
+    nodes = np.flatnonzero(below)
+    if nodes.size:
+        warn_accuracy(
+            f"the stress is below minus the strength at {nodes.size} nodes, the first at x = "
+            f"{nodes[0] * run.medium.spacing:.6g} m (up to t = {time:.6g} s, tau_0 = {load:.6g} "
+            "Pa): they would slip in reverse, which is not modelled, and are kept at rest; change "
+            "the sign of the load, or keep it above minus the strength"
+        )
+    return bool(nodes.size)
+
+
+def resolves_steps(run: Run, time: float) -> bool:
+    """Whether the time since zero load, as a float, tells explicit steps apart."""
+    return float(np.spacing(time)) <= 0.01 * run.medium.step
+
+
+def check_pace(run: Run, time: float) -> None:
+    """Refuse or warn of loading that explicit steps or floating-point times cannot follow.
+
+    Parameters
+    ----------
+    run : Run
+    time : float
+        When it starts, s.
+
+    Raises
+    ------
+    InputError
+    """
+    if time > SLOWEST:
+        raise InputError(
+            f"loading_rate: the first slip would come after {time:.3g} s, more than {SLOWEST:g} s;"
+            " load faster (the onset no longer depends on the rate)"
+        )
+    if not resolves_steps(run, time):
+        warn_accuracy(
+            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
+            f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
+            "and energies are not affected"
+        )
+    scale = run.scale_at(float(load_at(*run.history, time)))
+    rise = run.slope(time) * run.medium.step / scale
+    if rise > _COARSE:
+        step = run.medium.step
+        text = (
+            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
+            f"the stress scale, {scale:.3g} Pa; use time_step={step * _COARSE / rise:.2g} or less,"
+            " or load more slowly"
+        )
+        if rise > _COARSEST:
+            raise InputError(text)
+        warn_accuracy(f"{text} (the onset is sampled coarsely)")
+
+
+def check_finite(run: Run, state: State, reason: int) -> None:
+    """Raise `FloatingPointError` that says when and where a run became non-finite."""
+    if reason == monitor.NOT_FINITE:
+        node = int(state.watch[monitor.BAD_NODE])
+        raise FloatingPointError(
+            f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
+            f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
+            f"{state.steps} steps; the last finite state is kept"
+        )
