@@ -142,7 +142,7 @@ def calls() -> list[Call]:
     tau_p = strength.sample(interface, samples=2)
     local, rupture = st.LocalCriterion(), st.Rupture(loading_rate=1e9, max_steps=50_000)
     ensemble = st.Ensemble(samples=2)
-    study = st.Study(problem=problem, strength=strength, method=local, ensemble=ensemble)
+    study = st.Study(problem=problem, random=strength, method=local, ensemble=ensemble)
     sizes = {"correlation_length": 0.02, "truncation": 3.0}
     rows = {"residual_strength": 0.0, "initial_stress": 0.0, "weakening_rate": 0.1e12}
     of_problem = {"problem": problem, "strength": strength}

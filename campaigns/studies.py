@@ -42,15 +42,15 @@ residual_strength = 0.0
 profile = 1.0
 initial_stress = 0.0
 normal_pressure = 5e6
-[strength]
+[random.strength]
 mean_mode = true
-[strength.marginal]
+[random.strength.marginal]
 type = "beta"
 alpha = 1.5
 beta = 3.0
 low = 0.66e6
 high = 1.66e6
-[strength.spectrum]
+[random.strength.spectrum]
 type = "power_law"
 correlation_length = 0.02
 exponent = 4.0
@@ -73,7 +73,7 @@ queue = "long"
 interface = "lo"
 options = { job_extra_directives = ["--exclusive"] }
 [[sweep]]
-"strength.spectrum.correlation_length" = [0.02, 0.03]
+"random.strength.spectrum.correlation_length" = [0.02, 0.03]
 [[sweep]]
 "problem.interface.length" = { start = 0.1, stop = 0.2, count = 2 }
 """

@@ -180,7 +180,7 @@ def test_a_cache_that_others_can_write_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"strength.spectrum.correlation_length": 1e-308}, "check the units of the lengths"),
+        ({"random.strength.spectrum.correlation_length": 1e-308}, "check the units of the lengths"),
         ({"ensemble.samples": 10**13}, r"samples: must be at most 1e\+10"),
         ({"problem.interface.nodes": 10**30}, "less than or equal to 16777216"),
         ({"problem.interface.length": 1e-308}, "length: must be at least"),

@@ -260,7 +260,7 @@ def test_onset_of_ones_own_profile(command, study, tmp_path, form):
     assert f"{float(expected['friction_coefficient'][0]):.6f}" in line
 
 
-PROBLEM = TEXT[: TEXT.index("[strength.marginal]")]
+PROBLEM = TEXT[: TEXT.index("[random.strength.marginal]")]
 
 
 def test_onset_needs_a_problem_only(command, study, tmp_path):

@@ -185,7 +185,7 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
 def test_stop_is_an_option_of_studies(tmp_path):
     st.Study(
         problem=PROBLEM,
-        strength=st.RandomField(
+        random=st.RandomField(
             st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
             st.PowerLawSpectrum(correlation_length=3e-3),
         ),

@@ -100,9 +100,8 @@ def test_grid_far_too_fine(solid):
     with pytest.raises(st.InputError, match="interface.nodes"):
         st.onset(
             st.Problem(solid, fine, st.SlipWeakening(weakening_rate=1e13)),
-            np.full(8192, 0.9e6),
+            {"strength": np.full(8192, 0.9e6), "weakening_rate": 0.5e12},
             method=Equilibrium(),
-            weakening_rate=0.5e12,
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiction.ensemble import files, share, store, stored, work
+from stiction.ensemble import files, resume, scheduler, store, work
 from stiction.ensemble.files import Lock
 from stiction.ensemble.store import Store
 from stiction.ensemble.trouble import StoreError
@@ -34,7 +34,7 @@ STUDY = {
     },
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
-    "sweep": [{"strength.spectrum.correlation_length": [4e-3, 6e-3]}],
+    "sweep": [{"random.strength.spectrum.correlation_length": [4e-3, 6e-3]}],
 }
 
 
@@ -45,8 +45,8 @@ def make_study(**changes):
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
     """Many chunks of fifty samples instead of one a second."""
-    monkeypatch.setattr(stored, "FLUSH_SECONDS", 0.0)
-    monkeypatch.setattr(share.Sizer, "next", lambda sizer, plan, span, *rest: min(50, span.samples))
+    monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.0)
+    monkeypatch.setattr(scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(50, span.samples))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_a_chunk_damaged_while_the_run_goes_on(tmp_path, reference):
         if done == total:
             chunks(tmp_path / "run")[0].write_bytes(b"nonsense")
 
-    with pytest.raises(StoreError, match="550 of 600 samples are stored.*computes them again"):
+    with pytest.raises(StoreError, match="550 of 600 samples are resume.*computes them again"):
         run_into(make_study(), tmp_path / "run", workers=1, progress=damage)
     assert again(tmp_path / "run", ["50 samples are computed again"]).identical(reference)
 
@@ -267,9 +267,9 @@ def test_two_writers_without_a_lock_damage_nothing(tmp_path, reference, monkeypa
     """Each joins its chunks and writes the list as if alone; the next run finds all of both."""
     monkeypatch.setattr(store, "MANY", 3)
     code = (
-        "import sys, json; from stiction.ensemble import share, stored;"
-        "stored.FLUSH_SECONDS = 0.0; from stiction.ensemble import store; store.MANY = 3;"
-        "share.Sizer.next = lambda sizer, plan, span, *rest: min(20, span.samples);"
+        "import sys, json; from stiction.ensemble import resume, scheduler;"
+        "resume.FLUSH_SECONDS = 0.0; from stiction.ensemble import store; store.MANY = 3;"
+        "scheduler.Sizer.next = lambda sizer, plan, span, *rest: min(20, span.samples);"
         "from stiction.study.study import Study; from stiction.stored_run import run_into;"
         "run_into(Study.from_dict(json.loads(sys.argv[1])), sys.argv[2], lock=False, workers=1)"
     )
@@ -306,7 +306,7 @@ def test_the_name_of_another_writer_is_printed_safely(tmp_path):
 @pytest.mark.parametrize("name", ["run", "result.nc"])
 def test_small_chunks_are_joined(tmp_path, reference, monkeypatch, name):
     monkeypatch.setattr(store, "MANY", 4)
-    monkeypatch.setattr(share.Sizer, "next", lambda sizer, plan, span, *rest: min(7, span.samples))
+    monkeypatch.setattr(scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(7, span.samples))
     folder = tmp_path / name if name == "run" else folder_beside(tmp_path / name)
     assert make_study().run(out=tmp_path / name, workers=1).identical(reference)
     if name == "run":
