@@ -146,7 +146,7 @@ def as_rows(
     if bad.any():
         missing = np.isnan(array)
         unless = ", or inf where nothing breaks" if infinite else ""
-        if array.shape[-1] == nodes and missing.any():
+        if array.shape[-1:] == (nodes,) and missing.any():
             where = describe_gaps(np.atleast_2d(missing), interface)
             raise InputError(
                 f"{name}: must be finite{unless}: there {where}; st.onset(..., gaps='fill') and"
