@@ -20,9 +20,11 @@ PLAIN: dict[str, Any] = {
         "interface": {"length": 0.1, "nodes": 64},
         "friction": {"weakening_rate": 0.1e12},
     },
-    "strength": {
-        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-        "spectrum": {"type": "power_law", "correlation_length": 0.02},
+    "random": {
+        "strength": {
+            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
+            "spectrum": {"type": "power_law", "correlation_length": 0.02},
+        }
     },
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 20, "seed": 3, "keep": ["strength"], "keep_samples": [0, 7]},

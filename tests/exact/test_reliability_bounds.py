@@ -194,7 +194,7 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
     problem = st.paper.problem(nodes=136)
     field = st.paper.strength(problem, 0.5)
     method = st.LocalCriterion()
-    onset = st.monte_carlo(problem, field, method=method, samples=40_000, seed=10**6)
+    onset = st.monte_carlo(problem, field, method=method, samples=1_000_000, seed=10**6)
     stress = float(np.quantile(onset["critical_stress"], 0.01))
     found = np.array(
         [
@@ -204,8 +204,8 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
             for i in range(150)
         ]
     )
-    # The mean of 150 runs is known to 2.5 %, the reference to 5 % (two standard errors).
-    error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.05)
+    # Two standard errors: about 5 % for the mean of 150 runs, 2 % for the reference.
+    error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.02)
     assert abs(found.mean() / 0.01 - 1.0) < error
 
 

@@ -18,7 +18,11 @@ SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple
 
 @pytest.fixture
 def arguments(problem, make_strength):
-    return {"problem": problem, "strength": make_strength(), "method": st.LocalCriterion()}
+    return {
+        "problem": problem,
+        "random": {"strength": make_strength()},
+        "method": st.LocalCriterion(),
+    }
 
 
 @pytest.fixture

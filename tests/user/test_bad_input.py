@@ -232,6 +232,12 @@ CASES = {
         ),
         ["draws", "finite"],
     ),
+    "rate that is nan": (
+        lambda: st.onset(
+            make_problem(), np.full(256, 1e6), weakening_rate=np.nan, method=st.Equilibrium()
+        ),
+        ["weakening_rate", "must be finite"],
+    ),
     "rate that varies": (
         lambda: st.onset(
             make_problem(friction=st.SlipWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)),

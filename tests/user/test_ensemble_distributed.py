@@ -25,9 +25,11 @@ STUDY = {
         "interface": {"length": 0.1, "nodes": 256},
         "friction": {"weakening_rate": 0.4e12},
     },
-    "strength": {
-        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-        "spectrum": {"type": "power_law", "correlation_length": 3e-3},
+    "random": {
+        "strength": {
+            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
+            "spectrum": {"type": "power_law", "correlation_length": 3e-3},
+        }
     },
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 60_000, "seed": 3},

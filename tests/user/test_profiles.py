@@ -419,9 +419,17 @@ def test_profiles_in_a_study_file(interface, strength, tmp_path):
     }
     study = {
         "problem": plain,
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
+        "random": {
+            "strength": {
+                "marginal": {
+                    "type": "beta",
+                    "alpha": 1.5,
+                    "beta": 3,
+                    "low": 0.66e6,
+                    "high": 1.66e6,
+                },
+                "spectrum": {"type": "power_law", "correlation_length": 4e-3},
+            }
         },
         "method": {"type": "equilibrium"},
         "ensemble": {"samples": 4.0, "keep": "strength"},

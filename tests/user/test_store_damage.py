@@ -28,9 +28,11 @@ STUDY = {
         "interface": {"length": 0.1, "nodes": 128},
         "friction": {"weakening_rate": 0.25e12},
     },
-    "strength": {
-        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-        "spectrum": {"type": "power_law", "correlation_length": 4e-3},
+    "random": {
+        "strength": {
+            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
+            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
+        }
     },
     "method": {"type": "local_criterion"},
     "ensemble": {"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
@@ -46,7 +48,9 @@ def make_study(**changes):
 def often(monkeypatch):
     """Many chunks of fifty samples instead of one a second."""
     monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.0)
-    monkeypatch.setattr(scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(50, span.samples))
+    monkeypatch.setattr(
+        scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(50, span.samples)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -306,7 +310,9 @@ def test_the_name_of_another_writer_is_printed_safely(tmp_path):
 @pytest.mark.parametrize("name", ["run", "result.nc"])
 def test_small_chunks_are_joined(tmp_path, reference, monkeypatch, name):
     monkeypatch.setattr(store, "MANY", 4)
-    monkeypatch.setattr(scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(7, span.samples))
+    monkeypatch.setattr(
+        scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(7, span.samples)
+    )
     folder = tmp_path / name if name == "run" else folder_beside(tmp_path / name)
     assert make_study().run(out=tmp_path / name, workers=1).identical(reference)
     if name == "run":
