@@ -154,10 +154,8 @@ def _use(path: Path) -> None:
     study = Study.from_toml(path)
     _description(study)
     plan = study.plans[0]
-    field_size = max(
-        plan.problem.interface.nodes, plan.strength.modes(plan.problem.interface).count
-    )
-    if field_size <= 2**14:
+    interface = plan.problem.interface
+    if max(interface.size, plan.random.dimension(interface)) <= 2**15:
         compute(plan, study.ensemble.first, 1)
 
 

@@ -63,11 +63,10 @@ def events_of(study: st.Study, result: xr.Dataset, names: tuple[str, ...]) -> li
     """Arrested events of every point, from the kept profiles."""
     found = []
     for i, plan in enumerate(study.plans):
-        fields = {
+        profiles = {
             name: result[name].values.reshape(-1, *result[name].shape[-2:])[i] for name in names
         }
-        tau_p = fields.pop("strength")
-        found.append(st.equilibrium_events(plan.problem, tau_p, **fields))
+        found.append(st.equilibrium_events(plan.problem, profiles))
     return found
 
 

@@ -32,6 +32,7 @@ from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.interface import Interface as Interface
 from stiction.load import Load as Load
+from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
 from stiction.random.marginals import Beta as Beta
@@ -81,4 +82,5 @@ from stiction.study.study import (
     Study as Study,
 )
 
+paper = _albertini2020
 __version__: str

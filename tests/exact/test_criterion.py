@@ -1,7 +1,5 @@
 """The local criterion against closed forms."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -101,7 +99,7 @@ def test_strength_that_cannot_break_is_refused_with_a_way_out(problem):
     strength = rows.strength.copy()
     strength[0, 3] = np.inf
     with pytest.raises(st.InputError, match=r"must be finite everywhere.*st\.Equilibrium"):
-        excess_of(dataclasses.replace(rows, strength=strength))
+        excess_of(rows._replace(strength=strength))
 
 
 def test_uniform_strength_lets_go_at_its_value(problem):

@@ -72,7 +72,7 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     profiles = field.sample(problem.interface, samples=200)
     found = st.onset(problem, profiles, method=st.LocalCriterion())
     assert float(found["critical_stress"].min()) < 0.66e6
-    state = make_limit_state(problem, field, st.LocalCriterion(), 0, {}, "critical_stress", 1)
+    state = make_limit_state(problem, field, st.LocalCriterion(), 0, "critical_stress", 1)
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
 

@@ -20,7 +20,7 @@ SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple
 def arguments(problem, make_strength):
     return {
         "problem": problem,
-        "random": {"strength": make_strength()},
+        "random": make_strength(),
         "method": st.LocalCriterion(),
     }
 
@@ -70,7 +70,7 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         st.PowerLawSpectrum(correlation_length=3e-3),
     )
-    plan = make_plan(problem, strength, st.LocalCriterion(), 3, {})
+    plan = make_plan(problem, strength, st.LocalCriterion(), 3)
     whole = compute(plan, 0, 1300)
     part = compute(plan, first, samples)
     for name, values in part.items():
@@ -104,10 +104,10 @@ def test_what_else_is_random_is_independent_of_the_strength(arguments, make_stre
         st.PowerLawSpectrum(correlation_length=2e-3),
     )
     result = st.monte_carlo(
-        **arguments,
+        **arguments
+        | {"random": st.RandomInterface(strength=arguments["random"], initial_stress=initial)},
         samples=300,
         seed=5,
-        initial_stress=initial,
         keep=("strength", "initial_stress"),
     )
     strength, stress = result["strength"].values, result["initial_stress"].values
@@ -128,7 +128,7 @@ def test_chosen_samples_are_kept(arguments):
     assert result["strength"].dims == ("kept_sample", "x")
     np.testing.assert_array_equal(result["kept_sample"], [12, 49])
     interface = arguments["problem"].interface
-    direct = arguments["strength"].sample(interface, first=49)[0]
+    direct = arguments["random"].sample(interface, first=49)[0]
     np.testing.assert_array_equal(result["strength"].sel(kept_sample=49), direct)
     with pytest.raises(st.InputError, match="keep_limit = 0 MiB"):
         st.monte_carlo(**arguments, samples=40, keep=("strength",), keep_limit=1000.0)

@@ -82,7 +82,7 @@ def full_disk(monkeypatch):
 def test_a_full_disk_is_called_so_and_leaves_nothing_half(command, full_disk, tmp_path, arguments):
     assert command("run", "study.toml", "--out", "run")[0] == 0
     study = st.Study.from_dict(STUDY)
-    np.save("p.npy", study.strength.sample(study.problem.interface)[0])
+    np.save("p.npy", study.random.strength.sample(study.problem.interface)[0])
     full_disk()
     code, _, errors = command(*arguments)
     assert code == 1
@@ -184,8 +184,8 @@ def test_a_cache_that_others_can_write_is_refused(tmp_path):
     [
         ({"random.strength.spectrum.correlation_length": 1e-308}, "check the units of the lengths"),
         ({"ensemble.samples": 10**13}, r"samples: must be at most 1e\+10"),
-        ({"problem.interface.nodes": 10**30}, "less than or equal to 16777216"),
-        ({"problem.interface.length": 1e-308}, "length: must be at least"),
+        ({"problem.interface.nodes": 10**30}, "at most 2\\^24"),
+        ({"problem.interface.length": 1e-308}, "length: the nodes must be at least"),
         ({"ensemble.keep_samples": 10**13}, "keep_samples.*at most 1000000"),
     ],
 )

@@ -235,7 +235,7 @@ def test_interrupted_from_outside(command, study, tmp_path, number):
 def profile_of(study):
     loaded = st.Study.from_toml(study)
     interface = loaded.problem.interface
-    return interface, loaded.strength.sample(interface, seed=8)[0]
+    return interface, loaded.random.strength.sample(interface, seed=8)[0]
 
 
 @pytest.mark.parametrize("form", ["npy", "csv", "csv with x", "nc"])
@@ -275,7 +275,7 @@ def test_onset_needs_a_problem_only(command, study, tmp_path):
     study.write_text(PROBLEM.replace("nodes = 128", "nodes = 127") + "[strenght]\na = 1\n")
     code, _, err = command(*ask)
     assert code == 2
-    assert "problem.interface.nodes: must be a multiple of 2, got 127" in err
+    assert "problem.interface.nodes: must be even, got 127" in err
     assert "unknown 'strenght'; did you mean 'strength'?" in err
     study.write_text("title = 'nothing'")
     assert "problem: missing" in command(*ask)[2]

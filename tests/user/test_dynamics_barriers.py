@@ -67,12 +67,12 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
     assert run.attrs["stopped"] == "sliding"
     assert np.all(run["slip"].values[:, locked] == 0.0)
     assert float(run["weakened_fraction"][-1]) == np.mean(~locked)
-    for name in METHOD.variables:
+    for name in METHOD.variables(PROBLEM):
         assert np.all(np.isfinite(run[name])), name
-    with pytest.raises(InputError, match="tau_p: infinite at every node"):
+    with pytest.raises(InputError, match="strength: infinite at every node"):
         simulate(np.full(NODES, np.inf))
     # Methods without waves say what they take.
-    with pytest.raises(InputError, match="tau_p: must be finite; entry"):
+    with pytest.raises(InputError, match="strength: must be finite; entry"):
         st.onset(PROBLEM, tau_p, method=st.LocalCriterion())
 
 
@@ -160,7 +160,7 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
     whole = st.onset(problem, tau_p, method=METHOD)
     first = float(one.first_instability[0])
     assert first == float(whole.first_instability[0])
-    unknown = {name for name in method.variables if np.isnan(one[name].values).any()}
+    unknown = {name for name in method.variables(problem) if np.isnan(one[name].values).any()}
     if stop == "sliding":
         assert one.equals(whole)
         return
@@ -195,7 +195,7 @@ def test_stop_is_an_option_of_studies(tmp_path):
     assert 'stop = "onset"' in (tmp_path / "study.toml").read_text()
     study = st.Study.from_toml(tmp_path / "study.toml")
     assert study.method.stop == "onset"
-    found = st.monte_carlo(study.problem, study.strength, method=study.method, samples=2, seed=1)
+    found = st.monte_carlo(study.problem, study.random, method=study.method, samples=2, seed=1)
     assert np.all(np.isnan(found.kinetic_stress))
     assert np.all(found.critical_stress > 0.0)
     with pytest.raises(InputError, match="stop"):

@@ -137,7 +137,7 @@ def test_wrong_options_are_all_named():
     assert "end_time:" in text
     with pytest.raises(InputError, match="did you mean 'slip_rate'"):
         simulate_rupture(make_problem(), profile(), method=METHOD, variables=["slip_rat"])
-    with pytest.raises(InputError, match="one profile at a time"):
+    with pytest.raises(InputError, match="one sample at a time"):
         simulate_rupture(make_problem(), np.stack([profile()] * 2), method=METHOD)
     with pytest.raises(InputError, match="Rupture"):
         simulate_rupture(make_problem(), profile(), method=st.LocalCriterion())
@@ -269,7 +269,7 @@ def test_stop_conditions_and_progress():
     assert float(longer["time"][-1]) >= float(sliding["time"][-1]) + 1e-5
     assert float(longer["critical_stress"]) == float(sliding["critical_stress"])
     assert [p.steps for p in seen] == sorted(p.steps for p in seen)
-    assert set(method_module.Rupture(loading_rate=1.0).variables) - set(sliding) == set()
+    assert set(method_module.Rupture(loading_rate=1.0).variables(problem)) - set(sliding) == set()
 
 
 def test_two_processes_build_one_kernel_at_once(tmp_path):

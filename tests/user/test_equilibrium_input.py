@@ -59,7 +59,7 @@ def test_loads_of_a_path(problem, loads, message):
 
 
 def test_path_of_several_samples(problem):
-    with pytest.raises(st.InputError, match="one profile"):
+    with pytest.raises(st.InputError, match="one sample"):
         equilibrium_path(problem, np.full((2, 256), 0.9e6), [1e5])
 
 
@@ -73,8 +73,8 @@ def test_variables_are_labelled(problem, make_strength):
     method = Equilibrium(sensitivity=True, slip=True)
     tau_p = make_strength(0.5).sample(problem.interface, samples=2, seed=1)
     onset = st.onset(problem, tau_p, method=method)
-    assert set(onset.data_vars) == set(method.variables)
-    for name, variable in method.variables.items():
+    assert set(onset.data_vars) == set(method.variables(problem))
+    for name, variable in method.variables(problem).items():
         assert onset[name].attrs["units"] == variable.units
         assert onset[name].dims == variable.dims
 

@@ -91,7 +91,7 @@ def test_a_method_from_another_package(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: weakest\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
-        "[stiction.evaluation]\nweakest_node = weakest:WeakestNode\n"
+        "[stiction.methods]\nweakest_node = weakest:WeakestNode\n"
     )
     (tmp_path / "study.toml").write_text(STUDY)
     package = Path(st.__file__).parents[1]

@@ -81,7 +81,7 @@ def test_the_names_of_dimensions_decide_where_samples_equal_nodes(system, interf
     np.testing.assert_array_equal(rows_of, np.tile(residual[:, np.newaxis], NODES))
     with pytest.raises(st.InputError, match=r"not clear from \(a, b\).*call it 'x'"):
         st.onset(system, array.rename(sample="a", x="b").drop_vars("b"), method=st.LocalCriterion())
-    with pytest.raises(st.InputError, match="tau_p: has no dimension along the interface"):
+    with pytest.raises(st.InputError, match="strength: has no dimension along the interface"):
         st.onset(system, xr.DataArray(strength, dims="sample"), method=st.LocalCriterion())
 
 
@@ -95,7 +95,7 @@ def test_units_that_are_stated_are_converted(system, strength, unit):
 @pytest.mark.parametrize(
     ("unit", "words"),
     [
-        ("um", "tau_p: strength is in um, which is no unit of stress; give it in Pa"),
+        ("um", "strength: strength is in um, which is no unit of stress; give it in Pa"),
         ("mpa", r"unknown unit 'mpa'; did you mean MPa\?"),
         ("V", "unknown unit 'V'"),
         ("1", "no unit of stress"),
@@ -281,7 +281,7 @@ def test_gaps_are_named_filled_on_request_and_remembered(system, strength, recwa
     holes[:3], holes[-2:], holes[70:86] = np.nan, np.nan, np.nan
     words = r"no values \(NaN\) at x = 0.0546875 to 0.0664062 m, 0.0984375 to 0.0015625 m \(21 of"
     for given in (holes, labelled(holes, x), labelled(holes[::-1], x[::-1])):
-        with pytest.raises(st.InputError, match=f"tau_p: must be finite: there are {words}"):
+        with pytest.raises(st.InputError, match=f"strength: must be finite: there are {words}"):
             found(system, given)
     expected = np.interp(x, x[~np.isnan(holes)], holes[~np.isnan(holes)], period=0.1)
     for given in (holes, labelled(holes[::-1], x[::-1])):

@@ -20,6 +20,8 @@ def test_the_stub_names_what_the_package_has():
         if isinstance(node, ast.ImportFrom):
             for name in node.names:
                 homes[name.asname] = f"{node.module}.{name.name}"
+        if isinstance(node, ast.Assign):  # a module under another name
+            homes[node.targets[0].id] = homes.pop(node.value.id)
     assert homes.keys() | {"__version__"} == set(st.__all__)
     for name, path in homes.items():
         module, _, attribute = path.rpartition(".")

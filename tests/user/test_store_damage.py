@@ -94,7 +94,7 @@ def test_a_chunk_damaged_while_the_run_goes_on(tmp_path, reference):
         if done == total:
             chunks(tmp_path / "run")[0].write_bytes(b"nonsense")
 
-    with pytest.raises(StoreError, match="550 of 600 samples are resume.*computes them again"):
+    with pytest.raises(StoreError, match="550 of 600 samples are stored.*computes them again"):
         run_into(make_study(), tmp_path / "run", workers=1, progress=damage)
     assert again(tmp_path / "run", ["50 samples are computed again"]).identical(reference)
 

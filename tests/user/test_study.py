@@ -72,7 +72,7 @@ def test_python_and_toml_are_the_same_study(tmp_path):
 def test_a_study_is_monte_carlo():
     study = st.Study.from_dict(STUDY)
     result = study.run()
-    direct = st.monte_carlo(study.problem, study.strength, method=study.method, samples=40, seed=3)
+    direct = st.monte_carlo(study.problem, study.random, method=study.method, samples=40, seed=3)
     assert result.identical(direct)
 
 
@@ -94,12 +94,12 @@ def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
     np.save(tmp_path / "profile.npy", np.linspace(1.0, 1.2, 128))
     np.savetxt(tmp_path / "stress.csv", np.full(128, 1e4), delimiter=",")
     study = copy.deepcopy(STUDY)
-    study["strength"]["marginal"] = {"type": "lognorm", "s": 0.2, "scale": 1e6}
+    study["random"]["strength"]["marginal"] = {"type": "lognorm", "s": 0.2, "scale": 1e6}
     study["problem"]["load"] = {"profile": "profile.npy", "initial_stress": "stress.csv"}
     loaded = st.Study.from_dict(study, folder=tmp_path)
     np.testing.assert_array_equal(loaded.problem.load.profile, np.linspace(1.0, 1.2, 128))
     expected = scipy.stats.lognorm(0.2, scale=1e6)
-    assert loaded.strength.mean == pytest.approx(expected.mean(), rel=1e-14)
+    assert loaded.random.strength.mean == pytest.approx(expected.mean(), rel=1e-14)
     loaded.to_toml(tmp_path / "written.toml")
     assert st.Study.from_toml(tmp_path / "written.toml") == loaded
 
@@ -138,7 +138,7 @@ def test_mistakes_are_named(tmp_path, path, value, words):
 def test_all_mistakes_come_at_once():
     study = changed("problem.solid.density", -1.0)
     study["ensemble"] = {"samples": -5, "sed": 1}
-    del study["strength"]["spectrum"]
+    del study["random"]["strength"]["spectrum"]
     with pytest.raises(st.InputError) as caught:
         st.Study.from_dict(study)
     text = str(caught.value)
@@ -154,7 +154,7 @@ def test_a_function_cannot_be_written_down(tmp_path):
     study = st.Study.from_dict(STUDY)
     own = st.Study(
         problem=study.problem,
-        random=st.RandomField(study.strength.marginal, bell),
+        random=st.RandomField(study.random.strength.marginal, bell),
         method=study.method,
         ensemble=study.ensemble,
     )

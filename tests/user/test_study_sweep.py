@@ -40,7 +40,7 @@ def test_every_point_is_the_study_with_its_values():
     assert result["correlation_length"].attrs == {"units": "m", "long_name": LENGTH}
     for point in study.points:
         one = copy.deepcopy(STUDY)
-        one["strength"]["spectrum"]["correlation_length"] = point.values[LENGTH]
+        one["random"]["strength"]["spectrum"]["correlation_length"] = point.values[LENGTH]
         one["problem"]["solid"]["poisson_ratio"] = point.values["problem.solid.poisson_ratio"]
         alone = st.Study.from_dict(one).run()
         part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
@@ -88,7 +88,7 @@ def test_toml_python_and_result_agree(tmp_path):
     study = st.Study.from_toml(tmp_path / "study.toml")
     python = st.Study(
         problem=base.problem,
-        random=base.strength,
+        random=base.random,
         method=base.method,
         ensemble=base.ensemble,
         sweep=[
@@ -105,13 +105,15 @@ def test_toml_python_and_result_agree(tmp_path):
 
 def test_whole_tables_are_values_too():
     other = {"type": "lognorm", "s": 0.2, "scale": 1e6}
-    study = swept({"random.strength.marginal": [STUDY["strength"]["marginal"], other]})
+    study = swept({"random.strength.marginal": [STUDY["random"]["strength"]["marginal"], other]})
     result = study.run()
     np.testing.assert_array_equal(result["marginal"], ["beta", "lognorm"])
-    assert study.plans[1].strength.mean == pytest.approx(scipy.stats.lognorm(0.2, scale=1e6).mean())
-    scales = swept({"random.strength.marginal.scale": [1e6, 2e6]}, strength={
-        "marginal": other, "spectrum": STUDY["strength"]["spectrum"]
-    })  # fmt: skip
+    assert study.plans[1].random.strength.mean == pytest.approx(
+        scipy.stats.lognorm(0.2, scale=1e6).mean()
+    )
+    scales = swept({"random.strength.marginal.scale": [1e6, 2e6]}, random={"strength": {
+        "marginal": other, "spectrum": STUDY["random"]["strength"]["spectrum"]
+    }})  # fmt: skip
     stress = scales.run()["critical_stress"].values
     # The onset is linear in the strength: twice the scale, twice the stress, to round-off.
     np.testing.assert_allclose(stress[1], 2.0 * stress[0], rtol=1e-12)
@@ -121,13 +123,13 @@ def test_objects_and_functions_in_python():
     base = st.Study.from_dict(STUDY)
     study = st.Study(
         problem=base.problem,
-        random=base.strength,
+        random=base.random,
         method=base.method,
         ensemble=base.ensemble,
         sweep=[
             {
                 "random.strength.spectrum": [
-                    base.strength.spectrum,
+                    base.random.strength.spectrum,
                     lambda k: np.exp(-((k * 2e-3) ** 2)),
                 ]
             }
@@ -140,9 +142,9 @@ def test_objects_and_functions_in_python():
 
 def test_a_swept_key_needs_no_value_of_its_own():
     bare = copy.deepcopy(STUDY)
-    del bare["strength"]["spectrum"]["correlation_length"]
+    del bare["random"]["strength"]["spectrum"]["correlation_length"]
     study = st.Study.from_dict(bare | {"sweep": [{LENGTH: [4e-3, 6e-3]}]})
-    assert study.strength.spectrum.correlation_length == 4e-3
+    assert study.random.strength.spectrum.correlation_length == 4e-3
 
 
 def test_profiles_in_files_can_be_swept(tmp_path):
@@ -220,7 +222,7 @@ def test_kept_profiles():
     result = study.run()
     assert result["strength"].dims == ("correlation_length", "kept_sample", "x")
     np.testing.assert_array_equal(result["kept_sample"], [0, 1])
-    direct = study.plans[1].strength.sample(study.problem.interface, samples=2, seed=3)
+    direct = study.plans[1].random.strength.sample(study.problem.interface, samples=2, seed=3)
     np.testing.assert_array_equal(result["strength"].values[1], direct)
     longer = swept(
         {"problem.interface.length": [0.1, 0.2]}, ensemble={"samples": 3, "keep": ["strength"]}
@@ -254,7 +256,7 @@ def test_slip_and_sensitivity_on_request():
     result = study.run()
     direct = st.onset(
         study.problem,
-        study.strength.sample(study.problem.interface, samples=6, seed=0),
+        study.random.strength.sample(study.problem.interface, samples=6, seed=0),
         method=st.Equilibrium(slip=True, sensitivity=True),
     )
     np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])

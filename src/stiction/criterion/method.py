@@ -67,8 +67,8 @@ class LocalCriterion:
         rate = problem.friction.weakening_rate
         if rate is not None and problem.uniform_rate is None:
             reasons.append(
-                "the weakening rate varies along the interface, so that there is no one nucleation"
-                " length; use st.Equilibrium() or st.Rupture()"
+                "friction.weakening_rate varies along the interface, so there is no one"
+                " nucleation length; use st.Equilibrium() or st.Rupture()"
             )
         return reasons
 

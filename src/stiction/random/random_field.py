@@ -125,7 +125,7 @@ class RandomField:
         (samples, dimension) array
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
-        counts = _check_counts(samples=samples, seed=seed, first=first, stream=stream)
+        counts = check_counts(samples=samples, seed=seed, first=first, stream=stream)
         modes = self.modes(interface).count
         return standard_normal(**counts, modes=modes, mean_mode=self.mean_mode)
 
@@ -282,7 +282,8 @@ def _which(of: str) -> str:
     return of
 
 
-def _check_counts(**counts: Any) -> dict[str, int]:
+def check_counts(**counts: Any) -> dict[str, int]:
+    """`samples`, `seed`, `first`, ... as ints, or an `InputError` with all that are none."""
     numbers = {name: whole(value) for name, value in counts.items()}
     problems = [
         f"{name}: must be a whole number >= 0, got {describe(counts[name])}"

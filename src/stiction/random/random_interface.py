@@ -16,7 +16,7 @@ from stiction.errors import InputError, unknown_name
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.random.draws import standard_normal
-from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.random.random_field import RandomField, check_counts, warn_if_inaccurate
 from stiction.sample import PROFILES
 
 NAMES = tuple(PROFILES)
@@ -247,10 +247,16 @@ class RandomInterface:
         (samples, dimension) array
             Those of each property side by side, in the order of `names`.
         """
+        counts = check_counts(samples=samples, seed=seed, first=first)
         layout = self.layout(interface)
         parts = [
             standard_normal(
-                seed, samples, modes, first=first, stream=NAMES.index(name), mean_mode=mean
+                counts["seed"],
+                counts["samples"],
+                modes,
+                first=counts["first"],
+                stream=NAMES.index(name),
+                mean_mode=mean,
             )
             for name, modes, mean in zip(layout.names, layout.modes, layout.mean_mode, strict=True)
         ]

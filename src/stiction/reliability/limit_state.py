@@ -166,6 +166,7 @@ class LimitState:
             "the load profile": load.profile,
             "the initial stress": load.initial_stress,
             "the residual strength": friction.residual_strength,
+            "the residual ratio": friction.residual_ratio,
             "the weakening rate": friction.weakening_rate,
         }
         for name, value in parts.items():
