@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from what_if_correlation import correlation
 from what_if_plots import (
     XI,
     axes_of,
@@ -335,6 +336,7 @@ PARTS: dict[str, tuple[Callable[[st.Study, xr.Dataset], Shown], tuple[str, ...]]
     "wide_strength": (wide_strength, KEPT),
     "random_load": (random_load, ()),
     "random_residual": (random_residual, (*KEPT, "residual_strength")),
+    "correlation": (correlation, (*KEPT, "residual_strength")),
     "plane": (plane, ()),
     "uniform_dc": (uniform_dc, ()),
     "free_end": (free_end, KEPT),

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction import __version__
 from stiction.interface import Interface
 
 
@@ -86,7 +87,6 @@ def to_dataset(
     attributes : mapping
         Strings and numbers are kept, anything else is written as JSON.
     """
-    from stiction import __version__
 
     def attrs(variable: Variable) -> dict[str, str]:
         return {"units": variable.units, "long_name": variable.long_name}

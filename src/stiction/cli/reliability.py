@@ -88,6 +88,7 @@ def reliability(
     a whole lets go below it; with --event first_instability, that its first patch runs away,
     arrested or not, which is never later. The time limit holds for the curve and each answer.
     """
+    from stiction.export import write_result
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import check_probability, design_stress
     from stiction.reliability.estimate import check_stress, failure_probability
@@ -95,7 +96,6 @@ def reliability(
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
     from stiction.report.style import save_figure
-    from stiction.stored_run import write_result
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)

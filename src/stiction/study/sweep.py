@@ -310,7 +310,7 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
         else:
             changes[name] = _replaced(getattr(owner, name), branch, inner)
     try:
-        return dataclasses.replace(owner, **changes)  # type: ignore[type-var]  # a model object
+        return dataclasses.replace(owner, **changes)
     except InputError as error:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
