@@ -84,31 +84,32 @@ def correlation(study: st.Study, result: xr.Dataset) -> tuple[Figure, list[str]]
     arrested.set_ylim(bottom=0)
     events = events_of(study, result, ("strength", "residual_strength"))
     longer, shorter = (longest(study, events[k : k + 1]) for k in (0, 2 * (rho.size - 1)))
+    low = minus(rho[0])
     paired = 1e-3 * (static[0, 0] - static[-1, 0])
     moving = 1e-3 * (dynamic[0] - dynamic[-1])
     return figure, [
         "Arrest is decided by what the residual strength is where the strength is low. At"
-        f" xi_0/h_n = 0.5 and a correlation of {minus(rho[0])} weak places lose little strength, and"
+        f" xi_0/h_n = 0.5 and a correlation of {low} weak places lose little strength, and"
         f" {number(100 * share[0, 0], 100 * share_error[0, 0], 1)} % of samples have an arrested"
         f" event; without correlation {number(100 * share[zero, 0], 100 * share_error[zero, 0], 1)}"
         f" %, and at 1, where the residual strength is a function of the strength,"
         f" {number(100 * share[-1, 0], 100 * share_error[-1, 0], 1)} %. At xi_0/h_n = 2 the three"
         f" are {', '.join(percent(share[k, 1]) for k in (0, zero, -1))}. The longest arrested patch"
-        f" at xi_0/h_n = 0.5 is {longer} nucleation lengths long at {minus(rho[0])}, {shorter} at 1.",
+        f" at xi_0/h_n = 0.5 is {longer} nucleation lengths long at {low}, {shorter} at 1.",
         "The first instability depends on it only where nodes reach their residual strength before:"
-        f" at {minus(rho[0])} it rises by {number(onset[0, 0].mean(), standard_error(onset[0, 0]))} %"
+        f" at {low} it rises by {number(onset[0, 0].mean(), standard_error(onset[0, 0]))} %"
         f" against no correlation, at 1 it falls by"
         f" {number(-onset[-1, 0].mean(), standard_error(onset[-1, 0]))} %. Global sliding comes"
-        f" {number(sliding[0, 0].mean(), standard_error(sliding[0, 0]))} % later at {minus(rho[0])},"
+        f" {number(sliding[0, 0].mean(), standard_error(sliding[0, 0]))} % later at {low},"
         f" {number(-sliding[-1, 0].mean(), standard_error(sliding[-1, 0]))} % earlier at 1 (at"
         f" xi_0/h_n = 2: {number(sliding[0, 1].mean(), standard_error(sliding[0, 1]))} % and"
         f" {number(-sliding[-1, 1].mean(), standard_error(sliding[-1, 1]))} %).",
         "The stress drop of global sliding, the critical stress less the mean residual strength,"
         f" is {number(1e-3 * static[0, 0].mean(), 1e-3 * standard_error(static[0, 0]), 1)} kPa at"
-        f" {minus(rho[0])} and"
+        f" {low} and"
         f" {number(1e-3 * static[-1, 0].mean(), 1e-3 * standard_error(static[-1, 0]), 1)} kPa at 1,"
         f" sample by sample {number(paired.mean(), standard_error(paired), 1)} kPa or"
-        f" {percent(paired.mean() / (1e-3 * static[-1, 0].mean()))} less. The mean residual strength"
+        f" {percent(1e3 * paired.mean() / static[-1, 0].mean())} less. The mean residual strength"
         " is the same, so this is the change of the critical stress and no more."
         f" {dynamic.shape[-1]} elastodynamic ruptures at each correlation, loaded at"
         f" {LOADING_RATE / 1e6:.0f} MPa/s, say {number(moving.mean(), standard_error(moving), 1)}"
