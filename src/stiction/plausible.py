@@ -131,7 +131,7 @@ def warn_of_length(problem: Problem, patch: float, strength: float | None = None
         return
     _warn(
         f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-        f" ({length:.3g} m): all of it lets go as one",
+        f" ({length:.3g} m): all of it slides as one",
         suspects(problem, length / patch, strength),
     )
 

@@ -35,7 +35,7 @@ class Variable:
 
 
 ONSET_VARIABLES: dict[str, Variable] = {
-    "critical_load": Variable("Pa", "load factor at which the interface as a whole lets go"),
+    "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
     "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
     "first_instability": Variable("Pa", "mean interface stress when the first patch is unstable"),
     "critical_position": Variable("m", "position of the critical patch"),

@@ -1,9 +1,6 @@
 """Mistakes, budgets that do not suffice, odd cases, and the command line of failure probability."""
 
-import importlib.util
-import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
