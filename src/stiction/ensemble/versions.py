@@ -7,7 +7,7 @@ from functools import cache
 import numba
 import numpy as np
 
-from stiction.ensemble.trouble import WorkerError
+from stiction.errors import WorkerError
 
 
 @cache
