@@ -8,12 +8,6 @@ from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.distributed import Cluster as Cluster
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
-from stiction.ensemble.trouble import (
-    RunError as RunError,
-)
-from stiction.ensemble.trouble import (
-    StoreError as StoreError,
-)
 from stiction.equilibrium.events import equilibrium_events as equilibrium_events
 from stiction.equilibrium.method import Equilibrium as Equilibrium
 from stiction.equilibrium.path import equilibrium_path as equilibrium_path
@@ -22,6 +16,12 @@ from stiction.errors import (
 )
 from stiction.errors import (
     InputError as InputError,
+)
+from stiction.errors import (
+    RunError as RunError,
+)
+from stiction.errors import (
+    StoreError as StoreError,
 )
 from stiction.errors import (
     UnitWarning as UnitWarning,

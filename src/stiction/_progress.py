@@ -212,11 +212,11 @@ def _take_the_floor(meter: Meter) -> Display | None:
         earlier = _live[: _live.index(meter)]
         if any(other.total and not other.at_most for other in earlier):
             return None
-        for speaker in _speakers:
-            _displays[speaker].pause()
-        display = _display()
+        display = _displays[meter] = _display()
         _speakers.append(meter)
-        _displays[meter] = display
+        _speakers.sort(key=_live.index)  # the innermost last, whichever thread woke first
+        for speaker in _speakers[:-1]:
+            _displays[speaker].pause()
         return display
 
 

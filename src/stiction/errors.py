@@ -1,4 +1,4 @@
-"""What a user can get wrong, said once and clearly."""
+"""Errors and warnings: what a user can get wrong, and what can stop a run."""
 
 from __future__ import annotations
 
@@ -38,6 +38,18 @@ class AccuracyWarning(UserWarning):
 
 class UnitWarning(UserWarning):
     """A value that no solid has: probably it is in another unit than it is taken to be."""
+
+
+class RunError(RuntimeError):
+    """A run cannot go on; what was stored stays, and the message says what to do."""
+
+
+class StoreError(RunError):
+    """A folder or file cannot be used or written."""
+
+
+class WorkerError(RunError):
+    """Workers died or could not be reached."""
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:

@@ -35,10 +35,9 @@ from stiction.ensemble.store import (
     prepare_folder,
     writing,
 )
-from stiction.ensemble.trouble import StoreError
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
-from stiction.errors import InputError
+from stiction.errors import InputError, StoreError
 from stiction.export import check_suffix, export
 from stiction.study.study import Study
 

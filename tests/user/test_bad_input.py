@@ -96,7 +96,7 @@ CASES = {
     ),
     "exponent": (
         lambda: st.PowerLawSpectrum(correlation_length=1.0, exponent=0.5),
-        ["exponent", "greater than 0.5"],
+        ["exponent", "0.6", "0.5"],
     ),
     "two truncations": (
         lambda: st.PowerLawSpectrum(correlation_length=1.0, truncation=2.0, power_kept=0.9),

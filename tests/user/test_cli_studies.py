@@ -211,6 +211,8 @@ LONG = TEXT.replace("samples = 200", "samples = 3_000_000")
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
 def test_interrupted_from_outside(command, study, tmp_path, number):
+    # A shell that starts tests in the background lets them, and what they start, ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     study.write_text(LONG)
     run = tmp_path / "run"
     with subprocess.Popen(
@@ -272,11 +274,11 @@ def test_onset_needs_a_problem_only(command, study, tmp_path):
     assert code == 0
     expected = st.onset(read_setup(study)[0], profile, method=st.LocalCriterion())
     assert f"{float(expected['critical_stress'][0]) * 1e-6:.6f} MPa" in out
-    study.write_text(PROBLEM.replace("nodes = 128", "nodes = 127") + "[strenght]\na = 1\n")
+    study.write_text(PROBLEM.replace("nodes = 128", "nodes = 127") + "[randon]\na = 1\n")
     code, _, err = command(*ask)
     assert code == 2
     assert "problem.interface.nodes: must be even, got 127" in err
-    assert "unknown 'strenght'; did you mean 'strength'?" in err
+    assert "unknown 'randon'; did you mean 'random'?" in err
     study.write_text("title = 'nothing'")
     assert "problem: missing" in command(*ask)[2]
 

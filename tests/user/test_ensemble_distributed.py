@@ -15,8 +15,8 @@ from stiction.ensemble import distributed as dask_room
 from stiction.ensemble import resume
 from stiction.ensemble.distributed import Cluster, dask_executor
 from stiction.ensemble.slurm import slurm_cluster, slurm_jobs
-from stiction.ensemble.trouble import WorkerError
 from stiction.ensemble.work import do_work
+from stiction.errors import WorkerError
 from stiction.stored_run import StoredRun, run_into
 
 STUDY = {

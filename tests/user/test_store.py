@@ -19,7 +19,7 @@ import stiction as st
 from stiction import stored_run
 from stiction.ensemble import resume, scheduler, store, work
 from stiction.ensemble.files import Lock
-from stiction.ensemble.trouble import StoreError, WorkerError
+from stiction.errors import StoreError, WorkerError
 from stiction.stored_run import StoredRun, folder_beside, run_into
 
 STUDY = {

@@ -18,7 +18,7 @@ import xarray as xr
 from stiction.ensemble import files, resume, scheduler, store, work
 from stiction.ensemble.files import Lock
 from stiction.ensemble.store import Store
-from stiction.ensemble.trouble import StoreError
+from stiction.errors import StoreError
 from stiction.stored_run import StoredRun, folder_beside, run_into
 from stiction.study.study import Study
 

@@ -20,8 +20,7 @@ from stiction.cli.reliability import reliability
 from stiction.cli.runs import export, plot, report, status
 from stiction.cli.rupture import rupture
 from stiction.cli.studies import check, run, schema
-from stiction.ensemble.trouble import RunError
-from stiction.errors import InputError
+from stiction.errors import InputError, RunError
 
 app = typer.Typer(
     no_args_is_help=True,

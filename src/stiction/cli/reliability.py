@@ -39,8 +39,8 @@ def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
     echo(f"as a whole:        {whole}")
     echo(f"first instability: {first}")
     echo(
-        "  the first patch becomes unstable, arrested or not, before the interface slides as a whole"
-        " or just then:\n  the first instability is the conservative answer"
+        "  the first patch becomes unstable, arrested or not, before the interface slides as a"
+        " whole or just then:\n  the first instability is the conservative answer"
     )
 
 

@@ -18,9 +18,8 @@ from pydantic import AfterValidator, PlainSerializer
 
 from stiction._model import Count, Flag, Positive, model
 from stiction._progress import Meter
-from stiction.ensemble.trouble import WorkerError
 from stiction.ensemble.versions import versions
-from stiction.errors import InputError
+from stiction.errors import InputError, WorkerError
 
 INSTALL = 'python -m pip install "stiction[distributed]"'
 SCHEDULER_SECONDS = 60.0

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._files import write_atomically
-from stiction.ensemble.trouble import StoreError
+from stiction.errors import StoreError
 from stiction.results import Variable
 
 Arrays = dict[str, NDArray[Any]]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from stiction.ensemble.trouble import StoreError
+from stiction.errors import StoreError
 
 
 def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:

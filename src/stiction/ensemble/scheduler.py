@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 from threadpoolctl import threadpool_limits
 
 from stiction.ensemble.plan import Plan
-from stiction.ensemble.trouble import WorkerError
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome, do_work, process_mark
+from stiction.errors import WorkerError
 from stiction.random.draws import BLOCK
 
 MOST_BYTES = 16 * 2**20

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from stiction.ensemble.distributed import INSTALL, Cluster
-from stiction.ensemble.trouble import RunError
-from stiction.errors import InputError
+from stiction.errors import InputError, RunError
 
 SECONDS = 60.0
 LINES = 5

@@ -43,8 +43,8 @@ from stiction.ensemble.files import (
 )
 from stiction.ensemble.same import refuse_another
 from stiction.ensemble.scheduler import Span
-from stiction.ensemble.trouble import StoreError
 from stiction.ensemble.work import Failure, Outcome
+from stiction.errors import StoreError
 from stiction.results import Variable
 
 FORMAT = 2

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from stiction import __version__
-from stiction.ensemble.trouble import WorkerError
+from stiction.errors import WorkerError
 
 
 @cache

@@ -159,7 +159,7 @@ class PowerLawSpectrum(_ScaledSpectrum):
     """
 
     correlation_length: Positive
-    exponent: Annotated[float, BeforeValidator(_number), Field(gt=0.5, allow_inf_nan=False)] = 4.0
+    exponent: Annotated[float, BeforeValidator(_number), Field(ge=0.6, le=64.0)] = 4.0
     truncation: Positive | None = None
     power_kept: Share | None = None
     type: Literal["power_law"] = "power_law"

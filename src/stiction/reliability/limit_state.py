@@ -126,8 +126,8 @@ class LimitState:
         """Stresses below and above which no sample can slide, Pa.
 
         Nothing slips, and so nothing can become unstable, while the stress is below the strength at
-        every node; and the mean stress of an interface whose slip sums to no net force is at most the
-        mean of its strength. Both hold for every method and every sample.
+        every node; and the mean stress of an interface whose slip sums to no net force is at most
+        the mean of its strength. Both hold for every method and every sample.
         """
         fields = self.random.properties
         low, high = (float(end) for end in fields["strength"].marginal.distribution.support())

@@ -17,6 +17,7 @@ from stiction.papers.albertini2020 import studies
 from stiction.papers.albertini2020.claims import CLAIMS, Claim, judged
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.figures import select
+from stiction.papers.albertini2020.registry import Figure
 from stiction.papers.albertini2020.results import write_results
 from stiction.papers.albertini2020.setting import Setting
 from stiction.papers.albertini2020.studies.context import Context
@@ -106,7 +107,12 @@ def run(
     figures = [figure for figure in figures if there.issuperset(figure.needs)]
     claims = list(CLAIMS.values()) if only is None else _claims_of(figures)
     claims = [claim for claim in claims if there.issuperset(claim.needs)]
-    needed = studies.with_needs(need for item in (*figures, *claims) for need in item.needs)
+    needed = studies.with_needs(
+        [
+            *(n for figure in figures for n in figure.needs),
+            *(n for one in claims for n in one.needs),
+        ]
+    )
     total = studies.cost(needed, context) + _DRAWING * len(figures)
     with Meter("paper", total, progress, unit="steps") as meter:
         context.report = meter.advance
@@ -129,7 +135,7 @@ def run(
 
 def _checked(
     out: Any, samples: Any, seed: Any, workers: Any, only: Any, full: bool, ruptures: Any
-) -> tuple[Path, list[Any]]:
+) -> tuple[Path, list[Figure]]:
     problems = []
     counts = [("samples", samples, FEWEST), ("seed", seed, 0)]
     if ruptures is not None:
@@ -139,7 +145,7 @@ def _checked(
             problems.append(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
-    figures: list[Any] = []
+    figures: list[Figure] = []
     try:
         figures = select(only)
     except InputError as error:
@@ -157,13 +163,13 @@ def _checked(
     return folder, figures
 
 
-def _claims_of(figures: list[Any]) -> list[Claim]:
+def _claims_of(figures: list[Figure]) -> list[Claim]:
     """Claims that the studies of these figures can judge; those that need none come with all."""
     there = {need for figure in figures for need in figure.needs}
     return [claim for claim in CLAIMS.values() if claim.needs and there.issuperset(claim.needs)]
 
 
-def _draw(figure: Any, data: Data, folder: Path) -> ShownFigure:
+def _draw(figure: Figure, data: Data, folder: Path) -> ShownFigure:
     path = folder / "figures" / f"figure-{figure.number}-{figure.name}"
     buffer = io.BytesIO()
     with paper_style():

@@ -1,14 +1,12 @@
 """The paper's figures, one module a figure.
 
-A figure is a module with `name`, `number` (the paper's), `title`, `needs` (names of studies),
-`caption(data)`, `draw(data)`, which returns a matplotlib figure, and `tables(data)`, the numbers
-behind it. To add one, write the module and list it here.
+A figure is a module with the names of `registry.Figure`. To add one, write the module and list it
+here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 from stiction.errors import InputError, unknown_name
 from stiction.papers.albertini2020.figures import (
@@ -24,26 +22,24 @@ from stiction.papers.albertini2020.figures import (
     statistics,
     variance,
 )
+from stiction.papers.albertini2020.registry import Figure, by_name
 
-FIGURES: dict[str, Any] = {
-    figure.name: figure
-    for figure in (
-        problem,
-        mapping,
-        rupture,
-        prediction,
-        monte_carlo,
-        statistics,
-        variance,
-        interaction,
-        energy,
-        growth,
-        fidelity,
-    )
-}
+FIGURES: dict[str, Figure] = by_name(
+    problem,
+    mapping,
+    rupture,
+    prediction,
+    monte_carlo,
+    statistics,
+    variance,
+    interaction,
+    energy,
+    growth,
+    fidelity,
+)
 
 
-def select(only: Iterable[str] | None) -> list[Any]:
+def select(only: Iterable[str] | None) -> list[Figure]:
     """The figures of these names, in the order of the paper; all of them for None.
 
     Raises

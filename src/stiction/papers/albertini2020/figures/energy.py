@@ -14,7 +14,7 @@ from stiction.report.tables import Table
 name = "energy"
 number = "9"
 title = "Run-away propagation"
-needs = ("monte_carlo", "interaction", "arrest", "ruptures")
+needs: tuple[str, ...] = ("monte_carlo", "interaction", "arrest", "ruptures")
 
 LENGTHS = np.linspace(0.0, 4.5, 91)
 

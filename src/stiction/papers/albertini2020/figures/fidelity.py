@@ -16,7 +16,7 @@ from stiction.statistics.densities import density
 name = "fidelity"
 number = "11"
 title = "Monte Carlo study by elastodynamics"
-needs = ("monte_carlo", "interaction", "abundant", "dynamic")
+needs: tuple[str, ...] = ("monte_carlo", "interaction", "abundant", "dynamic")
 
 PROBABILITIES = np.array([0.01, 0.05, 0.25, 0.5, 0.75, 0.95])
 

@@ -12,7 +12,7 @@ from stiction.report.tables import Table
 name = "growth"
 number = "10"
 title = "Slip patches on the way to the onset"
-needs = ("growth",)
+needs: tuple[str, ...] = ("growth",)
 
 
 def caption(data: Data) -> str:

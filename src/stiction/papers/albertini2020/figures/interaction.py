@@ -16,7 +16,7 @@ from stiction.statistics.estimates import mean, share, standard_deviation
 name = "interaction"
 number = "8"
 title = "Local criterion against exact equilibrium"
-needs = ("monte_carlo", "interaction")
+needs: tuple[str, ...] = ("monte_carlo", "interaction")
 
 DRAWN = 400
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -14,7 +14,7 @@ from stiction.report.tables import Table
 name = "mapping"
 number = "2"
 title = "Mapping and spectrum of the random strength"
-needs = ()
+needs: tuple[str, ...] = ()
 
 _PAIRS = (-1.2, 0.9)
 

@@ -17,7 +17,7 @@ from stiction.statistics.quantiles import quantiles
 name = "mc"
 number = "5"
 title = "Monte Carlo study"
-needs = ("monte_carlo", "theory")
+needs: tuple[str, ...] = ("monte_carlo", "theory")
 
 BINS = 20
 

@@ -17,7 +17,7 @@ from stiction.statistics.estimates import mean
 name = "prediction"
 number = "4"
 title = "Theory against simulation"
-needs = ("representative", "ruptures")
+needs: tuple[str, ...] = ("representative", "ruptures")
 
 PREDICTIONS = ("local", "printed", "exact")
 LABELS = {"local": "local criterion", "printed": "same, printed $G^*$", "exact": "equilibrium"}

@@ -16,7 +16,7 @@ from stiction.report.tables import Table
 name = "problem"
 number = "1"
 title = "The problem"
-needs = ("monte_carlo", "theory")
+needs: tuple[str, ...] = ("monte_carlo", "theory")
 
 SHOWN = 1  # which of the correlation lengths
 

@@ -11,7 +11,7 @@ from stiction.report.tables import Table
 name = "rupture"
 number = "3"
 title = "A representative rupture"
-needs = ("representative",)
+needs: tuple[str, ...] = ("representative",)
 
 
 def caption(data: Data) -> str:

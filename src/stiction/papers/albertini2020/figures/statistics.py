@@ -17,7 +17,7 @@ from stiction.statistics.quantiles import quantiles
 name = "statistics"
 number = "6"
 title = "Statistics against correlation length"
-needs = ("monte_carlo", "theory", "trend", "window")
+needs: tuple[str, ...] = ("monte_carlo", "theory", "trend", "window")
 
 PROBABILITIES = (0.25, 0.5, 0.75)
 

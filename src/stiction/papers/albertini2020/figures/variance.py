@@ -14,7 +14,7 @@ from stiction.report.tables import Table
 name = "variance"
 number = "7"
 title = "Variance of the nucleation stress"
-needs = ("monte_carlo", "theory")
+needs: tuple[str, ...] = ("monte_carlo", "theory")
 
 
 def caption(data: Data) -> str:

@@ -1,19 +1,17 @@
 """The paper's studies: what is computed before anything is drawn or judged, one module a study.
 
-A study is a module with `name`, `title`, `cost(context)` (work it will do, for progress) and
-`compute(context)`, which returns a labelled dataset. It may have `needs`, the names of studies
-whose results it uses, and `depends`, the attributes of the context besides the setting that its
-result depends on (samples and seed if it has none). To add one, write the module and list it here.
+A study is a module with the names of `registry.Study`. To add one, write the module and list it
+here.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from typing import Any
 
 import xarray as xr
 
+from stiction.papers.albertini2020.registry import Study, by_name
 from stiction.papers.albertini2020.studies import (
     arrest,
     convergence,
@@ -37,29 +35,26 @@ from stiction.papers.albertini2020.studies import (
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.studies.study_cache import keep, kept
 
-STUDIES: dict[str, Any] = {
-    study.name: study
-    for study in (
-        theory,
-        monte_carlo,
-        interaction,
-        representative,
-        ruptures,
-        growth,
-        arrest,
-        convergence,
-        trend,
-        window,
-        correction,
-        skewness,
-        spectrum,
-        interface_length,
-        disorder,
-        free_end,
-        many_local_samples,
-        dynamic,
-    )
-}
+STUDIES: dict[str, Study] = by_name(
+    theory,
+    monte_carlo,
+    interaction,
+    representative,
+    ruptures,
+    growth,
+    arrest,
+    convergence,
+    trend,
+    window,
+    correction,
+    skewness,
+    spectrum,
+    interface_length,
+    disorder,
+    free_end,
+    many_local_samples,
+    dynamic,
+)
 
 
 def offered(context: Context) -> set[str]:

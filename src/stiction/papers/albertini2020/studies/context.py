@@ -15,6 +15,7 @@ from stiction.errors import AccuracyWarning
 from stiction.papers.albertini2020.setting import Setting
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 
 WORK = {"equilibrium": 15, "rupture": 4000}
 """Cost of a sample by method, in samples by the local criterion (about 50 microseconds)."""
@@ -76,29 +77,26 @@ class Context:
     def monte_carlo(
         self,
         problem: Problem,
-        strength: RandomField,
+        random: RandomInterface | RandomField,
         method: Any,
         samples: int,
         first: int = 0,
         weight: int = 1,
-        **others: Any,
     ) -> xr.Dataset:
         """An ensemble of this seed, its accuracy warnings kept for the report.
 
-        `weight` is how many times as dear as usual a sample is; `others` are random fields besides
-        the strength.
+        `weight` is how many times as dear as usual a sample is.
         """
         return self.listen(
             lambda tell: monte_carlo(
                 problem,
-                strength,
+                random,
                 method=method,
                 samples=samples,
                 seed=self.seed,
                 first=first,
                 workers=self.workers,
                 progress=tell,
-                **others,
             ),
             weight * work(method, 1),
         )

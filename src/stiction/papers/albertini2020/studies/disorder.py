@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,6 +12,7 @@ from stiction.papers.albertini2020.setting import Setting
 from stiction.papers.albertini2020.studies.context import Context, work
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface
 
 name = "disorder"
 title = "More disorder: wide strength range, random load, random residual strength"
@@ -43,22 +43,28 @@ def _noise(setting: Setting, ratio: float, deviation: float, centre: float) -> R
     )
 
 
-def _cases(context: Context) -> dict[str, tuple[RandomField, dict[str, Any]]]:
+def _cases(context: Context) -> dict[str, RandomInterface]:
     setting, ratio = context.setting, ratio_of(context)
     own, unit = setting.field(ratio), setting.mean
     # Residual strength stays below the weakest strength.
     residual = float(np.mean(setting.problem.friction.residual_strength))
     spread = 0.45 * (max(setting.bounds[0], 0.0) - residual) / (2.0 * np.sqrt(5.0))
-    cases: dict[str, tuple[RandomField, dict[str, Any]]] = {
-        "as it is": (own, {}),
-        "twice the range": (setting.field(ratio, marginal=widened(setting, 2.0)), {}),
-        "four times the range": (setting.field(ratio, marginal=widened(setting, 4.0)), {}),
-        "random load": (own, {"initial_stress": _noise(setting, ratio, 0.05 * unit, 0.0)}),
+    cases: dict[str, RandomInterface] = {
+        "as it is": RandomInterface(strength=own),
+        "twice the range": RandomInterface(
+            strength=setting.field(ratio, marginal=widened(setting, 2.0))
+        ),
+        "four times the range": RandomInterface(
+            strength=setting.field(ratio, marginal=widened(setting, 4.0))
+        ),
+        "random load": RandomInterface(
+            strength=own, initial_stress=_noise(setting, ratio, 0.05 * unit, 0.0)
+        ),
     }
     if spread > 0.0:
         for label, factor in (("random stress drop", 1.0), ("more random stress drop", 2.0)):
             noise = _noise(setting, 4.0 * ratio, factor * spread, residual + 2.3 * factor * spread)
-            cases[label] = (own, {"residual_strength": noise})
+            cases[label] = RandomInterface(strength=own, residual_strength=noise)
     return cases
 
 
@@ -76,9 +82,9 @@ def compute(context: Context) -> xr.Dataset:
     parts = []
     cases = _cases(context)
     count = _count(context)
-    for field, others in cases.values():
+    for random in cases.values():
         found = context.monte_carlo(
-            context.setting.problem, field, Equilibrium(), count, weight=_EVENTS, **others
+            context.setting.problem, random, Equilibrium(), count, weight=_EVENTS
         )
         parts.append(found[["first_instability", "critical_stress", "arrested_events"]])
     dataset = xr.concat(parts, dim="case", combine_attrs="drop").assign_coords(case=list(cases))

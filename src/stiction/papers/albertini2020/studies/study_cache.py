@@ -9,12 +9,12 @@ import warnings
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
 from stiction._model import to_plain
 from stiction._netcdf import DamagedError, read_dataset, write_dataset
+from stiction.papers.albertini2020.registry import Study
 from stiction.papers.albertini2020.studies.context import Context
 
 FOLDER = "studies"
@@ -32,7 +32,7 @@ def _sources() -> str:
     return digest.hexdigest()
 
 
-def place_of(study: Any, context: Context, depends: tuple[str, ...] | None = None) -> Path | None:
+def place_of(study: Study, context: Context, depends: tuple[str, ...] | None = None) -> Path | None:
     """Where its result is kept, without the ending; nowhere without a folder."""
     if context.folder is None:
         return None
@@ -51,13 +51,13 @@ def place_of(study: Any, context: Context, depends: tuple[str, ...] | None = Non
     )
 
 
-def _named(name: str) -> Any:
+def _named(name: str) -> Study:
     from stiction.papers.albertini2020.studies import STUDIES
 
     return STUDIES[name]
 
 
-def kept(study: Any, context: Context) -> xr.Dataset | None:
+def kept(study: Study, context: Context) -> xr.Dataset | None:
     """The result of an earlier run; None if there is none, or, with a warning, a damaged one."""
     place = place_of(study, context)
     if place is None:
@@ -75,7 +75,7 @@ def kept(study: Any, context: Context) -> xr.Dataset | None:
     return dataset
 
 
-def keep(study: Any, context: Context, dataset: xr.Dataset) -> None:
+def keep(study: Study, context: Context, dataset: xr.Dataset) -> None:
     """Keep a result in place of an older one of the same study, whole or not at all."""
     place = place_of(study, context)
     if place is None:
