@@ -1,6 +1,6 @@
 """Runs the what-if studies of this folder, draws a figure of each and writes what they show.
 
-``python examples/what_ifs.py`` writes docs/what-ifs.md and its pictures, in about two minutes;
+``python examples/what_ifs.py`` writes docs/what-ifs.md and its pictures, in about four minutes;
 ``python examples/what_ifs.py length plane`` runs some of them and prints what they show.
 """
 
@@ -23,9 +23,9 @@ INTRODUCTION = """# What if
 The discussion of Albertini et al. (2020) asks what would change if strength, spectrum, interface or
 load were different. Each question is a study of its own, a TOML file in `examples/` that
 `stiction check`, `run` and `report` take; `python examples/what_ifs.py` runs them all, draws these
-figures and writes this page, numbers included. Stresses are onsets by exact equilibrium, with every
-interaction between patches, unless something else is said; lines are means and shades span 5 to
-95 % of the samples.
+figures and writes this page, numbers included, and `python examples/what_ifs.py correlation` one of
+them. Stresses are onsets by exact equilibrium, with every interaction between patches, unless
+something else is said; lines are means and shades span 5 to 95 % of the samples.
 """
 
 

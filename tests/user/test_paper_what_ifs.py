@@ -46,13 +46,17 @@ def test_every_what_if_has_a_study_and_a_part(what_ifs):
 
 
 @pytest.mark.parametrize(
-    "name", ["skewness", "length", "random_residual", "uniform_dc", "free_end", "plane"]
+    "name",
+    [
+        *("skewness", "length", "random_residual", "uniform_dc", "free_end", "plane"),
+        pytest.param("correlation", marks=pytest.mark.slow),  # ruptures, too
+    ],
 )
 def test_a_what_if_in_small(what_ifs, name, tmp_path):
     """Six samples: the sentences have numbers, and the figure has ink."""
     title, figure, sentences = what_ifs.run(name, samples=6)
     assert title
-    assert len(sentences) == 3
+    assert len(sentences) >= 3
     assert sum(len(re.findall(r"\d", sentence)) for sentence in sentences) > 3
     assert "nan" not in " ".join(sentences)
     path = tmp_path / "figure.png"
