@@ -1,4 +1,4 @@
-"""Patches grow, merge and let go: the exact path of equilibria of one random interface.
+"""Patches grow, merge and become unstable: the exact path of equilibria of one random interface.
 
 One sample at xi_0/h_n = 0.25. The upper part shows where the interface slips as the load rises, up
 to the critical load; the lower part the strength, the stress at onset, and the sensitivity, the

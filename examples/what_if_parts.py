@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from what_if_correlation import correlation
 from what_if_plots import (
     XI,
     axes_of,
@@ -186,7 +187,7 @@ def random_load(study: st.Study, result: xr.Dataset) -> Shown:
     return figure, [
         f"A random initial stress of standard deviation {deviation[0]:.0f} to"
         f" {deviation[-1]:.0f} kPa lowers the mean critical stress from {found[0].mean():.3f} to"
-        f" {found[-1].mean():.3f} MPa: the interface lets go where strength less stress is least.",
+        f" {found[-1].mean():.3f} MPa: sliding begins where strength less stress is least.",
         f"Its standard deviation grows from {1e3 * found[0].std():.0f} to"
         f" {1e3 * found[-1].std():.0f} kPa.",
         f"Yet only {percent(some.min())} to {percent(some.max())} of samples have an arrested"
@@ -335,6 +336,7 @@ PARTS: dict[str, tuple[Callable[[st.Study, xr.Dataset], Shown], tuple[str, ...]]
     "wide_strength": (wide_strength, KEPT),
     "random_load": (random_load, ()),
     "random_residual": (random_residual, (*KEPT, "residual_strength")),
+    "correlation": (correlation, (*KEPT, "residual_strength")),
     "plane": (plane, ()),
     "uniform_dc": (uniform_dc, ()),
     "free_end": (free_end, KEPT),

@@ -196,7 +196,7 @@ def onset(
     gaps: Gaps = "refuse",
     progress: Show = True,
 ) -> xr.Dataset:
-    """At which load, and where, do interfaces of given strength let go?
+    """At which load, and where, do interfaces of given strength begin to slide?
 
     Parameters
     ----------

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib.util
 import json
+import math
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -15,10 +17,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._netcdf import write_dataset
 from stiction._progress import Meter
+from stiction.ensemble.files import cannot_write
 from stiction.errors import InputError, warn_accuracy
 
 ROWS = 2**14
+OVERHEAD = 2**16
 NEEDS = {".parquet": "pyarrow", ".zarr": "zarr"}
 SUFFIXES = (".nc", ".csv", ".parquet", ".zarr")
 
@@ -67,8 +72,6 @@ def export(result: xr.Dataset, path: str | Path) -> None:
     path = Path(path)
     check_suffix(path)
     if path.suffix == ".nc":
-        from stiction.stored_run import write_result
-
         write_result(result, path)
         return
     aside = path.with_name(path.name + ".part")
@@ -84,10 +87,26 @@ def export(result: xr.Dataset, path: str | Path) -> None:
             shutil.rmtree(path)
         os.replace(aside, path)
     except OSError as error:
-        from stiction.ensemble.files import cannot_write
-
         _remove(aside)
         raise cannot_write(path, error) from error
+
+
+def write_result(result: xr.Dataset, path: Path) -> None:
+    """Write a result as one NetCDF file with checksums, whole or not at all."""
+    # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
+    if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
+        raise cannot_write(path, OSError(errno.ENOSPC, ""))
+    try:
+        write_dataset(result, path)
+    except (OSError, RuntimeError) as error:  # the NetCDF library raises either
+        raise cannot_write(path, error) from error
+
+
+def _free_bytes(folder: Path) -> float:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return math.inf
 
 
 def _remove(path: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction import __version__
 from stiction.interface import Interface
 
 
@@ -34,7 +35,7 @@ class Variable:
 
 
 ONSET_VARIABLES: dict[str, Variable] = {
-    "critical_load": Variable("Pa", "load factor at which the interface as a whole lets go"),
+    "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
     "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
     "first_instability": Variable("Pa", "mean interface stress when the first patch is unstable"),
     "critical_position": Variable("m", "position of the critical patch"),
@@ -86,7 +87,6 @@ def to_dataset(
     attributes : mapping
         Strings and numbers are kept, anything else is written as JSON.
     """
-    from stiction import __version__
 
     def attrs(variable: Variable) -> dict[str, str]:
         return {"units": variable.units, "long_name": variable.long_name}

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import math
 import os
-import shutil
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -21,11 +18,11 @@ from numpy.typing import NDArray
 from stiction._brief import brief
 from stiction._checks import as_path
 from stiction._model import describe
-from stiction._netcdf import DamagedError, read_dataset, write_dataset
+from stiction._netcdf import DamagedError, read_dataset
 from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
-from stiction.ensemble.files import HeldError, Lock, cannot_write
+from stiction.ensemble.files import HeldError, Lock
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
@@ -41,10 +38,10 @@ from stiction.ensemble.store import (
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError, StoreError
+from stiction.export import check_suffix, export
 from stiction.study.study import Study
 
 FAILED = "failed_samples"
-OVERHEAD = 2**16
 
 
 @dataclass(frozen=True)
@@ -215,8 +212,6 @@ class StoredRun:
         StoreError
             If it cannot be written.
         """
-        from stiction.export import check_suffix, export
-
         target = as_path("path", path)
         check_suffix(target)
         export(self.dataset(), target)
@@ -237,24 +232,6 @@ def _is_active(folder: Path) -> bool:
 def folder_beside(file: Path) -> Path:
     """Where the chunks of ``result.nc`` are until it is complete."""
     return file.parent / f"{file.name}.run"
-
-
-def write_result(result: xr.Dataset, path: Path) -> None:
-    """Write a result as one NetCDF file with checksums, whole or not at all."""
-    # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
-    if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
-        raise cannot_write(path, OSError(errno.ENOSPC, ""))
-    try:
-        write_dataset(result, path)
-    except (OSError, RuntimeError) as error:  # the NetCDF library raises either
-        raise cannot_write(path, error) from error
-
-
-def _free_bytes(folder: Path) -> float:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:
-        return math.inf
 
 
 def _read_result(path: Path) -> xr.Dataset:

@@ -7,8 +7,8 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
+from stiction._archive import UNREADABLE, read_arrays
 from stiction.dynamics import monitor
-from stiction.dynamics.archive import UNREADABLE, read_arrays
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
 from stiction.elasticity import kernel_cache

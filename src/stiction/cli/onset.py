@@ -51,12 +51,12 @@ def onset(
     interpolate: Interpolate = False,
     fill_gaps: FillGaps = False,
 ) -> None:
-    """At which load, and where, does one interface of given strength let go?
+    """At which load, and where, does one interface of given strength begin to slide?
 
     Takes the problem (and the method, if it has one) from a study file, which needs nothing else,
     and the strength from PROFILE, asks every method that applies, and prints a table; with --out
-    also draws the profile and where each method sees it let go. The method of the study keeps its
-    options, the others take their defaults.
+    also draws the profile and where each method sees sliding begin. The method of the study keeps
+    its options, the others take their defaults.
     """
     from stiction.study.study import read_setup
 

@@ -39,8 +39,8 @@ def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
     echo(f"as a whole:        {whole}")
     echo(f"first instability: {first}")
     echo(
-        "  the first patch runs away, arrested or not, before the interface lets go as a whole or"
-        " just then:\n  the first instability is the conservative answer"
+        "  the first patch becomes unstable, arrested or not, before the interface slides as a"
+        " whole or just then:\n  the first instability is the conservative answer"
     )
 
 
@@ -85,9 +85,10 @@ def reliability(
     figures (PNG and PDF) into a folder.
 
     The stress is the mean shear stress on the interface, and failure means that the interface as
-    a whole lets go below it; with --event first_instability, that its first patch runs away,
+    a whole slides below it; with --event first_instability, that its first patch does,
     arrested or not, which is never later. The time limit holds for the curve and each answer.
     """
+    from stiction.export import write_result
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import check_probability, design_stress
     from stiction.reliability.estimate import check_stress, failure_probability
@@ -95,7 +96,6 @@ def reliability(
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
     from stiction.report.style import save_figure
-    from stiction.stored_run import write_result
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
@@ -103,7 +103,7 @@ def reliability(
     problem, random, method = loaded.problem, loaded.random, loaded.method
     seed = loaded.ensemble.seed
     others: dict[str, Any] = {"workers": workers, "time_limit": time_limit}
-    # By the local criterion the first patch to run away is the whole interface.
+    # By the local criterion the first unstable patch is the whole interface.
     events: list[Event] = ["critical_stress"]
     if method.type != "local_criterion":
         events.append("first_instability")

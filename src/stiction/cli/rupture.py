@@ -65,6 +65,7 @@ def rupture(
     """
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
+    from stiction.export import write_result
     from stiction.report.rupture_figures import (
         can_write_mp4,
         front_figure,
@@ -72,7 +73,6 @@ def rupture(
         rupture_film,
     )
     from stiction.report.style import save_figure
-    from stiction.stored_run import write_result
     from stiction.study.study import Study, read_setup
 
     writable_folder(out)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics import monitor
-from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from stiction._archive import UNREADABLE, read_arrays, write_atomically
 from stiction._cache import cache_folder
-from stiction.dynamics.archive import UNREADABLE, read_arrays, write_atomically
 from stiction.elasticity.exponential_sum import ExponentialSum, fit_exponentials
 
 logger = logging.getLogger("stiction")

@@ -7,13 +7,13 @@ from functools import cache
 import numba
 import numpy as np
 
+from stiction import __version__
 from stiction.errors import WorkerError
 
 
 @cache
 def versions() -> str:
     """Versions of stiction, numpy and numba where this runs, as one line of text."""
-    from stiction import __version__
 
     return f"stiction {__version__}, numpy {np.__version__}, numba {numba.__version__}"
 

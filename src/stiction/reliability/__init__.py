@@ -1,1 +1,1 @@
-"""Failure probability: how likely does the interface let go below a given stress?"""
+"""Failure probability: how likely does the interface slide below a given stress?"""

@@ -319,7 +319,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         )
     if probability > 0.0 and share < LEAST_SHARE:
         doubts.append(
-            f"only {share:.1%} of what the local criterion lets go lets go by equilibrium: it is a"
+            f"only {share:.1%} of what fails by the local criterion fails by equilibrium: it is a"
             " poor guide here, and failures that it does not see would be missed; compare with"
             " algorithm='subset'"
         )

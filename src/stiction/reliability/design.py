@@ -1,4 +1,4 @@
-"""Design stress: the stress below which the interface lets go with a given probability."""
+"""Design stress: the stress below which the interface slides with a given probability."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ DEEPER = 0.3
 
 @dataclass(frozen=True, eq=False)
 class DesignStress:
-    """A stress and the probability that the interface lets go below it.
+    """A stress and the probability that the interface slides below it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class DesignStress:
     evaluations, first_stage_evaluations : int
         Samples that the method, and only the local criterion, were asked for.
     lower_bound, stress_above_bound : float
-        Pa; no sample lets go below `lower_bound`.
+        Pa; no sample slides below `lower_bound`.
     algorithm, reason : str
     confidence : float
         Of `interval`.
@@ -238,7 +238,7 @@ def _finish(
         if on_it >= probability:
             stress, cov = lowest, tail.coefficient_of_variation(least)
             doubts.append(
-                f"{on_it:.2g} of all samples let go at the bound of {lowest:.7g} Pa, as far as the"
+                f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa, as far as the"
                 f" method can tell: the stress at P = {probability:g} is the bound itself"
             )
         interval = stress_interval(tail, probability, cov, confidence, lowest)
@@ -254,7 +254,7 @@ def _finish(
         place = f"the stress lies below {seen:.7g} Pa, the lowest seen"
         if not seen > lowest:
             stress, interval = lowest, (lowest, state.bounds[1])
-            place = f"some samples let go at the bound of {lowest:.7g} Pa, too few to tell more"
+            place = f"some samples slide at the bound of {lowest:.7g} Pa, too few to tell more"
         elif not math.isfinite(seen):
             stress, interval = math.nan, state.bounds
             place = "the method itself was not asked"
@@ -298,7 +298,7 @@ def design_stress(
     time_limit: float | None = None,
     progress: Show = True,
 ) -> DesignStress:
-    """Below which stress does the interface let go with a given probability?
+    """Below which stress does the interface slide with a given probability?
 
     The quantile of the stress at onset, from one set of subset runs: nothing is searched for.
 

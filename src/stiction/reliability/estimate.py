@@ -51,7 +51,7 @@ LEAST_COV = 1e-6
 
 
 def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list[str]:
-    """What is wrong with the options that all of the room share."""
+    """What is wrong with the options that all functions of this package share."""
     problems = []
     if not (is_finite(target_cov) and target_cov >= LEAST_COV):
         problems.append(
@@ -156,7 +156,7 @@ def failure_probability(
     time_limit: float | None = None,
     progress: Show = True,
 ) -> FailureProbability:
-    """How likely does an interface of random strength let go below a given stress?
+    """How likely does an interface of random strength slide below a given stress?
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def failure_probability(
     request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
     if stress <= low:
-        text = f"no interface lets go at or below {low:g} Pa, where nothing slips"
+        text = f"no interface slides at or below {low:g} Pa, where nothing slips"
         return _exact(request, 0.0, text)
     if stress >= high:
         text = f"no interface holds more than the greatest strength, {high:g} Pa"

@@ -26,7 +26,7 @@ ITERATIONS = 200
 
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
-    """The most likely draws at which a given place lets go at a given stress.
+    """The most likely draws at which a given place becomes unstable at a given stress.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
     field : RandomField
         Peak strength.
     excess : float
-        Average of the strength over the critical patch at which it lets go, Pa.
+        Average of the strength over the critical patch at which it becomes unstable, Pa.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""The limit state: from standard normal draws to the stress at which the interface lets go."""
+"""The limit state: from standard normal draws to the stress at which the interface slides."""
 
 from __future__ import annotations
 
@@ -123,11 +123,11 @@ class LimitState:
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Stresses below and above which no sample can let go, Pa.
+        """Stresses below and above which no sample can slide, Pa.
 
-        Nothing slips, and so nothing can let go, while the stress is below the strength at every
-        node; and the mean stress of an interface whose slip sums to no net force is at most the
-        mean of its strength. Both hold for every method and every sample.
+        Nothing slips, and so nothing can become unstable, while the stress is below the strength at
+        every node; and the mean stress of an interface whose slip sums to no net force is at most
+        the mean of its strength. Both hold for every method and every sample.
         """
         fields = self.random.properties
         low, high = (float(end) for end in fields["strength"].marginal.distribution.support())
@@ -158,7 +158,7 @@ class LimitState:
         return None
 
     def not_alike_everywhere(self) -> str | None:
-        """Why a shifted sample would not let go at the same stress, or None if it would."""
+        """Why a shifted sample would not slide at the same stress, or None if it would."""
         if len(self.random.names) > 1:
             return "more than the strength is random"
         load, friction = self.problem.load, self.problem.friction

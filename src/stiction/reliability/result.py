@@ -20,7 +20,7 @@ from stiction.sample import PROFILES
 
 @dataclass(frozen=True, eq=False)
 class FailureProbability:
-    """Probability that an interface lets go below a stress, with how far it can be trusted.
+    """Probability that an interface slides below a stress, with how far it can be trusted.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class FailureProbability:
     stress : float
         Pa.
     lower_bound, stress_above_bound : float
-        Pa; no sample lets go below `lower_bound`, so that a rare failure is told by how little
+        Pa; no sample slides below `lower_bound`, so that a rare failure is told by how little
         `stress` is above it.
     algorithm : str
         'plain', 'subset', 'importance', 'two_level', 'exact' (nothing had to be sampled) or

@@ -1,4 +1,4 @@
-"""One profile and where each method sees it let go."""
+"""One profile and where each method sees sliding begin."""
 
 from __future__ import annotations
 

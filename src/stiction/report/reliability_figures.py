@@ -118,7 +118,7 @@ def curve_figure(curve: xr.Dataset) -> Figure:
 
 
 def weak_spot_figure(failing: xr.Dataset, nucleation_length: float, stress: float) -> Figure:
-    """Profiles of failing samples, moved so that each lets go at the middle.
+    """Profiles of failing samples, moved so that each begins to slide at the middle.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
+from stiction import __version__
 from stiction.ensemble.files import write_whole
 from stiction.errors import InputError
 from stiction.report.run_figures import run_figures
@@ -153,8 +154,6 @@ def _versions(stored: StoredRun) -> str:
     import netCDF4
     import numba
     import scipy
-
-    from stiction import __version__
 
     modules = {"numpy": np, "scipy": scipy, "numba": numba, "xarray": xr, "netCDF4": netCDF4}
     others = ", ".join(f"{name} {module.__version__}" for name, module in modules.items())

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import pydantic
 import tomli_w
@@ -89,7 +89,7 @@ def _interface(value: Any) -> Any:
 
 
 if TYPE_CHECKING:  # a field alone is accepted and becomes an interface
-    AnyRandom = RandomInterface | RandomField
+    AnyRandom: TypeAlias = RandomInterface | RandomField
 else:
     AnyRandom = Annotated[RandomInterface, BeforeValidator(_interface)]
 

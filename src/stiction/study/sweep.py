@@ -22,12 +22,15 @@ from stiction.ensemble.assemble import GridAxis
 from stiction.errors import InputError, unknown_name
 from stiction.placed import Placed, is_profile, placed_profile
 from stiction.random.marginals import ScipyMarginal
+from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable
 
 MOST_POINTS = 100_000
 _FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
 _FIXED_TABLES = ("title", "sweep", "cluster", "ensemble.keep_limit")
 _RANGE = ("start", "stop", "count", "spacing")
+CORRELATION = "correlation"
+"""Table of `RandomInterface` whose keys are names of properties, and its values pure numbers."""
 _UNITS = {
     "length": "m",
     "correlation_length": "m",
@@ -291,8 +294,6 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
     if isinstance(owner, ScipyMarginal):
         changes = {name: leaf.value for name, leaf in tree.items() if isinstance(leaf, _Leaf)}
         return {"type": owner.type, **dict(owner.parameters), **changes}
-    if path == "random.correlation":
-        return _joined(owner or {}, tree)
     if not dataclasses.is_dataclass(owner):
         raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
     names = [field.name for field in dataclasses.fields(owner) if field.init]
@@ -304,10 +305,12 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
         inner = f"{path}.{name}" if path else name
         if isinstance(branch, _Leaf):
             changes[name] = branch.value
+        elif name == CORRELATION and isinstance(owner, RandomInterface):
+            changes[name] = _joined(owner.correlation or {}, branch)
         else:
             changes[name] = _replaced(getattr(owner, name), branch, inner)
     try:
-        return dataclasses.replace(owner, **changes)  # type: ignore[type-var]  # a model object
+        return dataclasses.replace(owner, **changes)
     except InputError as error:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
@@ -351,7 +354,8 @@ def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
         coordinates = {}
         for i, key in enumerate(axis.keys):
             values = _coordinate([step[i] for step in axis.steps])
-            unit = _UNITS.get(key.rsplit(".", 1)[-1], "1")
+            parts = key.split(".")
+            unit = "1" if CORRELATION in parts else _UNITS.get(parts[-1], "1")
             unit = unit if values.dtype.kind in "if" else "1"
             coordinates[names[key]] = (values, Variable(unit, key, (dim,)))
         result.append(GridAxis(dim, len(axis.steps), coordinates))
@@ -362,7 +366,8 @@ def _short_names(keys: Sequence[str], taken: Sequence[str]) -> dict[str, str]:
     names: dict[str, str] = {}
     for key in keys:
         parts = key.split(".")
-        for count in range(1, len(parts) + 1):
+        fewest = parts[::-1].index(CORRELATION) + 1 if CORRELATION in parts else 1
+        for count in range(fewest, len(parts) + 1):
             name = "_".join(parts[-count:])
             alike = [other for other in keys if other.split(".")[-count:] == parts[-count:]]
             if len(alike) == 1 and name not in taken:

@@ -106,7 +106,7 @@ def _points(data: Data, findings: Judged) -> list[str]:
         share = [float(np.mean(stress[ratio])) / data.setting.mean for ratio in (first, last)]
         spread = [float(np.std(stress[ratio])) / data.setting.mean for ratio in data.ratios]
         points.append(
-            f"By the local criterion the interface lets go at {100 * share[0]:.1f} % of its mean"
+            f"By the local criterion the interface slides at {100 * share[0]:.1f} % of its mean"
             f" strength if the correlation length is {first:g} of the nucleation length, at"
             f" {100 * share[1]:.1f} % if it is {last:g} times as long; samples vary by"
             f" {100 * min(spread):.1f} to {100 * max(spread):.1f} % (standard deviation)."
@@ -151,7 +151,7 @@ def _about_ruptures(data: Data) -> str:
         data["ruptures"]["critical_stress"].size,
     )
     return (
-        f"{runs} elastodynamic ruptures let go at the stress that exact equilibrium predicts to"
+        f"{runs} elastodynamic ruptures begin at the stress that exact equilibrium predicts to"
         f" {error('exact'):.2g} %, the local criterion to {error('local'):.2g} %, and the formula"
         f" with the printed modulus to {error('printed'):.2g} % (root mean square); in {wrong} of"
         f" {runs} the local criterion puts the onset in the wrong place."

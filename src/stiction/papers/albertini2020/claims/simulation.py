@@ -93,7 +93,7 @@ def simulations_overpredicted(data: Data) -> Finding:
 
 @claim(
     where="Secs. 3.3 and 5.2",
-    says="Interaction of patches explains why simulations let go earlier than predicted.",
+    says="Interaction of patches explains why simulations slide earlier than predicted.",
     needs=NEEDS,
 )
 def simulations_interaction(data: Data) -> Finding:

@@ -1,4 +1,4 @@
-"""Beyond the paper: the energy that lets a rupture run away, what is arrested, and how fast."""
+"""Beyond the paper: the energy that keeps a rupture growing, what is arrested, and how fast."""
 
 from __future__ import annotations
 
