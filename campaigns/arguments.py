@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from harness import Summary, command_line, finish, trial
 
 import stiction as st
+from stiction.sample import PROFILES
 
 NODES = 64
 Call = tuple[str, Callable[..., Any], dict[str, Any]]
@@ -144,11 +145,16 @@ def calls() -> list[Call]:
     ensemble = st.Ensemble(samples=2)
     study = st.Study(problem=problem, random=strength, method=local, ensemble=ensemble)
     sizes = {"correlation_length": 0.02, "truncation": 3.0}
-    rows = {"residual_strength": 0.0, "initial_stress": 0.0, "weakening_rate": 0.1e12}
+    rows = {"strength": tau_p, "residual_strength": 0.0, "initial_stress": 0.0,
+            "weakening_rate": 0.1e12}  # fmt: skip
+    row = rows | {"strength": tau_p[0]}
     of_problem = {"problem": problem, "strength": strength}
-    fields = {"residual_strength": None, "initial_stress": None, "weakening_rate": None}
+    ensemble_of = {"problem": problem, "random": strength}
+    fields = {name: None for name in ("residual_strength", "initial_stress", "weakening_rate",
+                                      "critical_slip", "fracture_energy", "normal_pressure",
+                                      "correlation")}  # fmt: skip
     chance = {
-        **of_problem, **fields, "method": local, "seed": 0, "target_cov": 0.5,
+        **ensemble_of, "method": local, "seed": 0, "target_cov": 0.5,
         "max_evaluations": 5000, "confidence": 0.9, "event": "critical_stress", "workers": 1,
     }  # fmt: skip
     values = np.linspace(0.7e6, 0.9e6, 50)
@@ -162,7 +168,9 @@ def calls() -> list[Call]:
         ("Problem", st.Problem,
          {"solid": problem.solid, "interface": interface, "friction": friction,
           "load": st.Load(), "mode": "II"}),
-        ("Problem.rows", problem.rows, {"tau_p": tau_p, **rows}),
+        ("Problem.sample", _by_name(problem.sample), rows),
+        ("Problem.sample", problem.sample, {"profiles": tau_p, "accept": ()}),
+        ("RandomInterface", st.RandomInterface, {"strength": strength, **fields}),
         ("Problem.nucleation_length_of", problem.nucleation_length_of, {"rate": 1e11}),
         ("Solid.effective_modulus", problem.solid.effective_modulus, {"mode": "II"}),
         ("Beta", st.Beta, beta),
@@ -193,22 +201,26 @@ def calls() -> list[Call]:
          {"loading_rate": 1e9, "kernel_tolerance": 1e-6, "memory_range": 1e5, "courant": 0.9,
           "time_step": None, "slip_step": 0.02, "load_step": 1e-3, "event_drop": 1e-4,
           "implicit": True, "max_steps": 1000}),
-        ("onset", st.onset, {"problem": problem, "tau_p": tau_p, "method": local, **rows}),
+        ("onset", st.onset, {"problem": problem, "profiles": tau_p, "method": local}),
+        ("onset", _by_name(st.onset), {"problem": problem, "method": st.Equilibrium(), **rows}),
         ("nucleation_stress", st.nucleation_stress,
          {"problem": problem, "tau_p": tau_p, "weights": "exact"}),
         ("equilibrium_events", st.equilibrium_events,
-         {"problem": problem, "tau_p": tau_p[0], **rows}),
+         {"problem": problem, "profiles": tau_p[0]}),
+        ("equilibrium_events", _by_name(st.equilibrium_events), {"problem": problem, **row}),
         ("equilibrium_path", st.equilibrium_path,
-         {"problem": problem, "tau_p": tau_p[0], "loads": [1e5, 2e5], **rows}),
+         {"problem": problem, "profiles": tau_p[0], "loads": [1e5, 2e5]}),
+        ("simulate_rupture", _by_name(st.simulate_rupture),
+         {"problem": problem, **row, "method": rupture}),
         ("simulate_rupture", st.simulate_rupture,
-         {"problem": problem, "tau_p": tau_p[0], "method": rupture, **rows, "load": None,
+         {"problem": problem, "profiles": tau_p[0], "method": rupture, "load": None,
           "initial_slip": None, "initial_load": None, "variables": ("slip",), "every": 10,
           "every_implicit": 1, "every_near_onset": None, "interval": None, "steps": True,
           "stop": "onset", "end_time": None, "store": None, "chunk": 64, "checkpoint": None,
           "checkpoint_every": 10_000, "restart": None, "progress": None}),
         ("open_rupture", st.open_rupture, {"folder": "x", "variables": None, "steps": True}),
         ("monte_carlo", st.monte_carlo,
-         {**of_problem, **fields, "method": local, "samples": 2, "seed": 0, "first": 0,
+         {**ensemble_of, "method": local, "samples": 2, "seed": 0, "first": 0,
           "keep": ("strength",), "keep_samples": (0,), "keep_limit": 1e9, "workers": 1,
           "executor": None, "progress": False}),
         ("nucleation_statistics", st.nucleation_statistics,
@@ -229,7 +241,7 @@ def calls() -> list[Call]:
          {"samples": 2, "seed": 0, "first": 0, "keep": ("strength",), "keep_samples": 1,
           "keep_limit": 1e9}),
         ("Study", st.Study,
-         {**of_problem, **fields, "method": local, "ensemble": ensemble,
+         {**ensemble_of, "method": local, "ensemble": ensemble,
           "sweep": [{"problem.interface.length": [0.1, 0.2]}], "cluster": None, "title": ""}),
         ("Study.run", study.run,
          {"out": None, "workers": 1, "executor": None, "progress": False, "retry": False}),
@@ -246,6 +258,17 @@ def calls() -> list[Call]:
         ("paper.strength", st.paper.strength,
          {"problem": st.paper.problem(256), "correlation_ratio": 0.5}),
     ]  # fmt: skip
+
+
+def _by_name(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function, its profiles given one by one."""
+
+    def wrapped(**given: Any) -> Any:
+        profiles = {name: given.pop(name) for name in list(given) if name in PROFILES}
+        options = [given.pop("problem")] if "problem" in given else []
+        return function(*options, profiles, **given)
+
+    return wrapped
 
 
 def campaign(count: int, seed: int = 0) -> Summary:

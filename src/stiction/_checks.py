@@ -70,7 +70,8 @@ def check_instance(name: str, value: Any, kind: type) -> None:
 
 def check_progress(value: Any) -> None:
     """Refuse what is neither a truth value nor a function."""
-    if not callable(value) and not isinstance(value, bool | np.bool_):
+    function = callable(value) and not isinstance(value, type)
+    if not function and not isinstance(value, bool | np.bool_):
         raise InputError(f"progress: must be True, False or a function, got {describe(value)}")
 
 

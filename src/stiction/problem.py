@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import model_validator
 
-from stiction._checks import is_real
+from stiction._checks import as_names, is_real
 from stiction._model import Mode, describe, model
 from stiction.errors import InputError, warn_accuracy
 from stiction.friction import Friction
@@ -230,6 +230,7 @@ class Problem:
         """
         if isinstance(profiles, Sample):
             return profiles
+        accept = as_names("accept", accept)
         given = named_profiles(profiles)
         shape = self.interface.shape
         friction, load = self.friction, self.load

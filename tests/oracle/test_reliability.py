@@ -119,7 +119,7 @@ def test_against_openturns_subset_sampling():
     ot = pytest.importorskip("openturns")
     problem = st.paper.problem(nodes=256)
     field = st.paper.strength(problem, 1.0)
-    state = make_limit_state(problem, field, LOCAL, 0, {}, "critical_stress", 1)
+    state = make_limit_state(problem, field, LOCAL, 0, "critical_stress", 1)
     stress, dimension = 0.6615e6, state.dimension
 
     def sample(points):

@@ -61,7 +61,7 @@ def test_writes_result_figures_and_film(monkeypatch, capsys, study, tmp_path):
     for name in ("rupture.png", "rupture.pdf", "front.png", "front.pdf", "rupture.gif"):
         assert (out / name).stat().st_size > 5000, name
     loaded = st.Study.from_toml(study)
-    tau_p = loaded.strength.sample(loaded.problem.interface, samples=1, seed=3, first=1)
+    tau_p = loaded.random.strength.sample(loaded.problem.interface, samples=1, seed=3, first=1)
     with xr.open_dataset(out / "rupture.nc") as result:
         np.testing.assert_array_equal(result.peak_strength, tau_p[0])
         expected = st.onset(loaded.problem, tau_p, method=st.Rupture(loading_rate=2e7))
