@@ -43,7 +43,7 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_python_of_the_page_on_reliability():
-    """All but the page's own comments: about half a minute."""
+    """With a failure curve by equilibrium: about a minute."""
     scope = {}
     run_blocks("docs/reliability.md", scope)
     assert 1e-6 < scope["found"].probability < 1e-3
