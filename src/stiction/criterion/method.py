@@ -64,6 +64,9 @@ class LocalCriterion:
         reasons = []
         if problem.interface.is_plane:
             reasons.append("it does not take interfaces of two dimensions")
+        if not problem.friction.linear:
+            name = type(problem.friction).__name__
+            reasons.append(f"friction: strength must fall linearly with slip, got {name}")
         rate = problem.friction.weakening_rate
         if rate is not None and problem.uniform_rate is None:
             reasons.append(

@@ -61,6 +61,16 @@ class Medium:
     effective_modulus: float
 
 
+def refused_laws(problem: Problem) -> list[str]:
+    """Why the friction law of a problem cannot be followed; nothing if it can."""
+    if problem.friction.linear:
+        return []
+    return [
+        f"friction: strength must fall linearly with slip, got {type(problem.friction).__name__};"
+        " use st.SlipWeakening(...)"
+    ]
+
+
 def prepare_medium(
     problem: Problem,
     *,
@@ -70,6 +80,8 @@ def prepare_medium(
     time_step: float | None,
 ) -> Medium:
     """Tables for a problem; raises `InputError` if the step is above the stability limit."""
+    if refused := refused_laws(problem):
+        raise InputError(refused)
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
         valid = (

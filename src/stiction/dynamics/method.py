@@ -20,7 +20,7 @@ from stiction.dynamics.checks import (
     warn_if_reversed_before,
     warn_if_unresolved,
 )
-from stiction.dynamics.discretization import Medium, prepare_medium
+from stiction.dynamics.discretization import Medium, prepare_medium, refused_laws
 from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
 from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, uniform_rate
@@ -157,9 +157,10 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        return (
-            ["it does not take interfaces of two dimensions"] if problem.interface.is_plane else []
-        )
+        reasons = refused_laws(problem)
+        if problem.interface.is_plane:
+            reasons.append("it does not take interfaces of two dimensions")
+        return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from numpy.typing import NDArray
 
 from stiction._model import model
+from stiction.equilibrium.prepared import refused_laws
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
 from stiction.results import Variable, along, onset_variables
@@ -83,9 +84,10 @@ class Equilibrium:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        return (
-            ["it does not take interfaces of two dimensions"] if problem.interface.is_plane else []
-        )
+        reasons = refused_laws(problem)
+        if problem.interface.is_plane:
+            reasons.append("it does not take interfaces of two dimensions")
+        return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""

@@ -31,6 +31,16 @@ PATIENCE = 1000
 """Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
 
 
+def refused_laws(problem: Problem) -> list[str]:
+    """Why the friction law of a problem cannot be followed; nothing if it can."""
+    if problem.friction.linear:
+        return []
+    return [
+        f"friction: strength must fall linearly with slip, got {type(problem.friction).__name__};"
+        " use st.SlipWeakening(...)"
+    ]
+
+
 @dataclass
 class Bound:
     """An upper bound of the critical load (Pa) and its multiplier."""
@@ -54,6 +64,8 @@ class Setting:
     def __init__(
         self, problem: Problem, nodes: slice = slice(None), prove_sliding: bool = False
     ) -> None:
+        if refused := refused_laws(problem):
+            raise InputError(refused)
         self.problem = problem
         self.caution = np.inf if prove_sliding else 1.0
         every = nodes.step or 1
