@@ -12,6 +12,7 @@ from stiction.dynamics.memory_layout import step_table
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.errors import InputError
+from stiction.friction.kernels import registered
 from stiction.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -63,11 +64,15 @@ class Medium:
 
 def refused_laws(problem: Problem) -> list[str]:
     """Why the friction law of a problem cannot be followed; nothing if it can."""
-    if problem.friction.linear:
+    try:
+        known = registered(problem.friction.parameters)
+    except NotImplementedError:
+        known = False
+    if known:
         return []
     return [
-        f"friction: strength must fall linearly with slip, got {type(problem.friction).__name__};"
-        " use st.SlipWeakening(...)"
+        f"friction: {type(problem.friction).__name__} has no compiled strength; give its"
+        " `parameters` a type that stiction.friction.kernels.register knows"
     ]
 
 
