@@ -8,7 +8,7 @@ from typing import Any, Literal
 from numpy.typing import NDArray
 
 from stiction._model import model
-from stiction.equilibrium.prepared import refused_laws
+from stiction.equilibrium.pieces import refused
 from stiction.equilibrium.solver import Solver
 from stiction.problem import Problem
 from stiction.results import Variable, along, onset_variables
@@ -84,7 +84,7 @@ class Equilibrium:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        reasons = refused_laws(problem)
+        reasons = refused(problem.friction)
         if problem.interface.is_plane:
             reasons.append("it does not take interfaces of two dimensions")
         return reasons
