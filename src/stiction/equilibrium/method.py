@@ -33,10 +33,10 @@ DISCRETIZATION_ERROR = Variable(
 class Equilibrium:
     """Exact quasi-static onset with every interaction between patches, in under a millisecond.
 
-    The load is raised until no equilibrium is left. As long as no node has reached its residual
-    strength this is a linear programme, solved to round-off with a certificate; beyond the first
-    instability, or where the residual strength is reached before it, events are followed one by
-    one. Weakening rate, residual strength, initial stress and load profile may vary along the
+    The load is raised until no equilibrium is left. As long as strength falls linearly this is a
+    linear programme, solved to round-off with a certificate; beyond the first instability, or
+    where the residual strength or another corner of a `PiecewiseWeakening` is reached before it,
+    events are followed one by one: exact too, at some ten times the cost. Weakening rate, residual strength, initial stress and load profile may vary along the
     interface.
 
     Parameters
@@ -59,7 +59,8 @@ class Equilibrium:
     first instability, `slip_patches` at that moment, `critical_patch_length` (m),
     `arrested_events`, `residual_reached` (whether a node had reached its residual strength before
     the interface let go), and `sliding_position` (m), which differs from `critical_position` only
-    after an arrested event. Arrest is decided by equilibrium: inertia may carry a rupture through.
+    after an arrested event. Where a law steepens and a corner is passed before the first
+    instability, `certificate_gap` is nan. Arrest is decided by equilibrium: inertia may carry a rupture through.
     """
 
     sensitivity: bool = False

@@ -75,6 +75,11 @@ def pieces_of(law: FrictionLaw) -> Pieces:
     return Pieces(u[1:].copy(), starts, steep / steep[0], float(steep[0]), law.integral)
 
 
+def steepens(pieces: Pieces) -> bool:
+    """Whether a piece falls more steeply than the one before it."""
+    return bool(np.any(np.diff(pieces.slopes) > 0.0))
+
+
 @jit
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """The piece on which a node of this d_c is after a slip."""

@@ -24,7 +24,7 @@ from stiction.equilibrium.continuation import (
 from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED
 from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.pieces import LINEAR, Pieces
+from stiction.equilibrium.pieces import LINEAR, Pieces, steepens
 from stiction.equilibrium.prepared import LARGE_GRID, Setting
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.workspace import Sample, make_sample
@@ -144,7 +144,8 @@ class Solver:
                 first[row] = at_first.load
                 if self.slip:
                     slips[row] = at_first.slip
-        self._check(table[:, batch.GAP], first)
+        known_gaps = ~(steepens(self.setting.pieces) & (fate == batch.CORNER_REACHED))
+        self._check(table[known_gaps, batch.GAP], first[known_gaps])
         mean_profile = rows.load_profile.mean()
         values: dict[str, NDArray[Any]] = {
             "critical_load": load,
@@ -238,6 +239,8 @@ class Solver:
             Solution(state.load, state.slip, state.stiff, multiplier),
             np.empty(self.setting.nodes),
         )
+        if steepens(sample.pieces):  # then no multiplier bounds the load from above
+            line[batch.GAP] = np.nan
         line[batch.PATCHES] = count_patches(state.slip)
         _, length, centre = main_patch(multiplier)
         line[batch.POSITION] = centre * self.setting.spacing

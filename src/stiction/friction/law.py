@@ -81,6 +81,11 @@ class FrictionLaw:
         return self.initial_slope
 
     @property
+    def steepens(self) -> bool:
+        """Whether strength falls more steeply later than at zero slip."""
+        return self.steepest_slope > self.initial_slope
+
+    @property
     def integral(self) -> float:
         """Integral of f(u) over all u >= 0."""
         raise NotImplementedError
