@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 
 import stiction as st
 
-GAMMA = {"fracture_energy": 1.0, "residual_strength": 0.2e6}
+GAMMA = {"fracture_energy": 2.5, "residual_strength": 0.2e6}
 LAWS = {
     "linear": st.SlipWeakening(**GAMMA),
     "exponential": st.ExponentialWeakening(**GAMMA),
@@ -21,16 +21,16 @@ LAWS = {
 
 @pytest.fixture(scope="module")
 def runs():
-    """A weak spot breaks an interface of 1024 nodes, with the same fracture energy for each law."""
+    """A weak spot breaks an interface of 512 nodes, with the same fracture energy for each law."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
-    interface = st.Interface(length=0.2, nodes=1024)
-    strength = 1e6 - 0.4e6 * np.exp(-(((interface.x - 0.1) / 0.015) ** 2))
+    interface = st.Interface(length=0.1, nodes=512)
+    strength = 1e6 - 0.4e6 * np.exp(-(((interface.x - 0.05) / 0.015) ** 2))
     problem = st.Problem(solid, interface, LAWS["linear"], mode="III")
     return {
         name: st.simulate_rupture(
             dataclasses.replace(problem, friction=law),
             strength,
-            method=st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4),
+            method=st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25),
             variables=("slip", "slip_rate", "shear_stress", "strength"),
             every=1,
         )
@@ -47,7 +47,7 @@ def test_energies_balance(runs, name):
     sheared = 0.5 * (stress[1:] + stress[:-1]) * np.diff(slip, axis=0)
     friction = np.cumsum(sheared.sum(axis=1)) * spacing
     dissipated = run.fracture_energy.values + 0.2e6 * slip.sum(axis=1) * spacing
-    # Trapezia over steps in which a node weakens by a few per cent: their error is a few 1e-4.
+    # Trapezia over steps in which the fastest nodes weaken by a tenth: off at corners.
     assert friction[-1] == pytest.approx(dissipated[-1], rel=1e-3)
     pushed = 0.5 * (load[1:] + load[:-1]) * np.diff(slip.sum(axis=1)) * spacing
     assert run.work.values[-1] == pytest.approx(pushed.sum(), rel=1e-3)
@@ -59,7 +59,7 @@ def test_energies_balance(runs, name):
     # All of it is spent, up to the last per cent of strength of a law that never ends.
     assert run.stopped == "sliding"
     left = 0.01 if name == "exponential" else 1e-12
-    assert run.fracture_energy.values[-1] == pytest.approx(0.2, rel=left)
+    assert run.fracture_energy.values[-1] == pytest.approx(0.25, rel=left)
     assert law.reach > 0.0
 
 
@@ -81,7 +81,7 @@ def test_bilinear_weakening_has_two_peaks_of_slip_rate(runs):
     # The front passes with the steep piece; a second peak follows with the gentle one
     # (equal fracture energy, another shape).
     for name, expected in (("linear", 1), ("exponential", 1), ("bilinear", 2)):
-        for node in (250, 300, 350):
+        for node in (100, 130, 160):
             rate = runs[name].slip_rate.values[:, node]
             peaks, _ = find_peaks(rate, prominence=0.05 * rate.max())
             assert peaks.size == expected, (name, node)

@@ -260,9 +260,7 @@ def implicit_steps(
         # Round-off of the transforms bounds what can be asked for.
         accuracy = max(control[RESIDUAL] * scale, _ROUND_OFF * level)
         near = accuracy if control[CURVED] > 0.0 else 0.0
-        solved = solve_increment(
-            symbol, inverse, law, rows, slip, pushed, u, state, accuracy, near
-        )
+        solved = solve_increment(symbol, inverse, law, rows, slip, pushed, u, state, accuracy, near)
         largest, total = 0.0, 0.0
         if solved:
             least = control[SMALL_DROP] * scale

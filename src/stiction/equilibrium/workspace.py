@@ -35,9 +35,7 @@ class Sample(NamedTuple):
 
 
 @jit
-def make_sample(
-    excess: Array, floor: Array, profile: Array, rate: Array, pieces: Pieces
-) -> Sample:
+def make_sample(excess: Array, floor: Array, profile: Array, rate: Array, pieces: Pieces) -> Sample:
     """A sample in which nodes that are at their floor, but for round-off, do not weaken."""
     n = excess.shape[0]
     scale = 0.0
