@@ -120,7 +120,7 @@ def warn_of_units(problem: Problem, strength: float, residual: float = 0.0) -> N
         return  # the length below follows from it
     if friction.weakening_rate is None:  # otherwise the problem has seen to it
         scale, value = friction.scale
-        rate = float(friction.rate(np.float64(strength - residual), scale, np.median(value)))
+        rate = float(friction.rate(np.asarray(strength - residual), scale, np.median(value)))
         warn_of_length(problem, problem.nucleation_length_of(max(rate, 1e-300)), strength)
 
 

@@ -181,9 +181,10 @@ class Solver:
         solve_batch(
             np.ascontiguousarray(rows.strength - rows.initial_stress),
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-            setting.profile, rate, setting.pieces, setting.usual_rate, setting.grid, setting.wide_column,
-            setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
-            setting.modulus, setting.caution, table, slips, stiffs, aheads, multipliers, self.slip,
+            setting.profile, rate, setting.pieces, setting.usual_rate, setting.grid,
+            setting.wide_column, setting.usual, setting.windows(unusual), setting.block,
+            setting.reach, setting.spacing, setting.modulus, setting.caution, table, slips, stiffs,
+            aheads, multipliers, self.slip,
         )  # fmt: skip
 
     def _one(
