@@ -35,7 +35,12 @@ def prepared(nodes: int, tolerance: float = 1e-6):
     )
     method = Rupture(loading_rate=2e7, implicit=False, kernel_tolerance=tolerance)
     run = make_run(
-        method, method.medium(problem), problem.sample(tau_p), 0, uniform_rate(method.loading_rate)
+        method,
+        problem.friction,
+        method.medium(problem),
+        problem.sample(tau_p),
+        0,
+        uniform_rate(method.loading_rate),
     )
     return run, run.start(first_slip(run))
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 UNITS = {
     "strength": "Pa",
     "residual_strength": "Pa",
+    "residual_ratio": "1",
     "initial_stress": "Pa",
     "normal_pressure": "Pa",
     "weakening_rate": "Pa/m",
@@ -43,6 +44,7 @@ UNITS = {
 _NAMES = {
     "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
     "residual_strength": ("tau_r", "taur"),
+    "residual_ratio": (),
     "initial_stress": ("tau_i", "taui"),
     "normal_pressure": ("pressure", "normal_stress", "sigma_n", "sigma"),
     "weakening_rate": ("w",),

@@ -21,12 +21,14 @@ def rupture(nodes, steps):
     strength = 1e6 - 0.35e6 * np.exp(-(((interface.x - 0.05) / 0.012) ** 2))
     method = Rupture(loading_rate=1.0, implicit=False, time_step=END / steps)
     history = load_history(([0.0, 1.0], [7.5e5, 7.5e5]), None)
-    run = make_run(method, method.medium(problem), problem.sample(strength), 0, history)
+    run = make_run(
+        method, problem.friction, method.medium(problem), problem.sample(strength), 0, history
+    )
     run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0)
     run.advance(state, steps)
     energy = radiated_energy(
-        float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
+        problem.friction, float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
         run.medium.stiffness[0], run.medium.spacing,
     )  # fmt: skip
     return state, energy

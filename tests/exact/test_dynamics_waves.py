@@ -63,7 +63,7 @@ def released(steps, end, mode="II"):
     method = Rupture(loading_rate=1.0, implicit=False, time_step=end * unit / steps)
     history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
     rows = problem.sample(np.full(32, 1.001e6))
-    run = make_run(method, method.medium(problem), rows, 0, history)
+    run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
     run.control[monitor.SLID_STOP] = np.inf
     state = run.start(0.0, 1e-3 + 1e-6 * np.cos(k * interface.x))
     run.advance(state, steps)

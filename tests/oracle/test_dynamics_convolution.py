@@ -51,7 +51,14 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     x = interface.x
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
     method = Rupture(loading_rate=3e9, implicit=False)
-    run = make_run(method, method.medium(problem), problem.sample(strength), 0, uniform_rate(3e9))
+    run = make_run(
+        method,
+        problem.friction,
+        method.medium(problem),
+        problem.sample(strength),
+        0,
+        uniform_rate(3e9),
+    )
     run.control[monitor.SLID_STOP] = np.inf
     state = run.start(first_slip(run))
     slip, rate = direct_convolution(run, state, 900)

@@ -33,6 +33,7 @@ def strength(seed, low=0.7e6, high=1.5e6):
 def fresh_run(profile, method=METHOD):
     run = make_run(
         method,
+        PROBLEM.friction,
         method.medium(PROBLEM),
         PROBLEM.sample(profile),
         0,
@@ -155,8 +156,8 @@ def test_radiated_energy_is_steady_after_arrest():
 
     def radiated():
         return radiated_energy(
-            float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
-            run.medium.stiffness[0], run.medium.spacing,
+            PROBLEM.friction, float(state.watch[monitor.WORK]), state.slip, state.slip_hat,
+            run.rows, run.medium.stiffness[0], run.medium.spacing,
         )  # fmt: skip
 
     run.advance(state, 3000)

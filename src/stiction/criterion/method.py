@@ -15,6 +15,7 @@ from stiction.criterion.nucleation import (
     Weights,
     excess_of,
     multiplier_of,
+    refused_laws,
     uniform_rates,
     warn_if_coarse,
 )
@@ -40,6 +41,9 @@ class LocalCriterion:
     -----
     The weights of the average are never negative, so the result lies between the least and the
     greatest strength also where the strength jumps. The minimum is taken between the nodes.
+    Of a friction law that is not linear the weakening rate at zero slip counts, with an
+    `AccuracyWarning`: strength that falls ever less steeply lets go later. A law that steepens
+    is refused.
     """
 
     weights: Weights = "exact"
@@ -61,7 +65,7 @@ class LocalCriterion:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        reasons = []
+        reasons = refused_laws(problem)
         if problem.interface.is_plane:
             reasons.append("it does not take interfaces of two dimensions")
         rate = problem.friction.weakening_rate

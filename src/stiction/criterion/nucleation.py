@@ -11,7 +11,7 @@ from stiction._typing import Array
 from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.grid_weights import grid_weights, transform
 from stiction.criterion.moving_average import average_rows
-from stiction.errors import InputError
+from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.sample import Sample
 
@@ -24,11 +24,39 @@ def weight_of(weights: Weights) -> Weight:
     return exact_weight() if weights == "exact" else rounded_weight()
 
 
+def refused_laws(problem: Problem) -> list[str]:
+    """Why the criterion of the initial slope says nothing on a friction law; nothing if it does."""
+    friction = problem.friction
+    if not friction.steepens:
+        return []
+    times = friction.steepest_slope / friction.initial_slope
+    return [
+        f"friction: the local criterion takes the weakening rate at zero slip, and this law falls"
+        f" up to {times:.3g} times as steeply later, so that patches become unstable at lower"
+        " loads than it says; use st.Equilibrium() or st.Rupture()"
+    ]
+
+
+def check_law(problem: Problem) -> None:
+    """Refuse a law that steepens; warn of one that is not linear, with the error to expect."""
+    if reasons := refused_laws(problem):
+        raise InputError(reasons)
+    if not problem.friction.linear:
+        warn_accuracy(
+            "friction: the local criterion takes the weakening rate at zero slip for that at any;"
+            " as strength falls ever less steeply, patches become unstable later than it says: for"
+            " an exponential law and strength from 0.66 to 1.66 MPa by 2 % (at most 7 %) at a"
+            " correlation length of a quarter of h_n, by 0.6 % (at most 3 %) at one of h_n;"
+            " st.Equilibrium() follows polygons exactly"
+        )
+
+
 def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights = "exact") -> Array:
     """What the moving average over h_n does to each wave of the grid, shape (nodes//2 + 1,).
 
     It is the transform of weights that are not negative.
     """
+    check_law(problem)
     if nucleation_length > problem.interface.extent:
         raise InputError(
             f"interface.length: the nucleation length {nucleation_length:.4g} m is longer than the"

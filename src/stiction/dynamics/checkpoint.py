@@ -14,7 +14,9 @@ from stiction.dynamics import monitor
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 
-FORMAT = 3
+FORMAT = 4
+
+_SLIPS = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
 
 _NAMES = {
     "nodes": "number of nodes",
@@ -24,6 +26,7 @@ _NAMES = {
     "poles": "memory kernel",
     "weights": "memory kernel",
     "stiffness": "elastic stiffness",
+    "law": "friction law",
     "tau_p": "peak strength (Pa)",
     "tau_r": "residual strength (Pa)",
     "weakening_rate": "weakening rate (Pa/m)",
@@ -50,6 +53,7 @@ def identity(run: Run) -> dict[str, NDArray[Any]]:
         "stiffness": medium.stiffness,
         "poles": medium.kernel.poles,
         "weights": medium.kernel.weights,
+        "law": np.concatenate([run.friction.fraction(_SLIPS), *map(np.ravel, run.law)]),
         "tau_p": rows[0],
         "tau_r": rows[1],
         "weakening_rate": rows[2],

@@ -67,7 +67,7 @@ def warn_if_reversed(run: Run, state: State) -> bool:
     """
     if state.stress.min() >= 0.0:
         return False
-    strength = np.maximum(run.rows[0] - run.rows[2] * state.slip, run.rows[1])
+    strength = run.strength_after(state.slip)
     below = state.stress < -strength - 1e-6 * state.watch[monitor.SCALE]
     return _warn_of_reverse(
         run, below & ((state.slip == 0.0) | (state.load < 0.0)), state.time, state.load

@@ -1,9 +1,10 @@
 """One implicit step: slip increments u >= 0 with the stress nowhere above the strength.
 
-(M - W on weakening nodes) u = g - strength on the slipping set, u = 0 and stress below strength
-elsewhere; M is a circulant with positive symbol. The slipping set is found by a semismooth Newton
-iteration (each node sticks, weakens or is at its residual strength), each linear problem by
-conjugate gradients preconditioned with the inverse circulant.
+(M - W) u = g - strength on the slipping set, u = 0 and stress below strength elsewhere; M is a
+circulant with positive symbol, W how fast the strength of each node falls where it goes. The
+slipping set, and the straight line that the strength of each node follows, are found by a
+semismooth Newton iteration, each linear problem by conjugate gradients preconditioned with the
+inverse circulant.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.friction.kernels import line_at, strength_at
 
 
 @jit
@@ -28,7 +30,7 @@ def _apply(symbol: Array, vector: Array) -> Any:
 def _solve(
     symbol: Array,
     inverse: Array,
-    weakening: Array,
+    falling: Array,
     state: Any,
     driving: Array,
     u: Array,
@@ -42,8 +44,7 @@ def _solve(
     for i in range(n):
         residual[i] = 0.0
         if state[i] > 0:
-            drop = weakening[i] if state[i] == 1 else 0.0
-            residual[i] = driving[i] - product[i] + drop * u[i]
+            residual[i] = driving[i] - product[i] + falling[i] * u[i]
             worst = max(worst, abs(residual[i]))
     if not worst > accuracy:
         return worst <= accuracy
@@ -63,8 +64,7 @@ def _solve(
         for i in range(n):
             if state[i] > 0:
                 stiff += direction[i] * product[i]
-                if state[i] == 1:
-                    product[i] -= weakening[i] * direction[i]
+                product[i] -= falling[i] * direction[i]
                 curvature += direction[i] * product[i]
         if not curvature > 1e-10 * stiff:
             return False
@@ -85,12 +85,14 @@ def _solve(
 def solve_increment(
     symbol: Array,
     inverse: Array,
+    law: Any,
     rows: Array,
     slip: Array,
     pushed: Array,
     u: Array,
     state: Any,
     accuracy: float,
+    near: float,
 ) -> Any:
     """Slip increments of one implicit step; returns whether they were found.
 
@@ -98,8 +100,10 @@ def solve_increment(
     ----------
     symbol, inverse : (nodes//2 + 1,) arrays
         Eigenvalues of M, Pa/m, and their inverses.
+    law : NamedTuple
+        ``friction.parameters``.
     rows : (6, nodes) array
-        tau_p, tau_r, W, d_c, p, tau_i.
+        As in `Run`.
     slip : (nodes,) array
         Slip before the step, m.
     pushed : (nodes,) array
@@ -107,46 +111,44 @@ def solve_increment(
     u : (nodes,) array
         First guess, and the increments found, m.
     state : (nodes,) int array
-        0 stuck, 1 weakening, 2 residual; first guess, and as found.
+        0 stuck, 1 slipping; first guess, and as found.
     accuracy : float
         Pa.
+    near : float
+        Distance (Pa) of the strength from the straight line it is taken for at which that will do.
     """
     n = u.size
-    driving = np.empty(n)
-    strength, floor, weakening, critical = rows[0], rows[1], rows[2], rows[3]
+    driving, falling = np.empty(n), np.empty(n)
+    strength, floor, weakening = rows[0], rows[1], rows[2]
     for i in range(n):
-        limit = max(strength[i] - weakening[i] * slip[i], floor[i])
+        limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
         if state[i] == 0 and pushed[i] > limit:
             state[i] = 1
-        if state[i] > 0:
-            state[i] = 2 if slip[i] + u[i] >= critical[i] else 1
-        else:
+        if state[i] == 0:
             u[i] = 0.0
+        start, falling[i] = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
+        driving[i] = pushed[i] - start
     for _ in range(60):
-        for i in range(n):
-            if state[i] == 1:
-                driving[i] = pushed[i] - (strength[i] - weakening[i] * slip[i])
-            else:
-                driving[i] = pushed[i] - floor[i]
-        if not _solve(symbol, inverse, weakening, state, driving, u, accuracy):
+        if not _solve(symbol, inverse, falling, state, driving, u, accuracy):
             return False
         product = _apply(symbol, u)
         changed = 0
         for i in range(n):
             if state[i] == 0:
-                limit = max(strength[i] - weakening[i] * slip[i], floor[i])
+                limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
                 if pushed[i] - product[i] > limit + 10.0 * accuracy:
-                    state[i] = 2 if slip[i] >= critical[i] else 1
+                    state[i] = 1
                     changed += 1
             elif u[i] < 0.0:
                 state[i] = 0
                 u[i] = 0.0
                 changed += 1
-            else:
-                fresh = 2 if slip[i] + u[i] >= critical[i] else 1
-                if fresh != state[i]:
-                    state[i] = fresh
-                    changed += 1
+            start, slope = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
+            old = driving[i] + falling[i] * u[i]
+            driving[i] = pushed[i] - start
+            if state[i] > 0 and abs(driving[i] + slope * u[i] - old) > near:
+                changed += 1
+            falling[i] = slope
         if changed == 0:
             return True
     return False

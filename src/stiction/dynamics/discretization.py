@@ -12,6 +12,7 @@ from stiction.dynamics.memory_layout import step_table
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.errors import InputError
+from stiction.friction.kernels import registered
 from stiction.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -61,6 +62,20 @@ class Medium:
     effective_modulus: float
 
 
+def refused_laws(problem: Problem) -> list[str]:
+    """Why the friction law of a problem cannot be followed; nothing if it can."""
+    try:
+        known = registered(problem.friction.parameters)
+    except NotImplementedError:
+        known = False
+    if known:
+        return []
+    return [
+        f"friction: {type(problem.friction).__name__} has no compiled strength; give its"
+        " `parameters` a type that stiction.friction.kernels.register knows"
+    ]
+
+
 def prepare_medium(
     problem: Problem,
     *,
@@ -70,6 +85,8 @@ def prepare_medium(
     time_step: float | None,
 ) -> Medium:
     """Tables for a problem; raises `InputError` if the step is above the stability limit."""
+    if refused := refused_laws(problem):
+        raise InputError(refused)
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
         valid = (

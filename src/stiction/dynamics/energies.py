@@ -5,28 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.friction.law import FrictionLaw
+
 Floats = NDArray[np.float64]
 
 
-def fracture_energy(slip: Floats, strength: Floats, residual: Floats, weakening: Floats) -> Floats:
+def fracture_energy(friction: FrictionLaw, slip: Floats, rows: Floats) -> Floats:
     """Energy dissipated above the residual strength at each node, J/m2.
 
     Parameters
     ----------
+    friction : FrictionLaw
     slip : (..., nodes) array
         m.
-    strength, residual, weakening : (nodes,) arrays
-        tau_p (infinite where nothing breaks), tau_r (Pa), W (Pa/m).
-
-    Returns
-    -------
-    (..., nodes) array
-        (tau_p - tau_r) d - W d^2/2 up to d_c, then Gamma = (tau_p - tau_r)^2/(2 W).
+    rows : (6, nodes) array
+        tau_p (infinite where nothing breaks), tau_r, W, and more.
     """
-    excess = np.where(np.isfinite(strength), strength - residual, 0.0)
-    weakened = np.minimum(slip, excess / weakening)
-    energy: Floats = weakened * (excess - 0.5 * weakening * weakened)
-    return energy
+    drop = np.where(np.isfinite(rows[0]), rows[0] - rows[1], 0.0)
+    return friction.dissipated(slip, drop, rows[2])
 
 
 def strain_energy(slip_hat: NDArray[np.complex128], stiffness: Floats, spacing: float) -> float:
@@ -49,6 +45,7 @@ def strain_energy(slip_hat: NDArray[np.complex128], stiffness: Floats, spacing: 
 
 
 def radiated_energy(
+    friction: FrictionLaw,
     work: float,
     slip: Floats,
     slip_hat: NDArray[np.complex128],
@@ -60,16 +57,17 @@ def radiated_energy(
 
     Parameters
     ----------
+    friction : FrictionLaw
     work : float
         int int (tau_0 p + tau_i) V dx dt, J/m.
     rows : (6, nodes) array
-        tau_p, tau_r, W, d_c, p, tau_i.
+        As in `Run`.
     slip, slip_hat, stiffness, spacing
         As above. The stress equals the strength wherever there is slip rate, so that the work of
         friction follows from the slip alone.
     """
-    friction = fracture_energy(slip, rows[0], rows[1], rows[2]) + rows[1] * slip
-    return work - float(friction.sum()) * spacing - strain_energy(slip_hat, stiffness, spacing)
+    spent = fracture_energy(friction, slip, rows) + rows[1] * slip
+    return work - float(spent.sum()) * spacing - strain_energy(slip_hat, stiffness, spacing)
 
 
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:

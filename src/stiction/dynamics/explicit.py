@@ -12,6 +12,7 @@ from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory_layout import advance_memory, pack
 from stiction.dynamics.monitor import (
     ALL_SLID,
+    ARRIVAL,
     AT_REST,
     BAD_NODE,
     BREAKABLE,
@@ -50,6 +51,7 @@ from stiction.dynamics.monitor import (
     settle,
 )
 from stiction.dynamics.scale import follow_scale
+from stiction.friction.kernels import strength_at
 
 
 @jit
@@ -91,6 +93,7 @@ def explicit_steps(
     fresh: Array,
     stiffness: Array,
     medium: Any,
+    law: Any,
     rows: Array,
     load_times: Array,
     load_values: Array,
@@ -104,7 +107,7 @@ def explicit_steps(
     Parameters
     ----------
     slip, rate, stress, arrival : (nodes,) arrays
-        m, m/s, Pa, and the time when half of d_c was reached (nan before), s; updated.
+        m, m/s, Pa, and the time when half of the strength was lost (nan before), s; updated.
     slip_hat : (nodes//2 + 1,) complex array
     memory, carried, table : packed as in `layout`
     fresh : (nodes//2,) array
@@ -112,8 +115,10 @@ def explicit_steps(
         G*|k|/2 and G|k|/2, Pa/m.
     medium : (4,) array
         Z = G/(2 c_s) (Pa s/m), dx (m), <p>, <tau_i>.
+    law : NamedTuple
+        ``friction.parameters``.
     rows : (6, nodes) array
-        tau_p, tau_r, W, d_c, p, tau_i.
+        As in `Run`.
     scale_loads, scales : arrays
         Stress scale against the load, Pa.
     control : array
@@ -128,6 +133,7 @@ def explicit_steps(
     guess = np.empty(n)
     strength, residual, weakening = rows[0], rows[1], rows[2]
     critical, profile, initial = rows[3], rows[4], rows[5]
+    half = control[ARRIVAL]
     keep = record.shape[0] > 0
     load_before = watch[LOAD]
     for taken in range(count):
@@ -137,7 +143,8 @@ def explicit_steps(
         _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
         moved = np.fft.irfft(out, n)
         for i in range(n):
-            limit = max(strength[i] - weakening[i] * (slip[i] + step * rate[i]), residual[i])
+            ahead = slip[i] + step * rate[i]
+            limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
             guess[i] = max(moved[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
         guess_hat = np.fft.rfft(guess)
         for j in range(rate_hat.size):
@@ -149,7 +156,7 @@ def explicit_steps(
         for i in range(n):
             increment = 0.5 * step * (rate[i] + guess[i])
             fresh_slip = slip[i] + increment
-            limit = max(strength[i] - weakening[i] * fresh_slip, residual[i])
+            limit = strength_at(law, strength[i], residual[i], weakening[i], fresh_slip)
             stuck = moved[i] + load * profile[i] + initial[i]
             v = max(stuck - limit, 0.0) / impedance
             work += increment * (mean_load * profile[i] + initial[i])
@@ -171,9 +178,9 @@ def explicit_steps(
             if guess[i] > top:
                 top, node = guess[i], i
             # d_c = 0 where nothing weakens: there the first slip counts.
-            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
                 increment = 0.5 * step * (rate[i] + guess[i])
-                past = slip[i] - 0.5 * critical[i]
+                past = slip[i] - half * critical[i]
                 arrival[i] = time - step * min(1.0, past / max(increment, 1e-300))
             slip_sum += slip[i]
             rate[i] = guess[i]

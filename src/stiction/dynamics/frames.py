@@ -83,7 +83,7 @@ class Frames:
         run, rows = self.run, self.run.rows
         medium, watch = run.medium, state.watch
         spacing = medium.spacing
-        dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
+        dissipated = fracture_energy(run.friction, state.slip, rows)
         fracture = float(dissipated.sum()) * spacing
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
@@ -108,7 +108,7 @@ class Frames:
             "slip": state.slip,
             "slip_rate": state.rate,
             "shear_stress": state.stress,
-            "strength": np.maximum(rows[0] - rows[2] * state.slip, rows[1]),
+            "strength": run.strength_after(state.slip),
         }
         frame |= {name: fields[name].copy() for name in self.variables}
         self._frames.append(frame)

@@ -12,8 +12,10 @@ from stiction.dynamics.complementarity import solve_increment
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.monitor import (
     ALL_SLID,
+    ARRIVAL,
     BAD_NODE,
     BREAKABLE,
+    CURVED,
     DONE,
     DROPPED,
     END_TIME,
@@ -54,6 +56,7 @@ from stiction.dynamics.monitor import (
     observe,
 )
 from stiction.dynamics.scale import follow_scale
+from stiction.friction.kernels import strength_at
 
 _ROUND_OFF = 1e-14  # of the largest stress: what a few transforms leave, ten times over
 
@@ -159,6 +162,7 @@ def implicit_steps(
     pace: Array,
     stiffness: Array,
     medium: Any,
+    law: Any,
     rows: Array,
     load_times: Array,
     load_values: Array,
@@ -191,7 +195,8 @@ def implicit_steps(
     symbol, inverse = np.empty(modes + 1), np.empty(modes + 1)
     state = np.zeros(n, np.int64)
     profile, initial, critical = rows[4], rows[5], rows[3]
-    weakening = rows[2]
+    peak, residual, weakening = rows[0], rows[1], rows[2]
+    half = control[ARRIVAL]
     breakable = int(control[BREAKABLE])
     root = np.sqrt(2.0)
     tabulated, paired = -1.0, -1.0
@@ -254,15 +259,17 @@ def implicit_steps(
         scale = watch[SCALE]
         # Round-off of the transforms bounds what can be asked for.
         accuracy = max(control[RESIDUAL] * scale, _ROUND_OFF * level)
-        solved = solve_increment(symbol, inverse, rows, slip, pushed, u, state, accuracy)
+        near = accuracy if control[CURVED] > 0.0 else 0.0
+        solved = solve_increment(symbol, inverse, law, rows, slip, pushed, u, state, accuracy, near)
         largest, total = 0.0, 0.0
         if solved:
             least = control[SMALL_DROP] * scale
             creep = control[STEADY_STRESS] * scale * size / impedance
             for i in range(n):
                 if slip[i] < critical[i] and u[i] > 0.0:
-                    lost = weakening[i] * min(u[i], critical[i] - slip[i])
-                    largest = max(largest, lost / max(weakening[i] * critical[i], least))
+                    lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+                    lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
+                    largest = max(largest, lost / max(peak[i] - residual[i], least))
                 elif u[i] > creep and critical[i] > 0.0:
                     largest = max(largest, u[i] / critical[i])
                 total += u[i]
@@ -311,8 +318,8 @@ def implicit_steps(
                 slid += 1
             if rate[i] > top:
                 top, node = rate[i], i
-            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= 0.5 * critical[i]:
-                beyond = slip[i] - 0.5 * critical[i]
+            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
+                beyond = slip[i] - half * critical[i]
                 arrival[i] = time - size * min(1.0, beyond / max(u[i], 1e-300))
         mean_stress = medium[3] + load * medium[2] - radiated
         watch[TIME], watch[LOAD], watch[TOP_RATE], watch[SLID] = time, load, top, slid

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from stiction.dynamics.implicit import implicit_steps
 from stiction.dynamics.loading import History, load_at
 from stiction.dynamics.memory_layout import LANES, blocks, carry_memory, scale_memory
 from stiction.dynamics.scale import follow_scale, stress_scale
+from stiction.friction.kernels import strengths
+from stiction.friction.law import FrictionLaw
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +43,7 @@ class State:
     carried : flat array
         The memory's part of the next explicit step.
     arrival : (nodes,) array
-        When half of d_c was reached, s; nan before.
+        When half of the strength was lost, s; nan before.
     watch : (monitor.FIELDS,) array
         Time, load, work of the load, peaks, events, counts.
     explicit : bool
@@ -88,12 +91,14 @@ class Run:
 
     Attributes
     ----------
+    friction : FrictionLaw
     rows : (6, nodes) array
-        tau_p (infinite where nothing breaks), tau_r, W, d_c, p, tau_i.
+        tau_p (infinite where nothing breaks), tau_r (Pa), W at zero slip (Pa/m), the slip from
+        which on a node counts as at its residual strength (m), p, tau_i (Pa).
     constants : (4,) array
         Z, dx, <p>, <tau_i>.
     steepest_rate : float
-        Largest weakening rate of nodes that may break, Pa/m.
+        Largest rate, Pa/m, at which a node that may break weakens at any slip.
     least_load : float
         Load below which nothing runs away: the mean strength of the weakest nodes that make up
         half a nucleation length, Pa. A few nodes of next to no strength do not count, nor do
@@ -101,6 +106,7 @@ class Run:
     """
 
     medium: Medium
+    friction: FrictionLaw
     rows: Floats
     constants: Floats
     history: History
@@ -118,6 +124,16 @@ class Run:
     def scale_at(self, load: float) -> float:
         """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
         return float(load_at(*self.scale, max(load, self.least_load)))
+
+    @functools.cached_property
+    def law(self) -> NamedTuple:
+        """The friction law as compiled kernels take it."""
+        return self.friction.parameters
+
+    def strength_after(self, slip: Floats) -> Floats:
+        """Strength after a slip (m), Pa."""
+        found: Floats = strengths(self.law, self.rows[0], self.rows[1], self.rows[2], slip)
+        return found
 
     @functools.cached_property
     def first_load(self) -> float:
@@ -141,7 +157,7 @@ class Run:
         load = float(load_at(*self.history, time))
         slip_hat = np.fft.rfft(delta)
         stress = self.elastic_stress(slip_hat, load)
-        limit = np.maximum(self.rows[0] - self.rows[2] * delta, self.rows[1])
+        limit = self.strength_after(delta)
         rate = np.maximum(stress - limit, 0.0) / self.medium.impedance
         # A node that has just reached its strength has not begun to slip: drop round-off.
         rate[rate * self.medium.impedance < 1e-12 * self.rows[0]] = 0.0
@@ -157,7 +173,8 @@ class Run:
         scale = follow_scale(watch, self.control, *self.scale, max(load, self.least_load))
         watch[monitor.TOP_RATE] = rate.max()
         watch[monitor.SLID] = np.count_nonzero(delta >= self.rows[3])
-        arrival = np.where((delta > 0.0) & (delta >= 0.5 * self.rows[3]), time, np.nan)
+        half = self.control[monitor.ARRIVAL] * self.rows[3]
+        arrival = np.where((delta > 0.0) & (delta >= half), time, np.nan)
         size = self.control[monitor.SMALLEST_STEP]
         slope = self.slope(time)
         first = 0.1 * self.control[monitor.LOAD_STEP] * scale / slope if slope > 0.0 else size
@@ -255,8 +272,8 @@ class Run:
         taken, reason = explicit_steps(
             count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,
-            medium.stiffness, self.constants, self.rows, *self.history, *self.scale, self.control,
-            record,
+            medium.stiffness, self.constants, self.law, self.rows, *self.history, *self.scale,
+            self.control, record,
         )  # fmt: skip
         return int(taken), int(reason)
 
@@ -265,8 +282,8 @@ class Run:
         taken, size, reason = implicit_steps(
             count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
             state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
-            medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.rows,
-            *self.history, self.turns, *self.scale, self.control, record,
+            medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.law,
+            self.rows, *self.history, self.turns, *self.scale, self.control, record,
         )  # fmt: skip
         state.step = float(size)
         return int(taken), int(reason)

@@ -20,11 +20,12 @@ from stiction.dynamics.checks import (
     warn_if_reversed_before,
     warn_if_unresolved,
 )
-from stiction.dynamics.discretization import Medium, prepare_medium
+from stiction.dynamics.discretization import Medium, prepare_medium, refused_laws
 from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
 from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, uniform_rate
 from stiction.errors import InputError
+from stiction.friction.law import FrictionLaw
 from stiction.problem import SMALLEST_EIGENVALUE, Problem
 from stiction.results import Variable, onset_variables
 from stiction.sample import Sample, steepest_rate
@@ -157,9 +158,10 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        return (
-            ["it does not take interfaces of two dimensions"] if problem.interface.is_plane else []
-        )
+        reasons = refused_laws(problem)
+        if problem.interface.is_plane:
+            reasons.append("it does not take interfaces of two dimensions")
+        return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
@@ -183,7 +185,7 @@ class Rupture:
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             warn_if_coarse(problem, rows)
             found = [
-                self._one(problem, make_run(self, medium, rows, i, history))
+                self._one(problem, make_run(self, problem.friction, medium, rows, i, history))
                 for i in range(rows.samples)
             ]
             return {
@@ -215,12 +217,19 @@ class Rupture:
         return found
 
 
-def make_run(method: Rupture, medium: Medium, rows: Sample, sample: int, history: History) -> Run:
+def make_run(
+    method: Rupture,
+    friction: FrictionLaw,
+    medium: Medium,
+    rows: Sample,
+    sample: int,
+    history: History,
+) -> Run:
     """The run of one sample."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     finite = np.isfinite(strength)
-    critical = (strength - residual) / weakening
+    critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
     table = np.stack([strength, residual, weakening, critical, rows.load_profile, initial])
     control = np.zeros(monitor.CONTROLS)
     control[monitor.BREAKABLE] = np.count_nonzero(finite)
@@ -243,17 +252,20 @@ def make_run(method: Rupture, medium: Medium, rows: Sample, sample: int, history
     control[monitor.NOTICED] = 1e-7
     control[monitor.GROWTH] = _GROWTH
     control[monitor.NEGLIGIBLE] = 5e-7
+    control[monitor.ARRIVAL] = friction.slip_at(0.5) / friction.reach
+    control[monitor.CURVED] = 0.0 if friction.linear else 1.0
     control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     constants = np.array(
         [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
     )
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
+    steepest *= friction.steepest_slope / friction.initial_slope
     half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
     weakens = finite & (critical > 0.0)
     loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
     weakest = min(max(round(half / medium.spacing), 1), loads.size)
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
-    return Run(medium, table, constants, history, control, steepest, least)
+    return Run(medium, friction, table, constants, history, control, steepest, least)
 
 
 def set_stop(control: Floats, stop: str) -> None:
@@ -290,7 +302,7 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, float]:
     far, near = (front_speed(problem, run, state, lengths) for lengths in (2.0, 0.5))
     kinetic = float(watch[monitor.KINETIC])
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
-    dissipated = fracture_energy(state.slip, rows[0], rows[1], rows[2])
+    dissipated = fracture_energy(run.friction, state.slip, rows)
     return {
         "critical_load": (peak - run.constants[3]) / run.constants[2],
         "critical_stress": peak,
@@ -302,7 +314,7 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, float]:
         "stress_drop": peak - kinetic,
         "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.spacing,
         "radiated_energy": radiated_energy(
-            float(watch[monitor.WORK]), state.slip, state.slip_hat, rows,
+            run.friction, float(watch[monitor.WORK]), state.slip, state.slip_hat, rows,
             medium.stiffness[0], medium.spacing,
         ),
         "fracture_energy": float(dissipated.sum()) * medium.spacing,

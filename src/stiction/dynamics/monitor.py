@@ -53,8 +53,10 @@ COLUMNS = 7
     GROWTH,  # by this factor
     PEAK_WIDTH_SIZE,  # so close below its maximum the mean stress still is at it
     NEGLIGIBLE,  # rise of the load in a step for which that does not matter
-) = range(21)
-CONTROLS = 21
+    ARRIVAL,  # slip at which strength has lost half of its way, in units of that at the residual
+    CURVED,  # 0 if strength is that of the linear law, whose pieces are met to the bit
+) = range(23)
+CONTROLS = 23
 
 
 @jit

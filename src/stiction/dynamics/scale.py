@@ -32,7 +32,7 @@ def stress_scale(rows: NDArray[np.float64]) -> History:
     Parameters
     ----------
     rows : (6, nodes) array
-        tau_p, tau_r, W, d_c, p, tau_i.
+        As in `Run`.
     """
     strength, residual, profile, initial = rows[0], rows[1], rows[4], rows[5]
     begin = (residual - initial) / profile

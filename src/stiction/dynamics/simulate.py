@@ -52,7 +52,7 @@ _NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 
 
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
-    "arrival_time": Variable("s", "when half of the critical slip was reached", ("x",)),
+    "arrival_time": Variable("s", "when half of the strength was lost", ("x",)),
     "front_speed": Variable("m/s", "apparent speed of the rupture front", ("x",)),
 }
 
@@ -270,7 +270,7 @@ def simulate_rupture(
     warn_of_units(problem, rows.mean_strength, float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
-    run = make_run(method, method.medium(problem), rows, 0, history)
+    run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
     stop = stop or method.stop
     set_stop(run.control, stop)
     if end_time is not None:

@@ -7,9 +7,10 @@ import numpy as np
 from stiction._jit import ZERO, jit
 from stiction._typing import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
-from stiction.equilibrium.instability_jump import AT_FLOOR, UNDECIDED, escape_run
+from stiction.equilibrium.instability_jump import UNDECIDED, escape_run
 from stiction.equilibrium.linear_program import solve_program
 from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.pieces import AT_CORNER, Pieces
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.window_bound import Windows, window_bound
 from stiction.equilibrium.workspace import Grid, Room, Sample, make_room, make_sample
@@ -18,8 +19,8 @@ LOAD, GAP, PATCHES, POSITION, LENGTH, FATE = range(6)
 COLUMNS = 6
 """Columns of the result of `solve_batch`."""
 
-FLOOR_REACHED = 3
-"""Fate of a sample whose floor is reached before the first instability."""
+CORNER_REACHED = 3
+"""Fate of a sample in which a corner of the law is reached before the first instability."""
 
 
 @jit
@@ -84,6 +85,7 @@ def solve_batch(
     floor: Array,
     profile: Array,
     rate: Array,
+    pieces: Pieces,
     usual_rate: float,
     grid: Grid,
     wide_column: Array,
@@ -108,6 +110,7 @@ def solve_batch(
     excess, floor, rate : (samples, n) arrays
         tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
     profile : (n,) array
+    pieces : Pieces
     usual_rate : float
         The problem's uniform weakening rate, or NaN.
     grid : Grid
@@ -136,7 +139,7 @@ def solve_batch(
     product = np.empty(n)
     work = np.empty((6, n))
     for row in range(samples):
-        sample = make_sample(excess[row], floor[row], profile, rate[row])
+        sample = make_sample(excess[row], floor[row], profile, rate[row], pieces)
         windows = usual
         for i in range(n):
             room.diagonal[i] = grid.column[0] - sample.rate[i]
@@ -162,8 +165,9 @@ def solve_batch(
             slips[row] = slip
         line[FATE] = UNDECIDED
         for i in range(n):
-            if slip[i] > sample.critical[i] * (2.0 - AT_FLOOR) and sample.critical[i] > 0.0:
-                line[FATE] = FLOOR_REACHED
+            corner = pieces.ends[0] * sample.critical[i]
+            if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
+                line[FATE] = CORNER_REACHED
         if line[FATE] == UNDECIDED:
             escape = caution * escape_run(sample, load, spacing, modulus)
             tried = slip.copy()

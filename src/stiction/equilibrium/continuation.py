@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction._typing import Array
 from stiction.equilibrium.instability_jump import (
     ARRESTED,
-    AT_FLOOR,
     SLIDING,
     UNDECIDED,
     jump,
 )
 from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.pieces import AT_CORNER
 from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.stable_path import CROWDED, REACHED, advance
@@ -27,7 +28,7 @@ MARGIN = 1.5
 """Safety on the length at which a rupture counts as unstoppable."""
 MOVED = 1e-3
 """Share of the largest added slip from which a node belongs to the patch of an event."""
-OVERSHOOT = 2.0 - AT_FLOOR
+OVERSHOOT = 2.0 - AT_CORNER
 
 
 @dataclass
@@ -65,13 +66,29 @@ class State:
 
 def residual_nodes(sample: Sample, slip: Array) -> Array:
     """Which nodes have reached their floor, (n,) bool; those of constant strength are none."""
-    reached: Array = (slip >= AT_FLOOR * sample.critical) & (sample.critical > 0.0)
+    reached: Array = (slip >= AT_CORNER * sample.critical) & (sample.critical > 0.0)
     return reached
 
 
-def exceeds(sample: Sample, slip: Array) -> bool:
-    """Whether a slip that knows of no floor goes beyond one."""
-    return bool(np.any((slip > OVERSHOOT * sample.critical) & (sample.critical > 0.0)))
+def present_pieces(sample: Sample, slip: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """The piece on which each node is, what it has at zero slip (Pa), and its slope (Pa/m)."""
+    pieces = sample.pieces
+    corners = AT_CORNER * (pieces.ends * sample.critical[:, None])
+    piece = np.count_nonzero(slip[:, None] >= corners, axis=1)
+    share = pieces.starts[piece]
+    return (
+        piece,
+        share * sample.excess + (1.0 - share) * sample.floor,
+        pieces.slopes[piece] * sample.rate,
+    )
+
+
+def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
+    """Whether a slip goes beyond the piece of each node (by default the first) that it rests on."""
+    ends = np.append(sample.pieces.ends, np.inf)
+    with np.errstate(invalid="ignore"):
+        end = ends[0 if piece is None else piece] * sample.critical
+    return bool(np.any((slip > OVERSHOOT * end) & (sample.critical > 0.0)))
 
 
 def at_rest(sample: Sample) -> State:
@@ -107,9 +124,9 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
             make_room(n),
         )  # fmt: skip
     if fate == ARRESTED and not np.any(
-        residual_nodes(sample, state.slip) & ~residual_nodes(sample, before)
+        present_pieces(sample, state.slip)[0] > present_pieces(sample, before)[0]
     ):
-        fate = UNDECIDED  # round-off: only nodes that reach their floor can stop an instability
+        fate = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
     if fate == UNDECIDED:
         warn_accuracy(
             "the jump of an unstable patch did not settle; it is counted as global sliding"
@@ -129,14 +146,12 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
 
 
 def leap(setting: Setting, sample: Sample, state: State) -> bool:
-    """Go straight to the next instability if no other node reaches its floor before it."""
-    residual = residual_nodes(sample, state.slip)
-    strength = np.where(residual, sample.floor, sample.excess)
-    rate = np.where(residual, 0.0, sample.rate)
+    """Go straight to the next instability if no node reaches another corner before it."""
+    piece, strength, rate = present_pieces(sample, state.slip)
     found = setting.programme(strength, rate)
     if found is None or found.load < state.load:
         return False
-    if exceeds(sample, np.where(residual, 0.0, found.slip)):
+    if exceeds(sample, found.slip, piece):
         return False
     state.load, state.slip, state.stiff = found.load, found.slip, found.stiff
     state.direction = found.multiplier

@@ -4,7 +4,7 @@ Slip beyond the instability can only grow, and strength only falls with slip. So
 which all slipping nodes are still driven forward lies below the next equilibrium, and two kinds of
 step keep that property: with frozen strengths, solve the elastic problem (K on the slipping nodes);
 or move along a field z >= 0 with A z <= 0, or towards the solution of the linear problem of the
-present states, as far as the first node that reaches its floor.
+present states, as far as the first node that reaches the next corner of its friction law.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from stiction.equilibrium.linear_program import (
     singular_direction,
     stress_tolerance,
 )
+from stiction.equilibrium.pieces import piece_at, start_of
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample, make_room
 
 SLIDING = 0
@@ -32,25 +33,26 @@ CROWDED = -2
 
 PATIENCE = 16
 """Elastic steps after which the true states are tried even if more nodes keep joining."""
-AT_FLOOR = 1.0 - 1e-12
-"""Share of d_c from which a node counts as residual."""
 
 
 @jit
 def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip."""
-    if slip[i] >= AT_FLOOR * sample.critical[i]:
-        return sample.floor[i]
-    return sample.excess[i] - sample.rate[i] * slip[i]
+    piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+    start = start_of(sample.pieces, sample.excess[i], sample.floor[i], piece)
+    return start - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
 
 
 @jit
-def step_to_floor(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
-    """Move along a direction until the first node reaches its floor, at most `longest` of it."""
+def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
+    """Move along a direction until the first node reaches a corner, at most `longest` of it."""
     step = longest
+    ends = sample.pieces.ends
     for i in range(slip.shape[0]):
-        if direction[i] > 0.0 and slip[i] < AT_FLOOR * sample.critical[i]:
-            step = min(step, (sample.critical[i] - slip[i]) / direction[i])
+        if direction[i] > 0.0:
+            piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+            if piece < ends.shape[0]:
+                step = min(step, (ends[piece] * sample.critical[i] - slip[i]) / direction[i])
     if not np.isfinite(step):
         return step
     for i in range(slip.shape[0]):
@@ -63,14 +65,14 @@ def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> f
     """Nodes of residual strength in a row that no fracture energy of the interface can stop.
 
     A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith);
-    the largest fracture energy is max (tau_p - tau_r)^2/(2 W).
+    the largest fracture energy is max (tau_p - tau_r) d_c times the area under the law.
     """
     drop = np.inf
     energy = 0.0
     for i in range(sample.excess.shape[0]):
         drop = min(drop, load * sample.profile[i] - sample.floor[i])
         fall = sample.excess[i] - sample.floor[i]
-        energy = max(energy, 0.5 * fall * sample.critical[i])
+        energy = max(energy, sample.pieces.area * fall * sample.critical[i])
     if drop <= 0.0:
         return np.inf
     return 4.0 * modulus * energy / (np.pi * drop * drop * spacing)
@@ -78,18 +80,16 @@ def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> f
 
 @jit
 def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
-    """Longest run of residual nodes on the circle, and how many there are in all."""
+    """Longest run of residual nodes on the circle, and how many corners are passed in all."""
     n = slip.shape[0]
     longest = 0
     run = 0
     count = 0
     for q in range(2 * n):
         i = q if q < n else q - n
-        if slip[i] > 0.0 and slip[i] >= AT_FLOOR * sample.critical[i]:
-            run += 1
-            count += 1
-        else:
-            run = 0
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i]) if slip[i] > 0.0 else ZERO
+        count += piece
+        run = run + 1 if slip[i] > 0.0 and piece == sample.pieces.ends.shape[0] else 0
         longest = max(longest, run)
     return min(longest, n), count // 2
 
@@ -179,8 +179,8 @@ def settle(
     for t in range(size):
         i = room.members[t]
         other.order[t] = i
-        residual = slip[i] >= AT_FLOOR * sample.critical[i]
-        other.diagonal[i] = grid.column[0] - (0.0 if residual else sample.rate[i])
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        other.diagonal[i] = grid.column[0] - sample.pieces.slopes[piece] * sample.rate[i]
     now = append(
         other.factor, ZERO, other.members, other.order, size, grid.column, other.diagonal, PIVOT
     )
@@ -202,7 +202,7 @@ def settle(
         direction[:] = 0.0
         for t in range(size):
             direction[other.members[t]] = max(solution[t], 0.0)
-    step = step_to_floor(sample, slip, direction, longest)
+    step = step_to_corner(sample, slip, direction, longest)
     if not np.isfinite(step):
         return SLIDING
     solution = room.vectors[1]
@@ -232,7 +232,7 @@ def jump(
         tau_0, Pa.
     slip, stiff : (n,) arrays, changed
         d of the state that became unstable, moved along the unstable direction as far as
-        `step_to_floor` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
+        `step_to_corner` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
     escape : float
         Residual nodes in a row that count as global sliding.
     steps : int
@@ -262,7 +262,7 @@ def jump(
         return SLIDING
     other = make_room(n)
     waited = 0
-    at_floor = 0
+    passed = 0
     for _ in range(steps):
         before = size
         size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
@@ -270,16 +270,16 @@ def jump(
             return UNDECIDED
         if size == ALL or unsupported(sample, load, slip):
             return SLIDING
-        run, residual = floor_runs(sample, slip)
+        run, corners = floor_runs(sample, slip)
         if run >= escape:
             return SLIDING
         waited += 1
         # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.
-        if waited < PATIENCE and (size > before or residual > at_floor):
-            at_floor = residual
+        if waited < PATIENCE and (size > before or corners > passed):
+            passed = corners
             continue
         waited = 0
-        at_floor = residual
+        passed = corners
         before = size
         status = settle(sample, grid, load, slip, stiff, room, other, size)
         if status == SLIDING:

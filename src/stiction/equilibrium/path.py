@@ -10,7 +10,7 @@ import xarray as xr
 from stiction._checks import check_instance
 from stiction._model import real_array, to_plain
 from stiction._typing import Array
-from stiction.equilibrium.continuation import State, at_rest, follow, residual_nodes
+from stiction.equilibrium.continuation import State, at_rest, exceeds, follow
 from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample
@@ -47,7 +47,7 @@ class Path:
             return self.state
         if load < self.simple_to:
             found = self.setting.programme(self.sample.excess, self.sample.rate, load)
-            if found is not None and not residual_nodes(self.sample, found.slip).any():
+            if found is not None and not exceeds(self.sample, found.slip):
                 self.state = State(load, found.slip, found.stiff, self.state.direction)
                 return self.state
             self.simple_to = -np.inf
@@ -108,7 +108,7 @@ def equilibrium_path(
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")
     setting = Setting(problem)
-    sample = sample_of(rows, 0)
+    sample = sample_of(rows, 0, setting.pieces)
     path = Path(setting, sample)
     initial = rows.initial_stress[0]
     slip = np.full((given.size, problem.interface.size), np.nan)

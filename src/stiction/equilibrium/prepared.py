@@ -12,6 +12,7 @@ from stiction.equilibrium.batch import certificate, start_from_bound
 from stiction.equilibrium.instability_jump import escape_run
 from stiction.equilibrium.linear_program import OVERFULL, SOLVED, solve_program
 from stiction.equilibrium.linear_program_cg import LargeProgram, Solution
+from stiction.equilibrium.pieces import pieces_of, refused
 from stiction.equilibrium.single_patch_test import block_factor
 from stiction.equilibrium.window_bound import Windows, exact_window, window_bound, windows_between
 from stiction.equilibrium.workspace import Grid, Sample, make_room
@@ -54,7 +55,10 @@ class Setting:
     def __init__(
         self, problem: Problem, nodes: slice = slice(None), prove_sliding: bool = False
     ) -> None:
+        if reasons := refused(problem.friction):
+            raise InputError(reasons)
         self.problem = problem
+        self.pieces = pieces_of(problem.friction)
         self.caution = np.inf if prove_sliding else 1.0
         every = nodes.step or 1
         self.nodes = problem.interface.size // every
@@ -170,7 +174,7 @@ class Setting:
 
     def gap(self, excess: Array, rate: Array, solution: Solution, stiff_multiplier: Array) -> float:
         """Distance of the bounds by slip and multiplier, Pa; K y is left in the last argument."""
-        sample = Sample(excess, excess, self.profile, rate, excess)
+        sample = Sample(excess, excess, self.profile, rate, excess, self.pieces)
         return float(
             certificate(
                 sample, self.grid, solution.slip, solution.stiff, solution.multiplier,

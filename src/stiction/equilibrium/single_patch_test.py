@@ -15,14 +15,14 @@ from stiction._lanes import multiply_add
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.instability_jump import (
-    AT_FLOOR,
     SLIDING,
     UNDECIDED,
-    step_to_floor,
+    step_to_corner,
     strength_at,
     unsupported,
 )
 from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.pieces import AT_CORNER
 from stiction.equilibrium.workspace import Sample
 
 STEPS = 30
@@ -104,7 +104,7 @@ def runs_away(
         SLIDING or UNDECIDED.
     """
     n = slip.shape[0]
-    step = step_to_floor(sample, slip, direction, np.inf)
+    step = step_to_corner(sample, slip, direction, np.inf)
     if not np.isfinite(step):
         return SLIDING
     first, length, _ = main_patch(direction)
@@ -158,7 +158,7 @@ def runs_away(
             grown[begin + t] += solution[t]
             largest = max(largest, slip[i])
             fastest = max(fastest, solution[t])
-            run = run + 1 if slip[i] >= AT_FLOOR * sample.critical[i] else 0
+            run = run + 1 if slip[i] >= AT_CORNER * sample.critical[i] else 0
             longest = max(longest, run)
         if longest >= escape or unsupported(sample, load, slip):
             return SLIDING

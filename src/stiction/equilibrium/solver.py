@@ -18,11 +18,13 @@ from stiction.equilibrium.continuation import (
     exceeds,
     fall,
     follow,
+    present_pieces,
     residual_nodes,
 )
 from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED
 from stiction.equilibrium.linear_program_cg import Solution
 from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.pieces import LINEAR, Pieces, steepens
 from stiction.equilibrium.prepared import LARGE_GRID, Setting
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.workspace import Sample, make_sample
@@ -34,13 +36,13 @@ WORST_GAP = 1e-9
 """Certificate gap, as a share of the load, from which on there is a warning."""
 
 
-def sample_of(rows: Samples, row: int) -> Sample:
+def sample_of(rows: Samples, row: int, pieces: Pieces = LINEAR) -> Sample:
     """One row as the kernels take it."""
     initial = rows.initial_stress[row]
     excess = np.ascontiguousarray(rows.strength[row] - initial)
     floor = np.ascontiguousarray(rows.residual_strength[row] - initial)
     rate = np.array(rows.weakening_rate[row])
-    return make_sample(excess, floor, np.array(rows.load_profile), rate)
+    return make_sample(excess, floor, np.array(rows.load_profile), rate, pieces)
 
 
 class Solver:
@@ -123,7 +125,7 @@ class Solver:
         residual = np.zeros(count, dtype=np.bool_)
         sliding_at = table[:, batch.POSITION].copy()
         for row in map(int, np.flatnonzero(fate != SLIDING)):
-            sample = sample_of(rows, row)
+            sample = sample_of(rows, row, self.setting.pieces)
             if row in known:
                 state = known[row]
                 fall(self.setting, sample, state)
@@ -136,13 +138,14 @@ class Solver:
             residual[row] = bool(residual_nodes(sample, state.slip).any())
             if state.direction.any():
                 sliding_at[row] = main_patch(state.direction)[2] * self.setting.spacing
-            if fate[row] == batch.FLOOR_REACHED:
+            if fate[row] == batch.CORNER_REACHED:
                 at_first = state.first or state  # it has none if it could not be followed so far
                 self._rewrite(sample, at_first, table[row], multipliers[row])
                 first[row] = at_first.load
                 if self.slip:
                     slips[row] = at_first.slip
-        self._check(table[:, batch.GAP], first)
+        known_gaps = ~(steepens(self.setting.pieces) & (fate == batch.CORNER_REACHED))
+        self._check(table[known_gaps, batch.GAP], first[known_gaps])
         mean_profile = rows.load_profile.mean()
         values: dict[str, NDArray[Any]] = {
             "critical_load": load,
@@ -178,9 +181,10 @@ class Solver:
         solve_batch(
             np.ascontiguousarray(rows.strength - rows.initial_stress),
             np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-            setting.profile, rate, setting.usual_rate, setting.grid, setting.wide_column,
-            setting.usual, setting.windows(unusual), setting.block, setting.reach, setting.spacing,
-            setting.modulus, setting.caution, table, slips, stiffs, aheads, multipliers, self.slip,
+            setting.profile, rate, setting.pieces, setting.usual_rate, setting.grid,
+            setting.wide_column, setting.usual, setting.windows(unusual), setting.block,
+            setting.reach, setting.spacing, setting.modulus, setting.caution, table, slips, stiffs,
+            aheads, multipliers, self.slip,
         )  # fmt: skip
 
     def _one(
@@ -191,14 +195,14 @@ class Solver:
         Returns the first instability if it is to be followed from there.
         """
         setting = self.setting
-        sample = sample_of(rows, row)
+        sample = sample_of(rows, row, setting.pieces)
         line = table[row]
         solution = setting.programme(sample.excess, sample.rate)
         if solution is None:  # followed event by event instead
             line[:] = 0.0
             line[batch.GAP] = np.nan
             multipliers[row] = 0.0
-            line[batch.FATE] = batch.FLOOR_REACHED
+            line[batch.FATE] = batch.CORNER_REACHED
             return None
         multipliers[row] = solution.multiplier
         if self.slip:
@@ -211,7 +215,7 @@ class Solver:
         line[batch.POSITION] = centre * setting.spacing
         line[batch.LENGTH] = length * setting.spacing
         if exceeds(sample, solution.slip):
-            line[batch.FATE] = batch.FLOOR_REACHED
+            line[batch.FATE] = batch.CORNER_REACHED
             return None
         ahead = solution.slip.copy()
         line[batch.FATE] = runs_away(
@@ -226,21 +230,25 @@ class Solver:
 
     def _rewrite(self, sample: Sample, state: State, line: Array, multiplier: Array) -> None:
         """Replace what the programme said by what the path to the first instability says."""
-        residual = residual_nodes(sample, state.slip)
+        piece, strength, rate = present_pieces(sample, state.slip)
         multiplier[:] = state.direction / max(
             dot(state.direction, sample.profile, sample.profile.size), 1e-300
         )
         line[batch.GAP] = self.setting.gap(
-            np.where(residual, sample.floor, sample.excess),
-            np.where(residual, 0.0, sample.rate),
+            strength,
+            rate,
             Solution(state.load, state.slip, state.stiff, multiplier),
             np.empty(self.setting.nodes),
         )
+        if steepens(sample.pieces):  # then no multiplier bounds the load from above
+            line[batch.GAP] = np.nan
         line[batch.PATCHES] = count_patches(state.slip)
         _, length, centre = main_patch(multiplier)
         line[batch.POSITION] = centre * self.setting.spacing
         line[batch.LENGTH] = length * self.setting.spacing
-        multiplier[residual] = 0.0  # the strength there is tau_r, whatever tau_p
+        # Of a piece that starts from share tau_p + (1 - share) tau_r; the floor's share is 0.
+        moving = sample.critical > 0.0
+        multiplier[moving] *= sample.pieces.starts[piece[moving]]
 
     @staticmethod
     def _check(gap: Array, load: Array) -> None:

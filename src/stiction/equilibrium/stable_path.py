@@ -1,21 +1,23 @@
-"""The path of equilibria, event by event: the load rises until a node slips or reaches its floor.
+"""The path of equilibria, event by event: the load rises until a node slips or reaches a corner.
 
-Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q the strength less
-the initial stress, W = 0 where the floor is reached. An event is a node at rest that reaches its
-strength (a row of the factor more), a slipping node that reaches its floor (a diagonal entry that
-rises by W), or a node whose slipping makes A singular: the path has an end there, at this load.
+Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q what the piece of
+the law on which a node is has at zero slip, less the initial stress, and W the slope of the piece.
+An event is a node at rest that reaches its strength (a row of the factor more), a slipping node
+that reaches the next corner (a diagonal entry that rises as the strength falls less steeply), or a
+node whose slipping, or weakening more steeply, makes A singular: there the path ends.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction._jit import ZERO, jit
 from stiction._typing import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
-from stiction.equilibrium.instability_jump import AT_FLOOR
 from stiction.equilibrium.linear_program import PIVOT, singular_direction, solve_forward
+from stiction.equilibrium.pieces import piece_at, start_of
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample
 
 REACHED = 0
@@ -28,16 +30,16 @@ REFRESH = 16
 
 @jit
 def build(
-    sample: Sample, grid: Grid, slip: Array, residual: Array, strength: Array, room: Room
+    sample: Sample, grid: Grid, slip: Array, piece: NDArray[np.int64], strength: Array, room: Room
 ) -> int:
-    """Factor of A on the slipping nodes for their present states; returns how many there are."""
+    """Strength and diagonal of A for the present pieces; returns how many nodes slip."""
     count = ZERO
+    pieces = sample.pieces
     for i in range(slip.shape[0]):
         room.inside[i] = slip[i] > 0.0
-        constant = sample.critical[i] == 0.0
-        residual[i] = constant or (room.inside[i] and slip[i] >= AT_FLOOR * sample.critical[i])
-        strength[i] = sample.floor[i] if residual[i] else sample.excess[i]
-        room.diagonal[i] = grid.column[0] - (0.0 if residual[i] else sample.rate[i])
+        piece[i] = piece_at(pieces, sample.critical[i], slip[i])
+        strength[i] = start_of(pieces, sample.excess[i], sample.floor[i], piece[i])
+        room.diagonal[i] = grid.column[0] - pieces.slopes[piece[i]] * sample.rate[i]
         if room.inside[i]:
             room.order[count] = i
             count += 1
@@ -80,11 +82,13 @@ def advance(
     solution = room.vectors[1]
     stiff_rate = room.vectors[2]
     rate = room.vectors[3]
-    residual = np.zeros(n, np.bool_)
+    pieces = sample.pieces
+    last = pieces.ends.shape[0]
+    piece = np.zeros(n, np.int64)
     strength = np.empty(n)
     own = grid.column[0]
     members, order, diagonal = room.members, room.order, room.diagonal
-    count = build(sample, grid, slip, residual, strength, room)
+    count = build(sample, grid, slip, piece, strength, room)
     if count > MOST_MEMBERS:
         return load, CROWDED
     size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
@@ -94,7 +98,7 @@ def advance(
         return load, UNSTABLE
     extend_forward(room.factor, ZERO, size, members, sample.profile, room.forward[0])
     extend_forward(room.factor, ZERO, size, members, strength, room.forward[1])
-    for event in range(2 * n + 1):  # each node begins to slip once, and reaches its floor once
+    for event in range((1 + last) * n + 1):  # a node begins to slip, and passes each corner, once
         for t in range(size):
             right[t] = room.forward[0, t]
         back_substitute(room.factor, size, right, rate)
@@ -116,8 +120,8 @@ def advance(
                     starts = i
         for t in range(size):
             i = members[t]
-            if not residual[i] and rate[t] > 0.0:
-                left = max(sample.critical[i] - slip[i], 0.0)
+            if piece[i] < last and rate[t] > 0.0:
+                left = max(pieces.ends[piece[i]] * sample.critical[i] - slip[i], 0.0)
                 if left < step * rate[t]:
                     step = left / rate[t]
                     starts = -1
@@ -129,11 +133,22 @@ def advance(
             stiff[i] += step * stiff_rate[i]
         if ends >= 0:
             i = members[ends]
-            slip[i] = sample.critical[i]
-            residual[i] = True
-            strength[i] = sample.floor[i]
-            diagonal[i] = own
-            raise_diagonal(room.factor, size, ends, sample.rate[i], room.vectors)
+            slip[i] = pieces.ends[piece[i]] * sample.critical[i]
+            before = pieces.slopes[piece[i]] * sample.rate[i]
+            piece[i] += 1
+            strength[i] = start_of(pieces, sample.excess[i], sample.floor[i], piece[i])
+            after = pieces.slopes[piece[i]] * sample.rate[i]
+            diagonal[i] = own - after
+            if after <= before:
+                raise_diagonal(room.factor, size, ends, before - after, room.vectors)
+            else:  # it weakens more steeply: the factor is made anew from there on
+                order[: size - ends] = members[ends:size]
+                now = append(
+                    room.factor, ends, members, order, size - ends, grid.column, diagonal, PIVOT
+                )
+                if now < size:
+                    singular_direction(room, now, direction)
+                    return load, UNSTABLE
             extend_forward(room.factor, ends, size, members, sample.profile, room.forward[0])
             extend_forward(room.factor, ends, size, members, strength, room.forward[1])
         elif starts >= 0:

@@ -83,6 +83,7 @@ def runs_away_frozen(
         padded(sample.profile[nodes], 1e-9 * float(sample.profile.mean())),
         padded(sample.rate[nodes], 1.0),
         padded(sample.critical[nodes], np.inf),
+        sample.pieces,
     )
     fate = jump(part, small, load, local, stiff, escape, steps, make_room(2 * WINDOW))
     slip[nodes] = np.maximum(slip[nodes], local[:WINDOW])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.equilibrium.cholesky import row_start
+from stiction.equilibrium.pieces import Pieces
 
 FLAT = 1e-11
 """Share of the mean strength by which it must fall to count as weakening. Less cannot be told from
@@ -20,8 +21,9 @@ class Sample(NamedTuple):
     """One strength profile; all arrays of shape (n,).
 
     `excess` is tau_p - tau_i and `floor` tau_r - tau_i (Pa): stress is counted from the initial
-    one. `profile` is the load profile, `rate` the weakening rate W (Pa/m), and `critical` the slip
-    d_c (m) at which the floor is reached. Nodes of constant strength have both 0.
+    one. `profile` is the load profile, `rate` the weakening rate W at zero slip (Pa/m), and
+    `critical` the slip d_c (m) at which the floor is reached. Nodes of constant strength have both
+    0. `pieces` are those of the friction law.
     """
 
     excess: Array
@@ -29,10 +31,11 @@ class Sample(NamedTuple):
     profile: Array
     rate: Array
     critical: Array
+    pieces: Pieces
 
 
 @jit
-def make_sample(excess: Array, floor: Array, profile: Array, rate: Array) -> Sample:
+def make_sample(excess: Array, floor: Array, profile: Array, rate: Array, pieces: Pieces) -> Sample:
     """A sample in which nodes that are at their floor, but for round-off, do not weaken."""
     n = excess.shape[0]
     scale = 0.0
@@ -47,8 +50,8 @@ def make_sample(excess: Array, floor: Array, profile: Array, rate: Array) -> Sam
             moving[i] = 0.0
             critical[i] = 0.0
         else:
-            critical[i] = (excess[i] - floor[i]) / rate[i]
-    return Sample(excess, bottom, profile, moving, critical)
+            critical[i] = pieces.first * (excess[i] - floor[i]) / rate[i]
+    return Sample(excess, bottom, profile, moving, critical, pieces)
 
 
 class Grid(NamedTuple):

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import Discriminator, Tag
+from pydantic import Discriminator, GetJsonSchemaHandler, Tag
+from pydantic_core import CoreSchema
 
 from stiction._model import describe
 from stiction.friction.exponential import ExponentialWeakening
@@ -26,11 +27,22 @@ def _tag(value: Any) -> str:
     return "own" if isinstance(value, FrictionLaw) else describe(value)
 
 
+class _Schema:
+    """For editors: a table without a type is the linear law, and files hold no laws of others."""
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        linear, *others, _ = handler(core)["oneOf"]
+        return {"anyOf": [linear, *({"allOf": [law, {"required": ["type"]}]} for law in others)]}
+
+
 Friction: TypeAlias = Annotated[
     Annotated[SlipWeakening, Tag("linear")]
     | Annotated[ExponentialWeakening, Tag("exponential")]
     | Annotated[PiecewiseWeakening, Tag("piecewise")]
     | Annotated[FrictionLaw, Tag("own")],
     Discriminator(_tag),
+    _Schema(),
 ]
 """Any friction law; in a study file ``type`` says which, linear if left out."""

@@ -81,6 +81,14 @@ class ExponentialWeakening(FrictionLaw):
         """f(u) = exp(-u)."""
         return np.exp(-np.asarray(u, dtype=np.float64))
 
+    def area(self, u: Any) -> Array:
+        """1 - exp(-u)."""
+        return -np.expm1(-np.asarray(u, dtype=np.float64))
+
+    def slip_at(self, fraction: float) -> float:
+        """u = -ln f."""
+        return -math.log(fraction) if fraction > 0.0 else math.inf
+
     @property
     def parameters(self) -> Exponential:
         """For kernels."""

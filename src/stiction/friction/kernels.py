@@ -1,8 +1,8 @@
 """Strength and slope of any friction law at a slip, inside compiled kernels.
 
-A law hands kernels its numbers as a NamedTuple of its own type, and registers two functions for
-that type with `register`. ``strength_at`` and ``slope_at`` are resolved by the type when a kernel
-is compiled, so a law costs nothing that it does not use, and another law changes no kernel.
+A law hands kernels its numbers as a NamedTuple of its own type, and registers functions for that
+type with `register`. ``strength_at``, ``slope_at`` and ``line_at`` are resolved by the type when a
+kernel is compiled, so a law costs nothing that it does not use, and another law changes no kernel.
 """
 
 from __future__ import annotations
@@ -10,12 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import overload
 
-_FUNCTIONS: dict[type, tuple[Callable[..., float], Callable[..., float]]] = {}
+from stiction._jit import jit
+from stiction._typing import Array
+
+_FUNCTIONS: dict[type, tuple[Callable[..., Any], ...]] = {}
 
 
-def register(parameters: type, strength: Callable[..., float], slope: Callable[..., float]) -> None:
+def register(
+    parameters: type,
+    strength: Callable[..., float],
+    slope: Callable[..., float],
+    line: Callable[..., tuple[float, float]] | None = None,
+) -> None:
     """Say how kernels evaluate the law whose parameters have this type.
 
     Parameters
@@ -23,11 +32,26 @@ def register(parameters: type, strength: Callable[..., float], slope: Callable[.
     parameters : NamedTuple class
     strength, slope : compiled functions (law, peak, residual, rate, slip) -> float
         tau_f (Pa), and how fast it falls, -d tau_f / d slip >= 0 (Pa/m).
+    line : compiled function (law, peak, residual, rate, slip, ahead) -> (float, float), optional
+        See `line_at`; follows from the other two if left out.
     """
-    _FUNCTIONS[parameters] = (strength, slope)
+    if line is None:
+
+        @jit
+        def line(law, peak, residual, rate, slip, ahead):  # type: ignore[no-untyped-def]
+            falling = slope(law, peak, residual, rate, slip + ahead)
+            there = strength(law, peak, residual, rate, slip + ahead)
+            return there + falling * ahead, falling
+
+    _FUNCTIONS[parameters] = (strength, slope, line)
 
 
-def _registered(law: Any, which: int) -> Callable[..., float] | None:
+def registered(law: NamedTuple) -> bool:
+    """Whether kernels can evaluate the law with these parameters."""
+    return type(law) in _FUNCTIONS
+
+
+def _registered(law: Any, which: int) -> Callable[..., Any] | None:
     kind = getattr(law, "instance_class", None)  # numba's types of NamedTuples have one
     return _FUNCTIONS[kind][which] if kind in _FUNCTIONS else None
 
@@ -42,15 +66,32 @@ def strength_at(law: NamedTuple, peak: float, residual: float, rate: float, slip
     peak, residual, rate, slip : float
         tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), slip (m).
     """
-    return _FUNCTIONS[type(law)][0](law, peak, residual, rate, slip)
+    result: float = _FUNCTIONS[type(law)][0](law, peak, residual, rate, slip)
+    return result
 
 
 def slope_at(law: NamedTuple, peak: float, residual: float, rate: float, slip: float) -> float:
     """How fast the strength falls at a slip, -d tau_f / d slip >= 0, Pa/m; see `strength_at`."""
-    return _FUNCTIONS[type(law)][1](law, peak, residual, rate, slip)
+    result: float = _FUNCTIONS[type(law)][1](law, peak, residual, rate, slip)
+    return result
 
 
-# numba compares the names of arguments with their annotations, so these two have none.
+def line_at(
+    law: NamedTuple, peak: float, residual: float, rate: float, slip: float, ahead: float
+) -> tuple[float, float]:
+    """The straight line that the strength follows at ``slip + ahead``; see `strength_at`.
+
+    Returns
+    -------
+    start, slope : float
+        What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law
+        it is the piece itself.
+    """
+    result: tuple[float, float] = _FUNCTIONS[type(law)][2](law, peak, residual, rate, slip, ahead)
+    return result
+
+
+# numba compares the names of arguments with their annotations, so these have none.
 @overload(strength_at)
 def _strength_at(law, peak, residual, rate, slip):  # type: ignore[no-untyped-def]
     function = _registered(law, 0)
@@ -65,3 +106,22 @@ def _slope_at(law, peak, residual, rate, slip):  # type: ignore[no-untyped-def]
     if function is None:
         return None
     return lambda law, peak, residual, rate, slip: function(law, peak, residual, rate, slip)
+
+
+@overload(line_at)
+def _line_at(law, peak, residual, rate, slip, ahead):  # type: ignore[no-untyped-def]
+    function = _registered(law, 2)
+    if function is None:
+        return None
+    return lambda law, peak, residual, rate, slip, ahead: function(
+        law, peak, residual, rate, slip, ahead
+    )
+
+
+@jit
+def strengths(law: NamedTuple, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
+    """Strength tau_f at every node, Pa; all arrays (nodes,), see `strength_at`."""
+    result = np.empty(slip.size)
+    for i in range(slip.size):
+        result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])
+    return result

@@ -15,6 +15,10 @@ SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
 
 
+NEARLY_RESIDUAL = 0.01
+"""Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
+
+
 @model
 class FrictionLaw:
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
@@ -77,6 +81,11 @@ class FrictionLaw:
         return self.initial_slope
 
     @property
+    def steepens(self) -> bool:
+        """Whether strength falls more steeply later than at zero slip."""
+        return self.steepest_slope > self.initial_slope
+
+    @property
     def integral(self) -> float:
         """Integral of f(u) over all u >= 0."""
         raise NotImplementedError
@@ -85,10 +94,24 @@ class FrictionLaw:
         """f(u) at slips u in units of d_c, any shape."""
         raise NotImplementedError
 
+    def area(self, u: Any) -> Array:
+        """Integral of f from 0 to slips u in units of d_c, any shape."""
+        raise NotImplementedError
+
+    def slip_at(self, fraction: float) -> float:
+        """u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
+        raise NotImplementedError
+
     @property
     def parameters(self) -> NamedTuple:
         """What compiled kernels are given; see `stiction.friction.kernels`."""
         raise NotImplementedError
+
+    @property
+    def reach(self) -> float:
+        """u from which on strength counts as residual: 1 % of the way is left if not none."""
+        end = self.slip_at(0.0)
+        return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
     def residual(self, strength: Array) -> Array:
         """tau_r, Pa, of a peak strength (Pa, any shape)."""
@@ -124,6 +147,26 @@ class FrictionLaw:
     def critical_slip_of(self, drop: Array, rate: Array) -> Array:
         """d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
         return self.initial_slope * drop / rate
+
+    def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
+        """Energy dissipated above the residual strength up to a slip, J/m2.
+
+        Parameters
+        ----------
+        slip : (..., nodes) array
+            m.
+        drop, rate : (nodes,) arrays
+            tau_p - tau_r (Pa), W (Pa/m).
+
+        Returns
+        -------
+        (..., nodes) array
+            (tau_p - tau_r) d_c times the integral of f.
+        """
+        critical = self.critical_slip_of(drop, rate)
+        u = np.divide(slip, critical, out=np.zeros(np.shape(slip)), where=critical > 0.0)
+        energy: Array = drop * critical * self.area(u)
+        return energy
 
     def fracture_energy_of(self, drop: Array, rate: Array) -> Array:
         """Gamma, J/m², from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""

@@ -27,7 +27,23 @@ def _slope(law: Linear, peak: float, residual: float, rate: float, slip: float) 
     return rate if peak - rate * slip > residual else 0.0
 
 
-register(Linear, _strength, _slope)
+@jit
+def _line(
+    law: Linear, peak: float, residual: float, rate: float, slip: float, ahead: float
+) -> tuple[float, float]:
+    if peak - rate * (slip + ahead) > residual:
+        return peak - rate * slip, rate
+    return residual, 0.0
+
+
+register(Linear, _strength, _slope, _line)
+
+
+def dissipated(slip: Array, drop: Array, rate: Array) -> Array:
+    """(tau_p - tau_r) d - W d^2/2 up to d_c, then (tau_p - tau_r)^2/(2 W), J/m2."""
+    weakened = np.minimum(slip, drop / rate)
+    energy: Array = weakened * (drop - 0.5 * rate * weakened)
+    return energy
 
 
 @model
@@ -81,6 +97,19 @@ class SlipWeakening(FrictionLaw):
     def fraction(self, u: Any) -> Array:
         """f(u) = max(1 - u, 0)."""
         return np.maximum(1.0 - np.asarray(u, dtype=np.float64), 0.0)
+
+    def area(self, u: Any) -> Array:
+        """w - w^2/2 with w = min(u, 1)."""
+        w = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
+        return w - 0.5 * w * w
+
+    def slip_at(self, fraction: float) -> float:
+        """u = 1 - f."""
+        return 1.0 - fraction
+
+    def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
+        """Energy dissipated above the residual strength, J/m2; see `FrictionLaw.dissipated`."""
+        return dissipated(slip, drop, rate)
 
     @property
     def parameters(self) -> Linear:

@@ -7,13 +7,15 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, model_validator
 
+from stiction._checks import check_count, check_instance
 from stiction._jit import jit
 from stiction._model import _number, model
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.friction.kernels import register
 from stiction.friction.law import FrictionLaw
-from stiction.friction.linear import Linear
+from stiction.friction.linear import Linear, dissipated
+from stiction.placed import Placed
 
 
 class Polygon(NamedTuple):
@@ -175,6 +177,92 @@ class PiecewiseWeakening(FrictionLaw):
     def fraction(self, u: Any) -> Array:
         """f(u) by interpolation between the corners."""
         return np.interp(np.asarray(u, dtype=np.float64), *self.corners)
+
+    def area(self, u: Any) -> Array:
+        """Area under the polygon up to u."""
+        corners, f = self.corners
+        at_corners = np.append(0.0, np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(corners)))
+        u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
+        piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
+        into = u - corners[piece]
+        area: Array = at_corners[piece] + into * (f[piece] - 0.5 * self.slopes[piece] * into)
+        return area
+
+    def slip_at(self, fraction: float) -> float:
+        """u on the polygon."""
+        u, f = self.corners
+        return float(np.interp(fraction, f[::-1], u[::-1]))
+
+    def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
+        """Energy dissipated above the residual strength, J/m2; see `FrictionLaw.dissipated`."""
+        if self.linear:  # the same to the bit
+            return dissipated(slip, drop, rate)
+        return super().dissipated(slip, drop, rate)
+
+    @classmethod
+    def from_law(cls, law: FrictionLaw, pieces: int) -> PiecewiseWeakening:
+        """A polygon that goes along another law.
+
+        Parameters
+        ----------
+        law : FrictionLaw
+            Such as `ExponentialWeakening`.
+        pieces : int
+            How many straight pieces. Corners lie on the law where it has lost equal shares of
+            strength; the last piece of a law that never ends is so long that it dissipates as
+            much as all the rest of the law.
+
+        Returns
+        -------
+        PiecewiseWeakening
+            With the residual strength of `law`, and its weakening rate, critical slip or fracture
+            energy, whichever was given, as the polygon has it: the first piece is a chord, less
+            steep than the law at zero slip (by 1/(2 pieces) of an exponential one).
+
+        Raises
+        ------
+        InputError
+            If `law` is no friction law or `pieces` no whole number from 2 on.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> law = st.ExponentialWeakening(weakening_rate=0.5e12)
+        >>> polygon = st.PiecewiseWeakening.from_law(law, 32)
+        >>> round(float(polygon.weakening_rate) / 0.5e12, 3)
+        0.984
+        """
+        check_instance("law", law, FrictionLaw)
+        pieces = check_count("pieces", pieces, 2)
+        fraction = 1.0 - np.arange(1, pieces + 1) / pieces
+        u = np.array([law.slip_at(float(f)) for f in fraction])
+        if not np.isfinite(u[-1]):
+            rest = law.integral - float(law.area(u[-2]))
+            u[-1] = u[-2] + 2.0 * pieces * rest
+        fraction[-1] = 0.0
+        end = float(u[-1])
+        slip = u / end
+        slip[-1] = 1.0
+        chord = (1.0 - float(fraction[0])) / float(u[0])
+        area = float(np.trapezoid(np.append(1.0, fraction), np.append(0.0, u)))
+        factors = {
+            "weakening_rate": chord / law.initial_slope,
+            "critical_slip": end,
+            "fracture_energy": area / law.integral,
+        }
+        scale, value = law.scale
+        if isinstance(value, Placed):
+            raise InputError(
+                f"law.{scale}: has points of its own; take the friction of a problem, which puts"
+                " them on its nodes"
+            )
+        return cls(
+            slip=tuple(map(float, slip)),
+            strength=tuple(map(float, fraction)),
+            residual_strength=law.residual_strength,
+            residual_ratio=law.residual_ratio,
+            **{scale: factors[scale] * value},
+        )
 
     @property
     def parameters(self) -> Polygon | Linear:

@@ -151,6 +151,8 @@ class LimitState:
 
     def no_single_length(self) -> str | None:
         """Why the local criterion cannot serve as a first stage, or None if it can."""
+        if not self.problem.friction.linear:
+            return "strength does not fall linearly with slip"
         if self.problem.uniform_rate is None or set(SCALES) & set(self.random.names):
             return "the weakening rate is not uniform"
         if self.problem.nucleation_length > self.problem.interface.lengths[0]:

@@ -78,7 +78,9 @@ def longer(problem: Problem, ratio: int) -> Problem:
         "load.normal_pressure": load.normal_pressure,
         "friction.weakening_rate": friction.weakening_rate,
         "friction.critical_slip": friction.critical_slip,
+        "friction.fracture_energy": friction.fracture_energy,
         "friction.residual_strength": friction.residual_strength,
+        "friction.residual_ratio": friction.residual_ratio,
     }
     varying = [name for name, value in parts.items() if isinstance(value, np.ndarray)]
     if varying:

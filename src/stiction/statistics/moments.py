@@ -12,7 +12,7 @@ from scipy.integrate import simpson
 
 from stiction._checks import check_flag, check_instance
 from stiction.criterion.eigenproblem import Weight
-from stiction.criterion.nucleation import Weights, multiplier_of, weight_of
+from stiction.criterion.nucleation import Weights, check_law, multiplier_of, weight_of
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
@@ -206,6 +206,7 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
 def _uniform_load(problem: Problem, strength: RandomField) -> tuple[float, float]:
     check_instance("problem", problem, Problem)
     check_instance("strength", strength, RandomField)
+    check_law(problem)
     problems = [
         f"load.{name}: varies along the interface, so tau_n is not stationary; sample it with"
         " st.monte_carlo instead"

@@ -1,0 +1,111 @@
+"""Friction laws against their own definitions, and the polygon of one piece against the line."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import stiction as st
+from stiction.friction.kernels import line_at, slope_at, strength_at, strengths
+
+DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
+LAWS = {
+    "linear": st.SlipWeakening(weakening_rate=RATE),
+    "exponential": st.ExponentialWeakening(weakening_rate=RATE),
+    "dual": st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], weakening_rate=RATE),
+    "steepening": st.PiecewiseWeakening(
+        slip=[0.3, 0.8, 1.0], strength=[0.9, 0.2, 0.0], weakening_rate=RATE
+    ),
+}
+ONE_PIECE = {"slip": [1.0], "strength": [0.0]}
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_kernels_follow_the_law(law):
+    critical = law.critical_slip_of(DROP, RATE)
+    u = np.array([0.0, 0.1, 0.25, 0.5, 0.7, 0.9, 2.0])
+    ones = np.ones(u.size)
+    found = strengths(
+        law.parameters, (RESIDUAL + DROP) * ones, RESIDUAL * ones, RATE * ones, u * critical
+    )
+    np.testing.assert_allclose(found, RESIDUAL + DROP * law.fraction(u), rtol=1e-14)
+    # No corner lies in the interval of the difference, which is exact on straight pieces.
+    arguments = law.parameters, RESIDUAL + DROP, RESIDUAL, RATE
+    for slip in u * critical:
+        here, there = slip, slip + 1e-4 * critical
+        fall = strength_at(*arguments, here) - strength_at(*arguments, there)
+        slope = slope_at(*arguments, 0.5 * (here + there))
+        assert fall == pytest.approx(slope * (there - here), rel=1e-6, abs=1e-6)
+        start, steep = line_at(*arguments, 0.1 * critical, slip - 0.1 * critical)
+        assert steep == slope_at(*arguments, slip)
+        reached = start - steep * (slip - 0.1 * critical)
+        assert reached == pytest.approx(strength_at(*arguments, slip), rel=1e-14)
+    assert slope_at(*arguments, 0.0) == pytest.approx(RATE, rel=1e-14)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_energy_is_the_area_under_the_law(law):
+    critical = law.critical_slip_of(DROP, RATE)
+    for u in (0.1, 0.25, 0.6, 0.9, 3.0):
+        corners = [0.2, 0.3, 0.8, 1.0]
+        area = quad(law.fraction, 0.0, u, points=[c for c in corners if c < u], epsabs=1e-13)[0]
+        assert float(law.area(u)) == pytest.approx(area, rel=1e-11)
+        energy = law.dissipated(np.array([u * critical]), np.array([DROP]), np.array([RATE]))
+        assert energy[0] == pytest.approx(DROP * critical * area, rel=1e-11)
+    assert float(law.area(100.0)) == pytest.approx(law.integral, rel=1e-14)
+    assert law.fracture_energy_of(DROP, RATE) == pytest.approx(DROP * critical * law.integral)
+    assert float(law.fraction(law.slip_at(0.37))) == pytest.approx(0.37, rel=1e-14)
+    assert float(law.fraction(law.reach)) == pytest.approx(0.01 if law.type == "exponential" else 0)
+
+
+def test_each_scale_means_the_same_law():
+    gamma = LAWS["dual"].fracture_energy_of(DROP, RATE)
+    for name, value in (
+        ("fracture_energy", gamma),
+        ("critical_slip", LAWS["dual"].critical_slip_of(DROP, RATE)),
+    ):
+        law = st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], **{name: value})
+        assert law.rate(np.array([DROP]), *law.scale)[0] == pytest.approx(RATE, rel=1e-14)
+
+
+def test_polygon_along_a_law():
+    law = st.ExponentialWeakening(critical_slip=2e-6, residual_ratio=0.2)
+    polygon = st.PiecewiseWeakening.from_law(law, 8)
+    u = polygon.critical_slip / 2e-6 * np.array(polygon.slip)[:-1]
+    # Corners on the law, at equal losses; the last piece dissipates what the tail does.
+    np.testing.assert_allclose(polygon.strength, 1.0 - np.arange(1, 9) / 8, atol=1e-15)
+    np.testing.assert_allclose(law.fraction(u), polygon.strength[:-1], rtol=1e-14)
+    tail = polygon.fracture_energy_of(1.0, polygon.rate(np.ones(1), *polygon.scale))[0] / 2e-6
+    corners = np.append(0.0, u)
+    assert tail - np.trapezoid(law.fraction(corners), corners) == pytest.approx(1 / 8)
+    assert polygon.residual_ratio == 0.2
+    # A polygon along a polygon of few corners keeps to it.
+    again = st.PiecewiseWeakening.from_law(LAWS["dual"], 5)
+    np.testing.assert_allclose(again.slip[2], 0.2, rtol=1e-14)
+    assert again.weakening_rate == pytest.approx(RATE, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "scale",
+    [{"weakening_rate": 0.5e12}, {"critical_slip": 5e-6}, {"fracture_energy": 12.0}],
+    ids=lambda scale: next(iter(scale)),
+)
+def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
+    scale |= {"residual_strength": 0.3e6}
+    linear = dataclasses.replace(problem, friction=st.SlipWeakening(**scale))
+    piece = dataclasses.replace(problem, friction=st.PiecewiseWeakening(**ONE_PIECE, **scale))
+    tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=4)
+    wide = 0.4e6 + 3.0 * (tau_p - tau_p.min())  # the residual strength is reached, events arrest
+    for method, strength in (
+        (st.Equilibrium(slip=True, sensitivity=True), wide),
+        (st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4), tau_p[:1]),
+    ):
+        ours = st.onset(piece, strength, method=method)
+        theirs = st.onset(linear, strength, method=method)
+        for name in theirs.data_vars:
+            np.testing.assert_array_equal(ours[name], theirs[name], err_msg=str(name))
+        if "weakening_rate" in scale and method.type == "equilibrium":
+            assert theirs.residual_reached.any()

@@ -1,0 +1,87 @@
+"""What ruptures do whatever the friction law, and what depends on its shape."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.signal import find_peaks
+
+import stiction as st
+
+GAMMA = {"fracture_energy": 2.5, "residual_strength": 0.2e6}
+LAWS = {
+    "linear": st.SlipWeakening(**GAMMA),
+    "exponential": st.ExponentialWeakening(**GAMMA),
+    "bilinear": st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.4, 0.0], **GAMMA),
+    "steepening": st.PiecewiseWeakening(slip=[0.4, 1.0], strength=[0.8, 0.0], **GAMMA),
+}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """A weak spot breaks an interface of 512 nodes, with the same fracture energy for each law."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
+    interface = st.Interface(length=0.1, nodes=512)
+    strength = 1e6 - 0.4e6 * np.exp(-(((interface.x - 0.05) / 0.015) ** 2))
+    problem = st.Problem(solid, interface, LAWS["linear"], mode="III")
+    return {
+        name: st.simulate_rupture(
+            dataclasses.replace(problem, friction=law),
+            strength,
+            method=st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25),
+            variables=("slip", "slip_rate", "shear_stress", "strength"),
+            every=1,
+        )
+        for name, law in LAWS.items()
+    }
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_energies_balance(runs, name):
+    run, law = runs[name], LAWS[name]
+    spacing = run.x.values[1]
+    slip, stress, load = run.slip.values, run.shear_stress.values, run["load"].values
+    # What friction dissipates, summed from the stress that slides, step by step.
+    sheared = 0.5 * (stress[1:] + stress[:-1]) * np.diff(slip, axis=0)
+    friction = np.cumsum(sheared.sum(axis=1)) * spacing
+    dissipated = run.fracture_energy.values + 0.2e6 * slip.sum(axis=1) * spacing
+    # Trapezia over steps in which the fastest nodes weaken by a tenth: off at corners.
+    assert friction[-1] == pytest.approx(dissipated[-1], rel=1e-3)
+    pushed = 0.5 * (load[1:] + load[:-1]) * np.diff(slip.sum(axis=1)) * spacing
+    assert run.work.values[-1] == pytest.approx(pushed.sum(), rel=1e-3)
+    radiated = run.radiated_energy.values
+    np.testing.assert_allclose(
+        run.work - dissipated - run.strain_energy, radiated, atol=1e-9 * run.work.values[-1]
+    )
+    assert (np.diff(radiated) > -1e-4 * radiated[-1]).all()
+    # All of it is spent, up to the last per cent of strength of a law that never ends.
+    assert run.stopped == "sliding"
+    left = 0.01 if name == "exponential" else 1e-12
+    assert run.fracture_energy.values[-1] == pytest.approx(0.25, rel=left)
+    assert law.reach > 0.0
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_stress_is_the_strength_of_the_law_wherever_it_slides(runs, name):
+    run, law = runs[name], LAWS[name]
+    peak = run.peak_strength.values
+    drop = peak - 0.2e6
+    rate = law.rate(drop, *law.scale)
+    expected = 0.2e6 + drop * law.fraction(run.slip.values / law.critical_slip_of(drop, rate))
+    np.testing.assert_allclose(run.strength, expected, rtol=1e-12)
+    sliding = run.slip_rate.values[1:] > 0.0
+    np.testing.assert_allclose(
+        run.shear_stress.values[1:][sliding], expected[1:][sliding], rtol=1e-6
+    )
+
+
+def test_bilinear_weakening_has_two_peaks_of_slip_rate(runs):
+    # The front passes with the steep piece; a second peak follows with the gentle one
+    # (equal fracture energy, another shape).
+    for name, expected in (("linear", 1), ("exponential", 1), ("bilinear", 2)):
+        for node in (100, 130, 160):
+            rate = runs[name].slip_rate.values[:, node]
+            peaks, _ = find_peaks(rate, prominence=0.05 * rate.max())
+            assert peaks.size == expected, (name, node)
