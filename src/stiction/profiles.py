@@ -35,7 +35,6 @@ UNITS = {
     "weakening_rate": "Pa/m",
     "critical_slip": "m",
     "fracture_energy": "J/m2",
-    "residual_ratio": "1",
     "load_profile": "1",
     "slip": "m",
 }
