@@ -1,0 +1,134 @@
+"""Exact onset of a plane: a coarse grid first, then the turning point on each finer one."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.equilibrium.onset_bracket import Bracket, bisect, make_bracket
+from stiction.equilibrium.transform_operator import stiffness_symbol
+from stiction.equilibrium.turning_point import close
+
+COARSEST = 8.0
+"""Least ratio of the largest K(k) to W on a coarse grid: some six nodes in the nucleation length."""
+ROUGH = 1e-4
+"""Relative gap on coarse grids."""
+
+
+class Plane(NamedTuple):
+    """Periods (m), G (Pa), nu and the choice of wavenumbers of a plane."""
+
+    lengths: tuple[float, float]
+    shear_modulus: float
+    poisson_ratio: float
+    wavenumbers: Literal["spectral", "lattice"] = "spectral"
+
+
+@functools.lru_cache(maxsize=16)
+def symbol_of(plane: Plane, shape: tuple[int, int]) -> Array:
+    """K(k) of a plane on a grid; see `stiffness_symbol`."""
+    symbol = stiffness_symbol(shape, *plane)
+    symbol.flags.writeable = True
+    return symbol
+
+
+def halved(fine: Array) -> Array:
+    """Values on every other node, averaged with weights 1/4, 1/2, 1/4 along x and y."""
+    for axis in (0, 1):
+        even, odd = (slice(None),) * axis + (slice(0, None, 2),), (slice(None),) * axis + (slice(1, None, 2),)
+        fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
+    return fine
+
+
+def doubled(coarse: Array) -> Array:
+    """Linear interpolation to twice the nodes along x and y."""
+    for axis in (0, 1):
+        between = 0.5 * (coarse + np.roll(coarse, -1, axis))
+        both = np.stack((coarse, between), axis + 1)
+        coarse = both.reshape(
+            tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape))
+        )
+    return coarse
+
+
+@dataclass(frozen=True)
+class PlaneOnset:
+    """Onset of one sample on a plane.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Rigorous bounds of the onset load tau_0, Pa.
+    slip : (nx, ny) array
+        d at onset, m; proves the lower bound.
+    multiplier : (nx, ny) array
+        y, with <p, y> = 1: derivative of the load by the strength; proves the upper bound.
+    iterations : int
+        On the finest grid; each takes two pairs of transforms.
+    """
+
+    lower: float
+    upper: float
+    slip: Array
+    multiplier: Array
+    iterations: int
+
+
+def narrow(bracket: Bracket, gap: float) -> float:
+    """Close a bracket from nothing: bisection until Newton's method succeeds; returns the bend."""
+    share = 5e-3
+    bend = 0.0
+    while bracket.gap > gap * abs(bracket.upper):
+        direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
+        if share <= 0.1 * gap:
+            break
+        closed, bend = close(bracket, direction, bracket.lower, bracket.slip, direction, gap)
+        share *= 0.2
+    return bend
+
+
+def plane_onset(
+    plane: Plane, excess: Array, profile: Array, rate: Array, gap: float = 1e-6
+) -> PlaneOnset:
+    """Largest load with an equilibrium while no node has reached its residual strength.
+
+    Parameters
+    ----------
+    plane : Plane
+    excess : (nx, ny) array
+        Peak strength less initial stress, Pa.
+    profile : (nx, ny) array
+        Load profile p > 0.
+    rate : (nx, ny) array
+        W > 0, Pa/m.
+    gap : float
+        Relative gap between the bounds at which to stop.
+    """
+    levels = [(excess, profile, rate)]
+    while True:
+        shape = levels[-1][0].shape
+        largest = float(symbol_of(plane, shape).max())
+        odd = shape[0] % 2 or shape[1] % 2
+        if odd or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
+            break
+        levels.append(tuple(halved(field) for field in levels[-1]))
+    bracket = None
+    bend = 0.0
+    for number in range(len(levels) - 1, -1, -1):
+        goal = gap if number == 0 else max(ROUGH, gap)
+        coarse = bracket
+        strength, load_profile, weakening = levels[number]
+        bracket = make_bracket(symbol_of(plane, strength.shape), weakening, strength, load_profile)
+        closed = False
+        if coarse is not None:
+            slip, held = doubled(coarse.slip), doubled(coarse.multiplier)
+            held *= 1.0 / np.sqrt((held**2).sum())
+            closed, bend = close(bracket, held, coarse.lower, slip, held, goal, bend=bend)
+        if not closed:
+            bend = narrow(bracket, goal)
+    assert bracket is not None
+    return PlaneOnset(bracket.lower, bracket.upper, bracket.slip, bracket.multiplier, bracket.iterations)

@@ -1,0 +1,173 @@
+"""The turning point of the load, where the stable and the unstable equilibria of a patch meet.
+
+With the patch held by a spring along phi (`controlled_equilibrium`), equilibria exist on both sides
+of it. Let a = <phi, d> and mu the force of the spring. On the slipping nodes A d = tau_0 p - s +
+mu phi, and the slope d' = dd/da at fixed load satisfies A d' = mu' phi. At the turning point
+mu = mu' = 0: Newton's method in a (with the slope of mu' by secant) and tau_0.
+
+Bounds: d is feasible at tau_0 if mu >= 0. The combination y of two slopes, one with mu' > 0 and one
+with mu' < 0, for which A y = 0 where both slip, is a multiplier; nodes that slip in one state only
+have A y <= 0 and hardly slip at the turning point, so the error of its bound is of second order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.equilibrium.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
+from stiction.equilibrium.controlled_equilibrium import equilibrate
+from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
+
+
+class State(NamedTuple):
+    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, slip, and slope with <phi, d'> = 1."""
+
+    load: float
+    amplitude: float
+    force: float
+    stiffness: float
+    relief: float
+    slip: Array
+    slope: Array
+
+
+def hold(
+    bracket: Bracket, held: Array, load: float, amplitude: float, guess: State, accuracy: float
+) -> State | None:
+    """Equilibrium with a patch held; None if something else is unstable.
+
+    Parameters
+    ----------
+    bracket : Bracket
+    held : (nx, ny) array
+        phi, unit norm.
+    load, amplitude : float
+        tau_0 (Pa) and the a at which the spring is without force.
+    guess : State
+        Slip and slope to start from.
+    accuracy : float
+        Largest residual stress as a share of the mean strength.
+    """
+    operator, excess, profile, room = (
+        bracket.operator, bracket.excess, bracket.profile, bracket.room,
+    )  # fmt: skip
+    spring = float(operator.rate.max())
+    slip = guess.slip.copy()
+    inside = (slip > 0.0) | (excess < load * profile)
+    right = load * profile - excess + (spring * amplitude) * held
+    status, taken = equilibrate(
+        operator, right, spring, held, inside, slip, bracket.residual, room,
+        accuracy * bracket.scale, ITERATIONS,
+    )  # fmt: skip
+    bracket.iterations += taken
+    if status != SOLVED:
+        return None
+    slope = np.where(inside, guess.slope, 0.0)
+    slope *= 1.0 / (spring * inner(held, slope))
+    residual_of(operator, spring, held, held, slope, bracket.residual)
+    # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
+    cost = float(np.abs(excess - load * profile).sum())
+    tolerance = accuracy * spring * bracket.scale * inner(profile, slope) / cost
+    status, taken = solve_inside(
+        operator, inside, spring, held, slope, bracket.residual, room, tolerance, ITERATIONS
+    )
+    bracket.iterations += taken
+    if status != SOLVED:
+        return None
+    share = inner(held, slope)
+    reached = inner(held, slip)
+    return State(
+        load, reached, spring * (amplitude - reached), 1.0 / share - spring,
+        -inner(profile, slope) / share, slip, slope / share,
+    )  # fmt: skip
+
+
+def close(
+    bracket: Bracket,
+    held: Array,
+    load: float,
+    slip: Array,
+    slope: Array,
+    gap: float,
+    steps: int = 20,
+    bend: float = 0.0,
+    trace: list | None = None,
+) -> tuple[bool, float]:
+    """Close a bracket by Newton's method on the turning point of one patch.
+
+    Parameters
+    ----------
+    bracket : Bracket
+        Changed.
+    held : (nx, ny) array
+        phi >= 0, unit norm: the patch.
+    load, slip, slope : float, (nx, ny) arrays
+        Guess.
+    gap : float
+        As a share of the load.
+    steps : int
+    bend : float
+        Curvature a d mu'/da if known, Pa/m, negative.
+
+    Returns
+    -------
+    closed : bool
+    bend : float
+        The curvature found.
+    """
+    accuracy = 0.05 * gap
+    start = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, slope)
+    first = state = hold(bracket, held, load, start.amplitude, start, accuracy)
+    below: State | None = None  # mu' > 0, the one with the largest a
+    above: State | None = None
+    weights = [1.0, 1.0]
+    step = last = 0.0
+    for _ in range(steps):
+        if state is None or first is None:
+            return False, bend
+        if trace is not None:
+            trace.append((state.load, state.amplitude, state.force, state.stiffness, bracket.lower, bracket.upper, bracket.iterations))
+        bracket.raise_slip(state.slip)
+        stable = state.stiffness > 0.0
+        both = below is not None and above is not None
+        # Illinois: an end that stays twice loses half of its weight.
+        weights = [1.0, 0.5 * weights[1] if both else 1.0] if stable else [0.5 * weights[0] if both else 1.0, 1.0]
+        if stable:
+            below = state
+        else:
+            above = state
+            bracket.raise_multiplier(state.slope)
+        if below is not None and above is not None:
+            bracket.raise_multiplier(
+                below.slope * -above.stiffness + above.slope * below.stiffness
+            )
+        if bracket.gap <= gap * abs(bracket.upper):
+            return True, bend
+        moved = state.amplitude - first.amplitude
+        curvature = (state.stiffness - first.stiffness) / moved if moved else bend / state.amplitude
+        if curvature < 0.0:
+            bend = curvature * state.amplitude
+        if below is not None and above is not None and below.amplitude < above.amplitude:
+            low, high = weights[0] * below.stiffness, weights[1] * -above.stiffness
+            amplitude = below.amplitude + low / (low + high) * (above.amplitude - below.amplitude)
+            step = amplitude - state.amplitude
+        elif curvature < 0.0:
+            # mu' falls in steps, as nodes join: go beyond, further each time.
+            newton = -1.2 * state.stiffness / curvature
+            stalled = moved and state.stiffness / last > 0.7
+            step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
+            step = min(max(step, -0.3 * state.amplitude), 0.3 * state.amplitude)
+        else:
+            step = state.amplitude * (0.1 if stable else -0.1)
+        force = state.force + (state.stiffness + 0.5 * min(curvature, 0.0) * step) * step
+        target = state.load - force / state.relief
+        target = min(target, bracket.upper - 0.3 * gap * abs(bracket.upper))
+        last = state.stiffness
+        guess = State(
+            0.0, 0.0, 0.0, 0.0, 0.0, np.maximum(state.slip + step * state.slope, 0.0), state.slope
+        )
+        state = hold(bracket, held, target, state.amplitude + step, guess, accuracy)
+    return False, bend
