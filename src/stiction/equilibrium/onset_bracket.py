@@ -51,6 +51,7 @@ class Bracket:
         shape = self.excess.shape
         self.room = np.empty((3, *shape))
         self.residual = np.empty(shape)
+        self.inside = np.zeros(shape, dtype=np.bool_)
         self.slip = np.zeros(shape)
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
@@ -112,7 +113,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
             break
         load = 0.5 * (low + high)
         slip = stable.copy()
-        inside = (slip > 0.0) | (excess < load * profile)
+        inside = bracket.inside
+        inside[:] = (slip > 0.0) | (excess < load * profile)
         status, taken = equilibrate(
             operator, load * profile - excess, 0.0, none, inside, slip, bracket.residual,
             bracket.room, accuracy * bracket.scale, ITERATIONS,

@@ -32,7 +32,6 @@ class Plane(NamedTuple):
 def symbol_of(plane: Plane, shape: tuple[int, int]) -> Array:
     """K(k) of a plane on a grid; see `stiffness_symbol`."""
     symbol = stiffness_symbol(shape, *plane)
-    symbol.flags.writeable = True
     return symbol
 
 
@@ -86,7 +85,7 @@ def narrow(bracket: Bracket, gap: float) -> float:
         direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
         if share <= 0.1 * gap:
             break
-        closed, bend = close(bracket, direction, bracket.lower, bracket.slip, direction, gap)
+        closed, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
         share *= 0.2
     return bend
 
@@ -127,7 +126,7 @@ def plane_onset(
         if coarse is not None:
             slip, held = doubled(coarse.slip), doubled(coarse.multiplier)
             held *= 1.0 / np.sqrt((held**2).sum())
-            closed, bend = close(bracket, held, coarse.lower, slip, held, goal, bend=bend)
+            closed, bend = close(bracket, held, coarse.lower, slip, goal, bend)
         if not closed:
             bend = narrow(bracket, goal)
     assert bracket is not None

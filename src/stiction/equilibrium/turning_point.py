@@ -19,7 +19,13 @@ import numpy as np
 from stiction._typing import Array
 from stiction.equilibrium.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
 from stiction.equilibrium.controlled_equilibrium import equilibrate
+from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
+
+SWITCHES = 4
+"""Patches to hold one after the other, at most."""
+RETREAT = 2e-3
+"""Share by which the load is lowered when another patch is held, twice as much each time."""
 
 
 class State(NamedTuple):
@@ -35,7 +41,7 @@ class State(NamedTuple):
 
 
 def hold(
-    bracket: Bracket, held: Array, load: float, amplitude: float, guess: State, accuracy: float
+    bracket: Bracket, held: Array, guess: State, accuracy: float
 ) -> State | None:
     """Equilibrium with a patch held; None if something else is unstable.
 
@@ -44,19 +50,19 @@ def hold(
     bracket : Bracket
     held : (nx, ny) array
         phi, unit norm.
-    load, amplitude : float
-        tau_0 (Pa) and the a at which the spring is without force.
     guess : State
-        Slip and slope to start from.
+        Load, amplitude at which the spring is without force, slip and slope to start from.
     accuracy : float
         Largest residual stress as a share of the mean strength.
     """
     operator, excess, profile, room = (
         bracket.operator, bracket.excess, bracket.profile, bracket.room,
     )  # fmt: skip
+    load, amplitude = guess.load, guess.amplitude
     spring = float(operator.rate.max())
     slip = guess.slip.copy()
-    inside = (slip > 0.0) | (excess < load * profile)
+    inside = bracket.inside
+    inside[:] = (slip > 0.0) | (excess < load * profile)
     right = load * profile - excess + (spring * amplitude) * held
     status, taken = equilibrate(
         operator, right, spring, held, inside, slip, bracket.residual, room,
@@ -85,18 +91,45 @@ def hold(
     )  # fmt: skip
 
 
+def other_patch(bracket: Bracket) -> Array:
+    """The patch that became unstable beside the one that was held, unit norm."""
+    vector = np.abs(bracket.room[1])
+    value, taken = lowest_eigenvector(
+        bracket.operator, bracket.inside, vector, 1e-3 * float(bracket.operator.rate.max()), 12
+    )
+    bracket.iterations += taken
+    if value <= 0.0:
+        bracket.raise_multiplier(vector)
+    held: Array = np.maximum(vector, 0.0)
+    return held / np.sqrt(inner(held, held))
+
+
+def next_amplitude(below: State, above: State, turn: int) -> float:
+    """Amplitude between a state with mu' > 0 and one with mu' < 0, further on."""
+    width = above.amplitude - below.amplitude
+    if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
+        return below.amplitude + width * below.stiffness / (below.stiffness - above.stiffness)
+    # mu' has one step, as where a single node joins: where the two tangents of mu meet.
+    force = above.force + above.relief * (below.load - above.load)
+    share = (force - below.force - above.stiffness * width) / (
+        (below.stiffness - above.stiffness) * width
+    )
+    return below.amplitude + min(max(share, 0.0), 1.0) * width
+
+
 def close(
     bracket: Bracket,
     held: Array,
     load: float,
     slip: Array,
-    slope: Array,
     gap: float,
-    steps: int = 20,
     bend: float = 0.0,
+    steps: int = 40,
     trace: list | None = None,
 ) -> tuple[bool, float]:
-    """Close a bracket by Newton's method on the turning point of one patch.
+    """Close a bracket by Newton's method on the turning point of a patch.
+
+    If another patch turns out to be unstable, it is held instead.
 
     Parameters
     ----------
@@ -104,13 +137,14 @@ def close(
         Changed.
     held : (nx, ny) array
         phi >= 0, unit norm: the patch.
-    load, slip, slope : float, (nx, ny) arrays
+    load, slip : float, (nx, ny) array
         Guess.
     gap : float
         As a share of the load.
-    steps : int
     bend : float
         Curvature a d mu'/da if known, Pa/m, negative.
+    steps : int
+        Held equilibria to solve for, at most.
 
     Returns
     -------
@@ -119,22 +153,29 @@ def close(
         The curvature found.
     """
     accuracy = 0.05 * gap
-    start = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, slope)
-    first = state = hold(bracket, held, load, start.amplitude, start, accuracy)
+    first: State | None = None
     below: State | None = None  # mu' > 0, the one with the largest a
     above: State | None = None
-    weights = [1.0, 1.0]
+    guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
     step = last = 0.0
-    for _ in range(steps):
-        if state is None or first is None:
-            return False, bend
+    switches = 0
+    for turn in range(steps):
+        state = hold(bracket, held, guess, accuracy)
+        if state is None:
+            switches += 1
+            if switches > SWITCHES:
+                break
+            held = other_patch(bracket)
+            load = min(guess.load, bracket.upper) * (1.0 - RETREAT * 2.0 ** (switches - 1))
+            slip = slip if first is None else first.slip
+            guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
+            first = below = above = None
+            step = bend = 0.0
+            continue
         if trace is not None:
             trace.append((state.load, state.amplitude, state.force, state.stiffness, bracket.lower, bracket.upper, bracket.iterations))
         bracket.raise_slip(state.slip)
         stable = state.stiffness > 0.0
-        both = below is not None and above is not None
-        # Illinois: an end that stays twice loses half of its weight.
-        weights = [1.0, 0.5 * weights[1] if both else 1.0] if stable else [0.5 * weights[0] if both else 1.0, 1.0]
         if stable:
             below = state
         else:
@@ -146,14 +187,15 @@ def close(
             )
         if bracket.gap <= gap * abs(bracket.upper):
             return True, bend
+        first = first or state
         moved = state.amplitude - first.amplitude
-        curvature = (state.stiffness - first.stiffness) / moved if moved else bend / state.amplitude
+        curvature = bend / state.amplitude
+        if moved:
+            curvature = (state.stiffness - first.stiffness) / moved
         if curvature < 0.0:
             bend = curvature * state.amplitude
         if below is not None and above is not None and below.amplitude < above.amplitude:
-            low, high = weights[0] * below.stiffness, weights[1] * -above.stiffness
-            amplitude = below.amplitude + low / (low + high) * (above.amplitude - below.amplitude)
-            step = amplitude - state.amplitude
+            step = next_amplitude(below, above, turn) - state.amplitude
         elif curvature < 0.0:
             # mu' falls in steps, as nodes join: go beyond, further each time.
             newton = -1.2 * state.stiffness / curvature
@@ -162,12 +204,11 @@ def close(
             step = min(max(step, -0.3 * state.amplitude), 0.3 * state.amplitude)
         else:
             step = state.amplitude * (0.1 if stable else -0.1)
-        force = state.force + (state.stiffness + 0.5 * min(curvature, 0.0) * step) * step
-        target = state.load - force / state.relief
-        target = min(target, bracket.upper - 0.3 * gap * abs(bracket.upper))
         last = state.stiffness
+        force = state.force + (state.stiffness + 0.5 * min(curvature, 0.0) * step) * step
+        load = state.load - force / state.relief
         guess = State(
-            0.0, 0.0, 0.0, 0.0, 0.0, np.maximum(state.slip + step * state.slope, 0.0), state.slope
-        )
-        state = hold(bracket, held, target, state.amplitude + step, guess, accuracy)
+            min(load, bracket.upper * (1.0 - 0.3 * gap)), state.amplitude + step, 0.0, 0.0, 0.0,
+            np.maximum(state.slip + step * state.slope, 0.0), state.slope,
+        )  # fmt: skip
     return False, bend
