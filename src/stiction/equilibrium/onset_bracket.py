@@ -14,7 +14,11 @@ from stiction._typing import Array
 from stiction.equilibrium.conjugate_gradients import NEGATIVE, SOLVED
 from stiction.equilibrium.controlled_equilibrium import equilibrate
 from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
-from stiction.equilibrium.onset_certificates import lower_bound, upper_bound
+from stiction.equilibrium.onset_certificates import (
+    lifting_field,
+    lower_bound,
+    upper_bound,
+)
 from stiction.equilibrium.transform_operator import Operator, make_operator
 
 ITERATIONS = 3000
@@ -56,7 +60,8 @@ class Bracket:
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
         self.multiplier = np.zeros(shape)
-        self.raise_multiplier(np.ones(shape))
+        self.lifting = lifting_field(self.operator)
+        self.raise_multiplier(self.lifting[0])
 
     @property
     def gap(self) -> float:
@@ -79,7 +84,9 @@ class Bracket:
     def raise_multiplier(self, y: Array) -> float:
         """Take a multiplier if it proves a lower upper bound; returns its bound."""
         trial = y.copy()
-        load = upper_bound(self.operator, self.excess, self.profile, trial, self.residual)
+        load = upper_bound(
+            self.operator, self.excess, self.profile, trial, *self.lifting, self.residual
+        )
         if load < self.upper:
             self.upper, self.multiplier = load, trial
         return load

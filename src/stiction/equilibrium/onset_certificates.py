@@ -14,7 +14,7 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.equilibrium.transform_operator import Operator, product
+from stiction.equilibrium.transform_operator import Operator, filtered, product
 
 
 @jit
@@ -44,36 +44,62 @@ def lower_bound(
     return load
 
 
+def lifting_field(operator: Operator) -> tuple[Array, Array]:
+    """A field z > 0 with A z < 0 at every node, and -A z (Pa/m), to make multipliers feasible.
+
+    Where W > 0 everywhere it is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g with
+    (K + w) g = w where W = 0 and zero elsewhere, w the smallest positive W: for a Z-matrix
+    0 <= g < 1, and -A z is 0.4 w (1 - g) where W = 0 and at least W - 0.4 (w + W) g > 0 elsewhere.
+    """
+    field = np.ones(operator.rate.shape)
+    free = operator.rate <= 0.0
+    if free.any() and not free.all():
+        least = float(operator.rate[~free].min())
+        pushed = np.empty_like(field)
+        filtered(operator, least / (operator.symbol + least), free.astype(np.float64), pushed)
+        field -= 0.4 * pushed
+    image = np.empty_like(field)
+    product(operator, field, image)
+    return field, -image
+
+
 @jit
 def upper_bound(
-    operator: Operator, excess: Array, profile: Array, y: Array, work: Array
+    operator: Operator,
+    excess: Array,
+    profile: Array,
+    y: Array,
+    lifting: Array,
+    lifted: Array,
+    work: Array,
 ) -> float:
     """Bound by a multiplier, which is first made feasible and normalised to <p, y> = 1; Pa.
 
-    Since a uniform field has K 1 = 0, adding epsilon to y lowers A y by epsilon W: the smallest
-    epsilon is added that makes A y <= 0 everywhere. Infinite where there is none, because W = 0.
+    The least multiple of z is added that makes A y <= 0 everywhere; infinite where there is none.
 
     Parameters
     ----------
     operator, excess, profile, work
         As for `lower_bound`.
     y : (nx, ny) array, changed
+    lifting, lifted : (nx, ny) arrays
+        z and -A z of `lifting_field`.
     """
     v, s, p = y.reshape(-1), excess.reshape(-1), profile.reshape(-1)
-    rate = operator.rate.reshape(-1)
+    z, relief = lifting.reshape(-1), lifted.reshape(-1)
     for i in range(v.size):
         v[i] = max(v[i], 0.0)
     product(operator, y, work)
     image = work.reshape(-1)
     lift = 0.0
     for i in range(v.size):
-        if image[i] > 0.0:
-            if rate[i] <= 0.0:
-                return np.inf
-            lift = max(lift, image[i] / rate[i])
+        if relief[i] <= 0.0 and image[i] > 0.0:
+            return np.inf
+        if image[i] > lift * relief[i]:
+            lift = image[i] / relief[i]
     load, weight = 0.0, 0.0
     for i in range(v.size):
-        v[i] += lift
+        v[i] += lift * z[i]
         load += s[i] * v[i]
         weight += p[i] * v[i]
     if not weight > 0.0:

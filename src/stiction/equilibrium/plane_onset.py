@@ -91,7 +91,12 @@ def narrow(bracket: Bracket, gap: float) -> float:
 
 
 def plane_onset(
-    plane: Plane, excess: Array, profile: Array, rate: Array, gap: float = 1e-6
+    plane: Plane,
+    excess: Array,
+    profile: Array,
+    rate: Array,
+    gap: float = 1e-6,
+    slip: Array | None = None,
 ) -> PlaneOnset:
     """Largest load with an equilibrium while no node has reached its residual strength.
 
@@ -103,12 +108,14 @@ def plane_onset(
     profile : (nx, ny) array
         Load profile p > 0.
     rate : (nx, ny) array
-        W > 0, Pa/m.
+        W, Pa/m; zero at nodes that have reached their residual strength.
     gap : float
         Relative gap between the bounds at which to stop.
+    slip : (nx, ny) array, optional
+        Equilibrium at a lower load to start from, m, instead of coarse grids.
     """
     levels = [(excess, profile, rate)]
-    while True:
+    while slip is None:
         shape = levels[-1][0].shape
         largest = float(symbol_of(plane, shape).max())
         odd = shape[0] % 2 or shape[1] % 2
@@ -122,11 +129,13 @@ def plane_onset(
         coarse = bracket
         strength, load_profile, weakening = levels[number]
         bracket = make_bracket(symbol_of(plane, strength.shape), weakening, strength, load_profile)
+        if slip is not None:
+            bracket.raise_slip(slip)
         closed = False
         if coarse is not None:
-            slip, held = doubled(coarse.slip), doubled(coarse.multiplier)
+            guess, held = doubled(coarse.slip), doubled(coarse.multiplier)
             held *= 1.0 / np.sqrt((held**2).sum())
-            closed, bend = close(bracket, held, coarse.lower, slip, goal, bend)
+            closed, bend = close(bracket, held, coarse.lower, guess, goal, bend)
         if not closed:
             bend = narrow(bracket, goal)
     assert bracket is not None
