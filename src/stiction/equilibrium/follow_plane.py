@@ -2,7 +2,7 @@
 
 Between jumps the programme (`plane_onset`) gives the next instability at once, with the nodes that
 have reached their residual strength at W = 0, as long as no other node reaches it before. Where
-one does, the load of the next jump is bisected, each trial by relaxation at fixed load.
+one does, the path is followed in steps of the load by relaxation at fixed load.
 """
 
 from __future__ import annotations
@@ -28,6 +28,14 @@ from stiction.equilibrium.transform_operator import Operator, make_operator
 
 RELEVANT = 1e-5
 """Share of a multiplier's largest value below which it is not part of the unstable patch."""
+
+
+FIRST_STEP = 0.01
+"""Step of the load where the path is followed in steps, as a share of the load."""
+
+
+MOVED = 0.02
+"""Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
 
 
 @dataclass(frozen=True)
@@ -89,27 +97,25 @@ def _programme(plane: Plane, sample: PlaneSample, slip: Array, gap: float) -> Pl
     return found
 
 
-def _bisect(
+def _step_on(
     operator: Operator, sample: PlaneSample, load: float, slip: Array, gap: float
 ) -> tuple[float, float, Array, Relaxed]:
-    """Last load of the stable path, first one beyond, slip at the one, what comes of the other."""
-    top = float(sample.excess.mean() / sample.profile.mean())  # nothing is stronger on average
-    high = top
-    beyond = None
+    """Follow the stable path in steps of the load.
+
+    A step is halved if it looks unstable, which a long one may do only because nodes reach their
+    residual strength in it. Returns the last load of the path, the first one beyond, the slip at
+    the one, and what comes of the other.
+    """
+    step = FIRST_STEP * load
     while True:
-        if beyond is None or high - load > gap * high:
-            middle = 0.5 * (load + high) if beyond is not None else high
-            relaxed = least_equilibrium(operator, sample, middle, slip, 0.1 * gap)
-            if relaxed.jumped or relaxed.status != BALANCED:
-                high, beyond = middle, relaxed
-            else:
-                load, slip = middle, relaxed.slip
-            continue
-        # A long step may look unstable only because nodes reach their residual strength in it.
-        beyond = least_equilibrium(operator, sample, high, slip, 0.1 * gap)
-        if beyond.jumped or beyond.status != BALANCED:
-            return load, high, slip, beyond
-        load, slip, high, beyond = high, beyond.slip, top, None
+        trial = least_equilibrium(operator, sample, load + step, slip, 0.1 * gap, True)
+        if trial.status == BALANCED:
+            load, slip, step = load + step, trial.slip, 1.5 * step
+        elif step > gap * load:
+            step = max(0.4 * step, 0.7 * gap * load)
+        else:
+            beyond = least_equilibrium(operator, sample, load + step, slip, 0.1 * gap)
+            return load, load + step, slip, beyond
 
 
 def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlanePath:
@@ -128,7 +134,7 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
     carry it through.
     """
     shape = sample.excess.shape
-    operator = make_operator(symbol_of(plane, shape), sample.rate, shape)  # type: ignore[arg-type]
+    operator = make_operator(symbol_of(plane, shape), sample.rate, shape)
     path: PlanePath | None = None
     slip = np.zeros(shape)
     load = float((sample.excess / sample.profile).min())
@@ -148,14 +154,15 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
                 relaxed = Relaxed(SLIDING, before, True, 0)
             multiplier = np.where(at_residual(sample, slip), 0.0, found.multiplier)
         else:
-            stable, beyond, before, relaxed = _bisect(operator, sample, load, slip, gap)
+            stable, beyond, before, relaxed = _step_on(operator, sample, load, slip, gap)
             multiplier = np.full(shape, np.nan)
         if path is None:
             path = PlanePath(stable, beyond, before, multiplier, found is not None)
         if relaxed.status != BALANCED:
             path.load, path.sliding_slip, path.outcome = stable, before, relaxed.status
             return path
-        path.events.append(PlaneEvent(stable, before, relaxed.slip))
+        if ((relaxed.slip - before) / sample.critical).max() > MOVED:
+            path.events.append(PlaneEvent(stable, before, relaxed.slip))
         load, slip = beyond, relaxed.slip
 
 
@@ -181,7 +188,7 @@ def plane_slip_at(
         BALANCED, SLIDING or UNDECIDED.
     """
     shape = sample.excess.shape
-    operator = make_operator(symbol_of(plane, shape), sample.rate, shape)  # type: ignore[arg-type]
+    operator = make_operator(symbol_of(plane, shape), sample.rate, shape)
     slips = np.full((len(loads), *shape), np.nan)
     status = np.full(len(loads), SLIDING)
     slip = np.zeros(shape)

@@ -1,10 +1,10 @@
 """Relaxation of a plane at a fixed load: each node stuck, weakening, or at its residual strength.
 
-Strength less initial stress is max(s - W d, r). From a slip d whose nodes are all driven forward or
-balanced, an overdamped interface moves to the least equilibrium that is not below d, or there is
-none and it slides. Two kinds of step, neither of which passes that equilibrium: an elastic one, with
-the strength frozen at its present value; and one with the true states of the nodes, taken where it
-ends before a weakening node reaches its residual strength: then it ends in the least equilibrium.
+Strength less initial stress is max(s - W d, r). From a slip d whose nodes are all driven forward
+or balanced, an overdamped interface moves to the least equilibrium that is not below d, or there
+is none and it slides. Two kinds of step, neither of which passes that equilibrium: an elastic one,
+with the strength frozen at its present value; and one with the true states of the nodes, up to
+where the first weakening node reaches its residual strength: if none does, it is the equilibrium.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SETTLED = 0.1
 
 
 class PlaneSample(NamedTuple):
-    """One sample: s, r (strengths less initial stress, Pa), p, W (Pa/m) and d_c (m), (nx, ny) each."""
+    """One sample: s, r (strengths less initial stress, Pa), p, W (Pa/m), d_c (m); (nx, ny) each."""
 
     excess: Array
     floor: Array
@@ -86,7 +86,12 @@ class Relaxed(NamedTuple):
 
 
 def least_equilibrium(
-    operator: Operator, sample: PlaneSample, load: float, slip: Array, accuracy: float = 1e-7
+    operator: Operator,
+    sample: PlaneSample,
+    load: float,
+    slip: Array,
+    accuracy: float = 1e-7,
+    only_stable: bool = False,
 ) -> Relaxed:
     """The least equilibrium at a load that is not below a given slip.
 
@@ -101,6 +106,8 @@ def least_equilibrium(
         Zero, or an equilibrium at a lower load, or beyond it along an unstable direction, m.
     accuracy : float
         Largest residual stress as a share of the mean strength.
+    only_stable : bool
+        Give up, as UNDECIDED, where the path to the equilibrium looks unstable.
 
     Notes
     -----
@@ -128,6 +135,8 @@ def least_equilibrium(
             if status == EXHAUSTED:
                 return Relaxed(UNDECIDED, slip, jumped, used)
             jumped = jumped or status == NEGATIVE
+            if jumped and only_stable:
+                return Relaxed(UNDECIDED, slip, jumped, used)
             if status == SOLVED:
                 new = np.maximum(new, slip)
                 step = step_to_floor(sample, slip, new - slip)

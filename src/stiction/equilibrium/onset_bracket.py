@@ -69,6 +69,15 @@ class Bracket:
         return self.upper - self.lower
 
     @property
+    def magnitude(self) -> float:
+        """Load that relative gaps are measured by: the onset, unless that is next to nothing."""
+        return max(abs(self.upper), 1e-2 * self.scale / float(self.profile.mean()))
+
+    def closed(self, gap: float) -> bool:
+        """Whether the bounds are within a relative gap."""
+        return self.gap <= gap * self.magnitude
+
+    @property
     def scale(self) -> float:
         """Stress that errors are measured by, Pa."""
         return float(abs(self.upper) * self.profile.mean() + np.abs(self.excess).mean())
@@ -94,7 +103,7 @@ class Bracket:
 
 def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Array) -> Bracket:
     """The trivial bracket: nothing slips, and the whole slides at once."""
-    return Bracket(make_operator(symbol, rate, excess.shape), excess, profile)  # type: ignore[arg-type]
+    return Bracket(make_operator(symbol, rate, excess.shape), excess, profile)
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Array:
@@ -116,7 +125,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
     low, high = bracket.lower, bracket.upper
     stable = bracket.slip.copy()
     for _ in range(steps):
-        if high - low <= gap * abs(high):
+        if high - low <= gap * bracket.magnitude:
             break
         load = 0.5 * (low + high)
         slip = stable.copy()

@@ -14,7 +14,7 @@ from stiction.equilibrium.transform_operator import stiffness_symbol
 from stiction.equilibrium.turning_point import close
 
 COARSEST = 8.0
-"""Least ratio of the largest K(k) to W on a coarse grid: some six nodes in the nucleation length."""
+"""Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
 ROUGH = 1e-4
 """Relative gap on coarse grids."""
 
@@ -38,7 +38,10 @@ def symbol_of(plane: Plane, shape: tuple[int, int]) -> Array:
 def halved(fine: Array) -> Array:
     """Values on every other node, averaged with weights 1/4, 1/2, 1/4 along x and y."""
     for axis in (0, 1):
-        even, odd = (slice(None),) * axis + (slice(0, None, 2),), (slice(None),) * axis + (slice(1, None, 2),)
+        even, odd = (
+            (slice(None),) * axis + (slice(0, None, 2),),
+            (slice(None),) * axis + (slice(1, None, 2),),
+        )
         fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
     return fine
 
@@ -48,9 +51,7 @@ def doubled(coarse: Array) -> Array:
     for axis in (0, 1):
         between = 0.5 * (coarse + np.roll(coarse, -1, axis))
         both = np.stack((coarse, between), axis + 1)
-        coarse = both.reshape(
-            tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape))
-        )
+        coarse = both.reshape(tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape)))
     return coarse
 
 
@@ -66,6 +67,9 @@ class PlaneOnset:
         d at onset, m; proves the lower bound.
     multiplier : (nx, ny) array
         y, with <p, y> = 1: derivative of the load by the strength; proves the upper bound.
+    closed : bool
+        Whether they are as close as was asked for. For spectral wavenumbers on a grid too coarse
+        for the critical patch they may not be.
     iterations : int
         On the finest grid; each takes two pairs of transforms.
     """
@@ -74,6 +78,7 @@ class PlaneOnset:
     upper: float
     slip: Array
     multiplier: Array
+    closed: bool
     iterations: int
 
 
@@ -81,11 +86,14 @@ def narrow(bracket: Bracket, gap: float) -> float:
     """Close a bracket from nothing: bisection until Newton's method succeeds; returns the bend."""
     share = 5e-3
     bend = 0.0
-    while bracket.gap > gap * abs(bracket.upper):
+    while not bracket.closed(gap):
+        before = bracket.gap
         direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
         if share <= 0.1 * gap:
             break
         closed, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
+        if not closed and share < 1e-3 and bracket.gap > 0.5 * before:
+            break  # the bounds of a stiffness that is no Z-matrix may not meet
         share *= 0.2
     return bend
 
@@ -121,7 +129,8 @@ def plane_onset(
         odd = shape[0] % 2 or shape[1] % 2
         if odd or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
             break
-        levels.append(tuple(halved(field) for field in levels[-1]))
+        strength, load_profile, weakening = levels[-1]
+        levels.append((halved(strength), halved(load_profile), halved(weakening)))
     bracket = None
     bend = 0.0
     for number in range(len(levels) - 1, -1, -1):
@@ -139,4 +148,7 @@ def plane_onset(
         if not closed:
             bend = narrow(bracket, goal)
     assert bracket is not None
-    return PlaneOnset(bracket.lower, bracket.upper, bracket.slip, bracket.multiplier, bracket.iterations)
+    return PlaneOnset(
+        bracket.lower, bracket.upper, bracket.slip, bracket.multiplier, bracket.closed(gap),
+        bracket.iterations,
+    )  # fmt: skip

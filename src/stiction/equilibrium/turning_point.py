@@ -24,12 +24,15 @@ from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
 
 SWITCHES = 4
 """Patches to hold one after the other, at most."""
+PATIENCE = 8
+PROGRESS = 0.95
+"""States that may leave more than this share of the gap, one after the other."""
 RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
 
 
 class State(NamedTuple):
-    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, slip, and slope with <phi, d'> = 1."""
+    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, slip, slope (<phi, d'> = 1)."""
 
     load: float
     amplitude: float
@@ -40,9 +43,7 @@ class State(NamedTuple):
     slope: Array
 
 
-def hold(
-    bracket: Bracket, held: Array, guess: State, accuracy: float
-) -> State | None:
+def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State | None:
     """Equilibrium with a patch held; None if something else is unstable.
 
     Parameters
@@ -104,17 +105,39 @@ def other_patch(bracket: Bracket) -> Array:
     return held / np.sqrt(inner(held, held))
 
 
-def next_amplitude(below: State, above: State, turn: int) -> float:
-    """Amplitude between a state with mu' > 0 and one with mu' < 0, further on."""
-    width = above.amplitude - below.amplitude
+def load_at(state: State, amplitude: float, curvature: float = 0.0) -> float:
+    """Load without force of the spring at an amplitude, extrapolated from a state, Pa."""
+    step = amplitude - state.amplitude
+    force = state.force + (state.stiffness + 0.5 * curvature * step) * step
+    return state.load - force / state.relief
+
+
+def amplitude_between(below: State, above: State, turn: int) -> float:
+    """Guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
     if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
-        return below.amplitude + width * below.stiffness / (below.stiffness - above.stiffness)
-    # mu' has one step, as where a single node joins: where the two tangents of mu meet.
-    force = above.force + above.relief * (below.load - above.load)
-    share = (force - below.force - above.stiffness * width) / (
-        (below.stiffness - above.stiffness) * width
-    )
-    return below.amplitude + min(max(share, 0.0), 1.0) * width
+        share = below.stiffness / (below.stiffness - above.stiffness)
+    else:  # mu' has one step, as where a single node joins: where the two `load_at` agree
+        here, there = load_at(below, below.amplitude), load_at(above, below.amplitude)
+        rise = below.stiffness / -below.relief
+        fall = above.stiffness / -above.relief
+        share = (there - here) / ((rise - fall) * (above.amplitude - below.amplitude))
+        share = min(max(share, 0.0), 1.0)
+    return below.amplitude + share * (above.amplitude - below.amplitude)
+
+
+def step_across(state: State, step: float, last: float, curvature: float, moved: bool) -> float:
+    """Step of the amplitude that is likely to change the sign of mu'.
+
+    `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
+    join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
+    """
+    longest = 0.3 * state.amplitude
+    if curvature >= 0.0:
+        return float(np.copysign(longest / 3.0, state.stiffness))
+    newton = -1.2 * state.stiffness / curvature
+    stalled = moved and state.stiffness / last > 0.7
+    step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
+    return min(max(step, -longest), longest)
 
 
 def close(
@@ -125,7 +148,6 @@ def close(
     gap: float,
     bend: float = 0.0,
     steps: int = 40,
-    trace: list | None = None,
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
@@ -158,7 +180,7 @@ def close(
     above: State | None = None
     guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
     step = last = 0.0
-    switches = 0
+    switches = idle = 0
     for turn in range(steps):
         state = hold(bracket, held, guess, accuracy)
         if state is None:
@@ -166,14 +188,14 @@ def close(
             if switches > SWITCHES:
                 break
             held = other_patch(bracket)
-            load = min(guess.load, bracket.upper) * (1.0 - RETREAT * 2.0 ** (switches - 1))
+            load = min(guess.load, bracket.upper)
+            load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
             slip = slip if first is None else first.slip
             guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
             first = below = above = None
             step = bend = 0.0
             continue
-        if trace is not None:
-            trace.append((state.load, state.amplitude, state.force, state.stiffness, bracket.lower, bracket.upper, bracket.iterations))
+        before = bracket.gap
         bracket.raise_slip(state.slip)
         stable = state.stiffness > 0.0
         if stable:
@@ -182,11 +204,12 @@ def close(
             above = state
             bracket.raise_multiplier(state.slope)
         if below is not None and above is not None:
-            bracket.raise_multiplier(
-                below.slope * -above.stiffness + above.slope * below.stiffness
-            )
-        if bracket.gap <= gap * abs(bracket.upper):
+            bracket.raise_multiplier(below.slope * -above.stiffness + above.slope * below.stiffness)
+        if bracket.closed(gap):
             return True, bend
+        idle = idle + 1 if bracket.gap > PROGRESS * before else 0
+        if idle > PATIENCE:
+            break
         first = first or state
         moved = state.amplitude - first.amplitude
         curvature = bend / state.amplitude
@@ -195,20 +218,16 @@ def close(
         if curvature < 0.0:
             bend = curvature * state.amplitude
         if below is not None and above is not None and below.amplitude < above.amplitude:
-            step = next_amplitude(below, above, turn) - state.amplitude
-        elif curvature < 0.0:
-            # mu' falls in steps, as nodes join: go beyond, further each time.
-            newton = -1.2 * state.stiffness / curvature
-            stalled = moved and state.stiffness / last > 0.7
-            step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
-            step = min(max(step, -0.3 * state.amplitude), 0.3 * state.amplitude)
+            amplitude = amplitude_between(below, above, turn)
+            step = amplitude - state.amplitude
+            load = min(load_at(below, amplitude), load_at(above, amplitude))
         else:
-            step = state.amplitude * (0.1 if stable else -0.1)
+            step = step_across(state, step, last, curvature, bool(moved))
+            load = load_at(state, state.amplitude + step, min(curvature, 0.0))
         last = state.stiffness
-        force = state.force + (state.stiffness + 0.5 * min(curvature, 0.0) * step) * step
-        load = state.load - force / state.relief
+        load = min(load, bracket.upper - 0.3 * gap * bracket.magnitude)
         guess = State(
-            min(load, bracket.upper * (1.0 - 0.3 * gap)), state.amplitude + step, 0.0, 0.0, 0.0,
+            load, state.amplitude + step, 0.0, 0.0, 0.0,
             np.maximum(state.slip + step * state.slope, 0.0), state.slope,
         )  # fmt: skip
     return False, bend
