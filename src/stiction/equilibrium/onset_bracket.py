@@ -71,7 +71,7 @@ class Bracket:
     @property
     def magnitude(self) -> float:
         """Load that relative gaps are measured by: the onset, unless that is next to nothing."""
-        return max(abs(self.upper), 1e-2 * self.scale / float(self.profile.mean()))
+        return max(abs(self.upper), 1e-2 * float(np.abs(self.excess).mean() / self.profile.mean()))
 
     def closed(self, gap: float) -> bool:
         """Whether the bounds are within a relative gap."""
@@ -80,7 +80,7 @@ class Bracket:
     @property
     def scale(self) -> float:
         """Stress that errors are measured by, Pa."""
-        return float(abs(self.upper) * self.profile.mean() + np.abs(self.excess).mean())
+        return self.magnitude * float(self.profile.mean())
 
     def raise_slip(self, slip: Array) -> float:
         """Take a slip if it proves a higher lower bound; returns its bound."""

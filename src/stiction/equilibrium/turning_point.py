@@ -32,7 +32,7 @@ RETREAT = 2e-3
 
 
 class State(NamedTuple):
-    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, slip, slope (<phi, d'> = 1)."""
+    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, d, d' (<phi, d'> = 1)."""
 
     load: float
     amplitude: float
