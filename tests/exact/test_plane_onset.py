@@ -1,4 +1,4 @@
-"""Planes where the answer is known: the line in modes II and III, the critical disc, uniform ones."""
+"""Planes where the answer is known: the line in modes II and III, the critical disc, uniform."""
 
 from __future__ import annotations
 

@@ -21,14 +21,9 @@ from stiction.equilibrium.least_equilibrium import (
     Relaxed,
     at_residual,
     least_equilibrium,
-    step_to_floor,
 )
 from stiction.equilibrium.plane_onset import Plane, PlaneOnset, plane_onset, symbol_of
 from stiction.equilibrium.transform_operator import Operator, make_operator
-
-RELEVANT = 1e-5
-"""Share of a multiplier's largest value below which it is not part of the unstable patch."""
-
 
 FIRST_STEP = 0.01
 """Step of the load where the path is followed in steps, as a share of the load."""
@@ -141,23 +136,16 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
     while True:
         found = _programme(plane, sample, slip, gap)
         if found is not None:
-            stable, beyond = found.lower, found.upper
-            y = found.multiplier
-            y = np.where(y > RELEVANT * y.max(), y, 0.0)
-            before = np.maximum(found.slip, slip)
-            start = before
-            step = step_to_floor(sample, before, y)
-            if np.isfinite(step):
-                start = before + step * y
-                relaxed = least_equilibrium(operator, sample, beyond, start, 0.1 * gap)
-            else:
-                relaxed = Relaxed(SLIDING, before, True, 0)
+            stable, before = found.lower, np.maximum(found.slip, slip)
+            beyond = found.upper + gap * abs(found.upper)
+            relaxed = least_equilibrium(operator, sample, beyond, before, 0.1 * gap)
             multiplier = np.where(at_residual(sample, slip), 0.0, found.multiplier)
         else:
             stable, beyond, before, relaxed = _step_on(operator, sample, load, slip, gap)
             multiplier = np.full(shape, np.nan)
         if path is None:
-            path = PlanePath(stable, beyond, before, multiplier, found is not None)
+            upper = found.upper if found is not None else beyond
+            path = PlanePath(stable, upper, before, multiplier, found is not None)
         if relaxed.status != BALANCED:
             path.load, path.sliding_slip, path.outcome = stable, before, relaxed.status
             return path

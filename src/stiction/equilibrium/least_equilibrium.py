@@ -14,8 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import EXHAUSTED, NEGATIVE, SOLVED
+from stiction.equilibrium.conjugate_gradients import (
+    EXHAUSTED,
+    NEGATIVE,
+    SOLVED,
+    residual_of,
+    solve_inside,
+)
 from stiction.equilibrium.controlled_equilibrium import equilibrate
+from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.transform_operator import Operator
 
 BALANCED = 0
@@ -24,6 +31,8 @@ UNDECIDED = 2
 
 AT_FLOOR = 1.0 - 1e-9
 """Share of d_c from which on a node counts as at its residual strength."""
+RELEVANT = 1e-5
+"""Share of the largest value below which a node is not part of an unstable direction."""
 ITERATIONS = 3000
 STEPS = 2000
 SETTLED = 0.1
@@ -74,6 +83,39 @@ def _advance(
         np.empty((3, *slip.shape)), tolerance, ITERATIONS,
     )  # fmt: skip
     return status, new, taken
+
+
+def weakening_step(
+    operator: Operator, sample: PlaneSample, load: float, slip: Array, tolerance: float
+) -> tuple[Array, int]:
+    """Slip moved with the true states until the first node reaches its residual strength.
+
+    Only the nodes that slip or are overloaded move; it goes towards their equilibrium, or, if they
+    have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
+    forward or balanced, so the next equilibrium is not passed. Returns the slip and iterations.
+    """
+    residual = at_residual(sample, slip)
+    operator = operator._replace(rate=np.where(residual, 0.0, sample.rate))
+    drive = load * sample.profile - np.where(residual, sample.floor, sample.excess)
+    rest, new = np.empty_like(slip), slip.copy()
+    room = np.empty((3, *slip.shape))
+    none = np.zeros_like(slip)
+    residual_of(operator, 0.0, none, drive, slip, rest)
+    inside = (slip > 0.0) | (rest > 0.0)
+    status, used = solve_inside(
+        operator, inside, 0.0, none, new, rest, room, tolerance, ITERATIONS
+    )  # fmt: skip
+    direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
+    longest = 1.0
+    if status == NEGATIVE:
+        direction = np.abs(room[1])
+        largest = float(sample.rate.max())
+        _, taken = lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
+        used += taken
+        direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
+        longest = np.inf
+    step = min(step_to_floor(sample, slip, direction), longest)
+    return (slip + step * direction if np.isfinite(step) else slip), used
 
 
 class Relaxed(NamedTuple):
@@ -139,11 +181,11 @@ def least_equilibrium(
                 return Relaxed(UNDECIDED, slip, jumped, used)
             if status == SOLVED:
                 new = np.maximum(new, slip)
-                step = step_to_floor(sample, slip, new - slip)
-                if step >= 1.0:
+                if step_to_floor(sample, slip, new - slip) >= 1.0:
                     return Relaxed(BALANCED, new, jumped, used)
-                slip = slip + step * (new - slip)
-                strength = strength_at(sample, slip)
+            slip, taken = weakening_step(operator, sample, load, slip, tolerance)
+            used += taken
+            strength = strength_at(sample, slip)
         status, new, taken = _advance(operator, sample, load, strength, frozen, slip, tolerance)
         used += taken
         if status != SOLVED:
