@@ -20,6 +20,7 @@ from stiction.equilibrium.least_equilibrium import (
     PlaneSample,
     Relaxed,
     at_residual,
+    contiguous,
     least_equilibrium,
 )
 from stiction.equilibrium.plane_onset import Plane, PlaneOnset, plane_onset, symbol_of
@@ -128,6 +129,7 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
     carry it through.
     """
+    sample = contiguous(sample)
     shape = sample.excess.shape
     operator = make_operator(symbol_of(plane, shape), sample.rate, shape)
     path: PlanePath | None = None
@@ -175,6 +177,7 @@ def plane_slip_at(
     status : (count,) int array
         BALANCED, SLIDING or UNDECIDED.
     """
+    sample = contiguous(sample)
     shape = sample.excess.shape
     operator = make_operator(symbol_of(plane, shape), sample.rate, shape)
     slips = np.full((len(loads), *shape), np.nan)

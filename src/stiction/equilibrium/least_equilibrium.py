@@ -35,8 +35,10 @@ RELEVANT = 1e-5
 """Share of the largest value below which a node is not part of an unstable direction."""
 ITERATIONS = 3000
 STEPS = 2000
-SETTLED = 0.1
+SETTLED = 0.02
 """Growth of slip in one elastic step, as a share of d_c, below which the true states are tried."""
+ROUGH = 2e-3
+"""Largest residual stress as a share of the mean strength while slip grows faster than that."""
 
 
 class PlaneSample(NamedTuple):
@@ -47,6 +49,11 @@ class PlaneSample(NamedTuple):
     profile: Array
     rate: Array
     critical: Array
+
+
+def contiguous(sample: PlaneSample) -> PlaneSample:
+    """The sample as compiled kernels take it, whatever its arrays are views of."""
+    return PlaneSample(*(np.ascontiguousarray(values, dtype=np.float64) for values in sample))
 
 
 def at_residual(sample: PlaneSample, slip: Array) -> Array:
@@ -186,7 +193,9 @@ def least_equilibrium(
             slip, taken = weakening_step(operator, sample, load, slip, tolerance)
             used += taken
             strength = strength_at(sample, slip)
-        status, new, taken = _advance(operator, sample, load, strength, frozen, slip, tolerance)
+        # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
+        rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
+        status, new, taken = _advance(operator, sample, load, strength + rough, frozen, slip, rough)
         used += taken
         if status != SOLVED:
             return Relaxed(UNDECIDED, slip, jumped, used)

@@ -122,6 +122,9 @@ def plane_onset(
     slip : (nx, ny) array, optional
         Equilibrium at a lower load to start from, m, instead of coarse grids.
     """
+    excess, profile, rate = (
+        np.ascontiguousarray(given, dtype=np.float64) for given in (excess, profile, rate)
+    )
     levels = [(excess, profile, rate)]
     while slip is None:
         shape = levels[-1][0].shape
