@@ -98,3 +98,17 @@ def test_grid_transfer_keeps_linear_and_uniform_fields():
     assert np.allclose(halved(x)[1:-1], x[2:-2:2, ::2], rtol=0, atol=1e-12)
     assert np.allclose(doubled(x)[:-2, 0], 0.5 * np.arange(30), rtol=0, atol=1e-12)
     assert np.all(halved(np.ones((8, 6))) == 1.0)
+
+
+@pytest.mark.parametrize("nodes", [16, 32, 128])
+def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
+    one = np.ones((nodes, nodes))
+    plane = Plane((0.03, 0.03), 1e9, 0.33)
+    uniform = plane_onset(plane, 0.9e6 * one, one, RATE * one)
+    assert uniform.lower == uniform.upper == 0.9e6
+    # So wide a weak strip that the first node to slip is nearly unstable.
+    wave = 1e6 + 1e5 * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)[:, None] * one
+    # Views of any layout are taken.
+    found = plane_onset(plane, np.asfortranarray(wave), np.broadcast_to(1.0, one.shape), RATE * one)
+    assert found.closed
+    assert 0.9e6 < found.lower < 1e6

@@ -37,6 +37,8 @@ ITERATIONS = 3000
 STEPS = 2000
 SETTLED = 0.02
 """Growth of slip in one elastic step, as a share of d_c, below which the true states are tried."""
+DRAG = 1e-3
+"""Stiffness added to elastic steps, as a share of the largest W."""
 ROUGH = 2e-3
 """Largest residual stress as a share of the mean strength while slip grows faster than that."""
 
@@ -165,7 +167,9 @@ def least_equilibrium(
     `accuracy`; spectral ones have small positive off-diagonal entries.
     """
     tolerance = accuracy * float(np.abs(sample.excess).mean() + abs(load) * sample.profile.mean())
-    frozen = np.zeros_like(sample.rate)
+    # K alone is singular where everything slips; a drag on the growth keeps it a lower bound.
+    drag = DRAG * float(sample.rate.max())
+    frozen = np.full_like(sample.rate, -drag)
     slip = np.maximum(slip, 0.0)
     jumped = False
     used = 0
@@ -195,7 +199,9 @@ def least_equilibrium(
             strength = strength_at(sample, slip)
         # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
         rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
-        status, new, taken = _advance(operator, sample, load, strength + rough, frozen, slip, rough)
+        status, new, taken = _advance(
+            operator, sample, load, strength + rough - drag * slip, frozen, slip, rough
+        )
         used += taken
         if status != SOLVED:
             return Relaxed(UNDECIDED, slip, jumped, used)

@@ -15,6 +15,8 @@ from stiction.equilibrium.turning_point import close
 
 COARSEST = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
+FEWEST = 8
+"""Least nodes along x and y on a coarse grid."""
 ROUGH = 1e-4
 """Relative gap on coarse grids."""
 
@@ -130,7 +132,7 @@ def plane_onset(
         shape = levels[-1][0].shape
         largest = float(symbol_of(plane, shape).max())
         odd = shape[0] % 2 or shape[1] % 2
-        if odd or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
+        if odd or min(shape) < 2 * FEWEST or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
             break
         strength, load_profile, weakening = levels[-1]
         levels.append((halved(strength), halved(load_profile), halved(weakening)))

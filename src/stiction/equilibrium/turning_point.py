@@ -60,7 +60,7 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
         bracket.operator, bracket.excess, bracket.profile, bracket.room,
     )  # fmt: skip
     load, amplitude = guess.load, guess.amplitude
-    spring = float(operator.rate.max())
+    spring = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
     slip = guess.slip.copy()
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
@@ -174,6 +174,10 @@ def close(
     bend : float
         The curvature found.
     """
+    if bracket.closed(gap):
+        return True, bend
+    if not slip.any() and not (bracket.excess < load * bracket.profile).any():  # nothing to hold
+        load = 0.5 * (bracket.lower + bracket.upper)
     accuracy = 0.05 * gap
     first: State | None = None
     below: State | None = None  # mu' > 0, the one with the largest a
