@@ -87,7 +87,8 @@ def report(nodes, samples):
     onsets = [timed(plane_onset, PLANE, s, one, rate, GAP) for s in strengths]
     ours = statistics.median(seconds for seconds, _ in onsets)
     widest = max((found.upper - found.lower) / found.upper for _, found in onsets)
-    text = f"{nodes} x {nodes}  {ours:.4f} s (goal {TARGETS.get(nodes, np.nan)}), gap {widest:.1e}"
+    goal = f" (goal {TARGETS[nodes]})" if nodes in TARGETS else ""
+    text = f"{nodes} x {nodes}  {ours:.4f} s{goal}, gap {widest:.1e}"
     several = strengths[: max(1, samples // 4)]
     plain = [timed(by_bisection, s) for s in several]
     seconds = statistics.median(spent for spent, _ in plain)
