@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction._typing import Array
+from stiction.equilibrium.conjugate_gradients import inner
 from stiction.equilibrium.least_equilibrium import (
     AT_FLOOR,
     BALANCED,
@@ -23,15 +24,15 @@ from stiction.equilibrium.least_equilibrium import (
     contiguous,
     least_equilibrium,
 )
+from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.plane_onset import Plane, PlaneOnset, plane_onset, symbol_of
 from stiction.equilibrium.transform_operator import Operator, make_operator
 
 FIRST_STEP = 0.01
 """Step of the load where the path is followed in steps, as a share of the load."""
-
-
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
+DIRECTION_ITERATIONS = 300
 
 
 @dataclass(frozen=True)
@@ -51,16 +52,18 @@ class PlanePath:
     ----------
     lower, upper : float
         Bounds of the first instability, Pa.
-    slip, multiplier : (nx, ny) arrays
-        d (m) at the first instability, and the derivative of its load by the peak strength (at
-        fixed W; zero at nodes at their residual strength).
+    slip : (nx, ny) array
+        d at the first instability, m.
+    direction : (nx, ny) array
+        y at the first instability, <p, y> = 1: the derivative of its load by the strength that
+        each node has there, tau_p - W d or tau_r.
     certified : bool
         Whether the bounds are rigorous: no node reached its residual strength before.
     load : float
         Last equilibrium = global sliding, Pa.
     events : list of PlaneEvent
-    sliding_slip : (nx, ny) array
-        d at the last equilibrium, m.
+    sliding_slip, sliding_direction : (nx, ny) arrays
+        d (m) and y at the last equilibrium.
     outcome : int
         SLIDING, or UNDECIDED where a relaxation did not settle: `load` is then a lower bound.
     """
@@ -68,15 +71,16 @@ class PlanePath:
     lower: float
     upper: float
     slip: Array
-    multiplier: Array
+    direction: Array
     certified: bool
     load: float = np.nan
     events: list[PlaneEvent] = field(default_factory=list)
     sliding_slip: Array = field(default_factory=lambda: np.zeros(0))
+    sliding_direction: Array = field(default_factory=lambda: np.zeros(0))
     outcome: int = UNDECIDED
 
 
-def _programme(plane: Plane, sample: PlaneSample, slip: Array, gap: float) -> PlaneOnset | None:
+def programme(plane: Plane, sample: PlaneSample, slip: Array, gap: float) -> PlaneOnset | None:
     """Next instability if no further node reaches its residual strength before it."""
     residual = at_residual(sample, slip)
     found = plane_onset(
@@ -114,6 +118,21 @@ def _step_on(
             return load, load + step, slip, beyond
 
 
+def _direction(operator: Operator, sample: PlaneSample, slip: Array, after: Array) -> Array:
+    """How the patch at the end of a stable path gives way: the y of its nearly zero eigenvalue."""
+    weak = ~at_residual(sample, slip)
+    growth = np.maximum(after - slip, 0.0)
+    inside = slip > 0.0
+    vector = np.where(inside, growth, 0.0)
+    if vector.any():
+        frozen = operator._replace(rate=np.where(weak, sample.rate, 0.0))
+        tolerance = 1e-6 * float(sample.rate.max())
+        lowest_eigenvector(frozen, inside, vector, tolerance, DIRECTION_ITERATIONS)
+        growth = np.maximum(vector, 0.0)
+    y: Array = growth / inner(sample.profile, growth)
+    return y
+
+
 def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlanePath:
     """First instability, arrested events and global sliding of one sample.
 
@@ -136,24 +155,33 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
     slip = np.zeros(shape)
     load = float((sample.excess / sample.profile).min())
     while True:
-        found = _programme(plane, sample, slip, gap)
+        found = programme(plane, sample, slip, gap)
         if found is not None:
             stable, before = found.lower, np.maximum(found.slip, slip)
             beyond = found.upper + gap * abs(found.upper)
             relaxed = least_equilibrium(operator, sample, beyond, before, 0.1 * gap)
-            multiplier = np.where(at_residual(sample, slip), 0.0, found.multiplier)
+            direction = found.multiplier
         else:
             stable, beyond, before, relaxed = _step_on(operator, sample, load, slip, gap)
-            multiplier = np.full(shape, np.nan)
+            direction = _direction(operator, sample, before, relaxed.slip)
         if path is None:
             upper = found.upper if found is not None else beyond
-            path = PlanePath(stable, upper, before, multiplier, found is not None)
+            path = PlanePath(stable, upper, before, direction, found is not None)
         if relaxed.status != BALANCED:
-            path.load, path.sliding_slip, path.outcome = stable, before, relaxed.status
+            path.load, path.outcome = stable, relaxed.status
+            path.sliding_slip, path.sliding_direction = before, direction
             return path
-        if ((relaxed.slip - before) / sample.critical).max() > MOVED:
+        weakens = sample.critical > 0.0
+        if (relaxed.slip - before > MOVED * sample.critical)[weakens].any():
             path.events.append(PlaneEvent(stable, before, relaxed.slip))
         load, slip = beyond, relaxed.slip
+
+
+def first_instability(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> float:
+    """Its load alone, without the jump, Pa."""
+    sample = contiguous(sample)
+    found = programme(plane, sample, np.zeros(sample.excess.shape), gap)
+    return found.lower if found is not None else follow_plane(plane, sample, gap).lower
 
 
 def plane_slip_at(

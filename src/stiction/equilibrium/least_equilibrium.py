@@ -59,7 +59,7 @@ def contiguous(sample: PlaneSample) -> PlaneSample:
 
 
 def at_residual(sample: PlaneSample, slip: Array) -> Array:
-    """Which nodes are at their residual strength, (nx, ny) bool."""
+    """Which nodes are at their residual strength, (nx, ny) bool; those of constant strength are."""
     reached: Array = slip >= AT_FLOOR * sample.critical
     return reached
 
@@ -207,7 +207,6 @@ def least_equilibrium(
             return Relaxed(UNDECIDED, slip, jumped, used)
         new = np.maximum(new, slip)
         weakening = ~at_residual(sample, new)
-        grown = ((new - slip) / sample.critical)[weakening].max(initial=0.0)
-        patient = bool(grown > SETTLED)
+        patient = bool((new - slip > SETTLED * sample.critical)[weakening].any())
         slip = new
     return Relaxed(UNDECIDED, slip, jumped, used)
