@@ -203,17 +203,17 @@ def plane_slip_at(
     slip : (count, nx, ny) array
         d, m; NaN from global sliding on.
     status : (count,) int array
-        BALANCED, SLIDING or UNDECIDED.
+        BALANCED, SLIDING or UNDECIDED; the same from the first that is not balanced on.
     """
     sample = contiguous(sample)
     shape = sample.excess.shape
     operator = make_operator(symbol_of(plane, shape), sample.rate, shape)
     slips = np.full((len(loads), *shape), np.nan)
-    status = np.full(len(loads), SLIDING)
+    status = np.full(len(loads), BALANCED)
     slip = np.zeros(shape)
     for number, load in enumerate(loads):
         relaxed = least_equilibrium(operator, sample, float(load), slip, accuracy)
-        status[number] = relaxed.status
+        status[number:] = relaxed.status
         if relaxed.status != BALANCED:
             break
         slip = slips[number] = relaxed.slip
