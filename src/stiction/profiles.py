@@ -20,6 +20,7 @@ from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
+from stiction.profile_planes import labelled_plane
 from stiction.profile_text import Table, read_table
 from stiction.units import factor_to, parse
 
@@ -462,6 +463,11 @@ def _magnitude(value: Any, si: str) -> Any:
     return value
 
 
+def _own_factor(source: Any, quantity: str) -> float:
+    """To SI, from the unit that a labelled array states."""
+    return _factor(None, _unit_of(source), quantity)
+
+
 def at_nodes(
     name: str, value: Any, quantity: str, interface: Interface, gaps: Gaps = "refuse"
 ) -> AtNodes:
@@ -471,6 +477,12 @@ def at_nodes(
     """
     try:
         value = simplified(value, quantity)
+        if interface.is_plane:
+            if gaps == "fill":
+                raise InputError("gaps cannot be filled on an interface of two dimensions")
+            labels = is_labelled(value)
+            found = labelled_plane(value, quantity, interface, _own_factor) if labels else value
+            return AtNodes(found, None)
         if is_labelled(value):
             points = labelled(value, quantity)
             if points.x is None and points.values.shape[1:] == (1,):  # one value a sample

@@ -113,6 +113,11 @@ def write_onset_figure(
     results: Mapping[str, xr.Dataset],
     path: Path,
 ) -> None:
-    """`draw_onset` as a file."""
+    """`draw_onset` as a file; of a plane the maps of `draw_plane_onset`."""
+    if problem.interface.is_plane:
+        from stiction.report.plane_figures import write_plane_onset
+
+        write_plane_onset(problem, tau_p, results, path)
+        return
     with paper_style():
         save_figure(draw_onset(problem, tau_p, results), path)
