@@ -32,11 +32,6 @@ class Variable:
     long_name: str
     dims: tuple[str, ...] = ("sample",)
 
-    @property
-    def is_wide(self) -> bool:
-        """Whether it has a value a node; the two components of a position are not that many."""
-        return bool({"x", "y"} & set(self.dims))
-
 
 ONSET_VARIABLES: dict[str, Variable] = {
     "critical_load": Variable("Pa", "load factor at which the interface as a whole lets go"),

@@ -174,8 +174,7 @@ def _plain_variables(values: Arrays) -> dict[str, Variable]:
     for name, value in values.items():
         if name not in ROWS:
             inner = tuple(f"{name}_{axis}" for axis in range(1, value.ndim))
-            row = "row" if len(value) == len(values["sample"]) else "wide_row"
-            result[name] = Variable("", "", (row, *inner))
+            result[name] = Variable("", "", ("wide_row" if inner else "row", *inner))
     return result
 
 
@@ -199,7 +198,7 @@ def tables_of(outcomes: Sequence[Outcome], variables: Mapping[str, Variable]) ->
         names = dict(ROWS)
         for name in group[0].values:
             variable = variables[name]
-            row = "wide_row" if variable.is_wide else "row"
+            row = "wide_row" if len(variable.dims) > 1 else "row"
             names[name] = replace(variable, dims=(row, *variable.dims[1:]))
             values[name] = np.concatenate([outcome.values[name] for outcome in group])
         yield Table(values, names, round(sum(outcome.seconds for outcome in group), 3))

@@ -19,11 +19,6 @@ from stiction.results import Variable, along
 from stiction.sample import PROFILES
 
 SLOW = 32
-FEW = 8
-PIECE_SECONDS = 4.0
-"""About what a piece of more samples than that few may take."""
-MOST_NUMBERS = 2**23
-"""Numbers in one profile of all samples that are solved at once: 64 MiB."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +51,15 @@ class Plan:
 
     @property
     def wide(self) -> tuple[str, ...]:
-        """The variables that have a number a node."""
-        return tuple(name for name, v in self.variables.items() if v.is_wide)
+        """The variables that have more than one number a sample."""
+        return tuple(name for name, v in self.variables.items() if len(v.dims) > 1)
 
     @property
     def piece(self) -> int:
         """Samples solved at once, as the method likes it."""
-        most = max(1, MOST_NUMBERS // self.problem.interface.size)
-        quick = max(FEW, int(PIECE_SECONDS / self.method.seconds_per_sample(self.problem)))
-        size = min(int(self.method.chunk_size), most, quick)
+        size = int(self.method.chunk_size)
         # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
-        return size if size < min(SLOW, most) else min(max(size, BLOCK), most)
+        return size if size < SLOW else max(size, BLOCK)
 
     def profiles(self, first: int, samples: int) -> dict[str, Array]:
         """The random profiles of samples first .. first + samples - 1, by name."""
