@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import jit, jit_sums
+from stiction._jit import jit
 from stiction._typing import Array
+from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.transform_operator import Operator, filtered, product
 
 SOLVED = 0
@@ -21,14 +22,10 @@ EXHAUSTED = 2
 Mask = NDArray[np.bool_]
 
 
-@jit_sums
+@jit
 def inner(a: Array, b: Array) -> float:
     """Sum of products over all nodes of two fields."""
-    total = 0.0
-    x, y = a.reshape(-1), b.reshape(-1)
-    for i in range(x.size):
-        total += x[i] * y[i]
-    return total
+    return dot(a.reshape(-1), b.reshape(-1), a.size)
 
 
 @jit
