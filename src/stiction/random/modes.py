@@ -119,9 +119,7 @@ def line_modes(spectrum: Any, mean_mode: bool, interface: Interface) -> Modes:
     return _made(power, j[None, :], j[1:].copy(), mean_mode)
 
 
-def plane_modes(
-    spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
-) -> Modes:
+def plane_modes(spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface) -> Modes:
     """The modes of a spectrum on a plane: wave vectors in an ellipse, of k and -k one.
 
     They are in the order of growing rectangles of the proportions of the plane, so that a mode has

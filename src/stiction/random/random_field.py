@@ -363,7 +363,8 @@ def _warn_of_lines(field: RandomField, interface: Interface) -> None:
         cell = (2.0 * math.pi) ** 2 / interface.extent * ratio_y
         k = modes.lengths(interface, ratio_y)[1:]
         seen = cell * (
-            2.0 * float(spectrum.plane_density(k).sum()) + float(spectrum.plane_density(0.0 * k[:1]))
+            2.0 * float(spectrum.plane_density(k).sum())
+            + float(spectrum.plane_density(0.0 * k[:1]))
         )
         whole = 2.0 * math.pi * spectrum.plane_power_integral(spectrum.plane_cutoff)
         apart = f"{2.0 * math.pi / max(interface.lengths):.3g}"
