@@ -134,8 +134,9 @@ class RandomField:
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
         if interface.is_plane:
-            numbers = modes.numbers
-            return gaussian_planes(draws, modes.sigma, numbers, self.mean_mode, interface.shape)
+            return gaussian_planes(
+                draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape
+            )
         z = np.empty((draws.shape[0], interface.size))
         gaussian_rows(draws, modes.sigma, self.mean_mode, interface.size, z)
         return z

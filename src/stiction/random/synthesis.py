@@ -65,7 +65,7 @@ def _plane_spectrum(
 
 
 def gaussian_planes(
-    draws: Array, sigma: Array, numbers: Array, has_mean: bool, shape: tuple[int, int]
+    draws: Array, sigma: Array, numbers: Array, has_mean: bool, shape: tuple[int, ...]
 ) -> Array:
     """z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
 
