@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from scipy.special import ndtr
 from scipy.stats import beta
 
-from stiction.equilibrium.ellipse_windows import ellipse_window, local_onset
+from stiction.criterion.ellipse_windows import ellipse_window, local_onset
 from stiction.equilibrium.follow_plane import follow_plane
 from stiction.equilibrium.least_equilibrium import PlaneSample
 from stiction.equilibrium.onset_bracket import bisect, make_bracket

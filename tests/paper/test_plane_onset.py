@@ -11,7 +11,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import beta
 
-from stiction.equilibrium.ellipse_windows import ellipse_window, local_onset
+from stiction.criterion.ellipse_windows import ellipse_window, local_onset
 from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of
 
 RATE = 0.5e12

@@ -8,20 +8,21 @@ initial stress with the weight y, over that of the load profile, bounds the onse
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import Mask
 from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
-from stiction.equilibrium.transform_operator import Operator, make_operator
+from stiction.equilibrium.transform_operator import make_operator
 
 TOLERANCE = 1e-9
 """Residual of an eigenvector, as a share of W."""
 ITERATIONS = 500
+SMALLEST_BOX = 32
+"""Nodes along each side of the piece of a plane that is looked at first."""
 
 
 class EllipseWindow(NamedTuple):
@@ -51,18 +52,29 @@ class EllipseWindow(NamedTuple):
     spectrum: NDArray[np.complex128]
 
 
-def squared_radius(shape: tuple[int, int], lengths: tuple[float, float], aspect: float) -> Array:
+def squared_radius(shape: tuple[int, int], spacings: tuple[float, float], aspect: float) -> Array:
     """x^2 + (aspect y)^2 of every node, from the nearest image of node (0, 0), m^2."""
-    x = np.fft.fftfreq(shape[0]) * lengths[0]
-    y = np.fft.fftfreq(shape[1]) * lengths[1]
+    x, y = (np.fft.fftfreq(n) * n * spacing for n, spacing in zip(shape, spacings, strict=True))
     result: Array = (x[:, None]) ** 2 + (aspect * y[None, :]) ** 2
     return result
 
 
-def _lowest(operator: Operator, inside: Mask, rate: float, guess: Array) -> float:
-    if not (guess[inside] != 0.0).any():
-        guess[:] = 1.0
-    return lowest_eigenvector(operator, inside, guess, TOLERANCE * rate, ITERATIONS)[0]
+def _boxes(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
+    """Ever larger pieces of a plane, the last of them the whole."""
+    side = SMALLEST_BOX
+    while side < max(shape):
+        yield min(side, shape[0]), min(side, shape[1])
+        side *= 2
+    yield shape
+
+
+def _nodes_of(box: tuple[int, int], shape: tuple[int, int]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Nodes of the plane that a box around node (0, 0) consists of, in the order of transforms."""
+    along, across = (
+        np.rint(np.fft.fftfreq(n) * n).astype(np.int64) % whole
+        for n, whole in zip(box, shape, strict=True)
+    )
+    return np.ix_(along, across)
 
 
 def ellipse_window(
@@ -80,22 +92,83 @@ def ellipse_window(
         W, Pa/m.
     aspect : float
         Semi-axis along x over that along y.
+
+    Notes
+    -----
+    What happens on the nodes of an ellipse is the same on a box of the plane that is twice as
+    long, made periodic with the stiffness between its own nodes: a block of a Toeplitz matrix is
+    one of a circulant. So the cost follows the ellipse and not the plane.
     """
-    operator = make_operator(symbol, rate, shape)._replace(rate=np.zeros(shape))
-    distance = squared_radius(shape, lengths, aspect)
-    radii = np.unique(np.round(distance / distance.max(), 12)) * distance.max() * (1.0 + 1e-11)
-    half = min(0.5 * lengths[0], 0.5 * lengths[1] * aspect)
-    low, high = -1, int(np.searchsorted(radii, half**2))
-    if high == 0:
+    spacings = lengths[0] / shape[0], lengths[1] / shape[1]
+    column = np.fft.irfft2(symbol, shape)
+    least = 0.0
+    for box in _boxes(shape):
+        room = [
+            n * spacing * (0.5 if n == whole else 0.25) * stretch
+            for n, whole, spacing, stretch in zip(box, shape, spacings, (1.0, aspect), strict=True)
+        ]
+        nodes = _nodes_of(box, shape)
+        found = _smallest_unstable(column[nodes], spacings, rate, aspect, least, min(room))
+        if found is not None:
+            weight = np.zeros(shape)
+            weight[nodes] = np.maximum(found.vector, 0.0)
+            weight /= weight.sum()
+            area = found.nodes * spacings[0] * spacings[1]
+            extents = 2.0 * found.axis, 2.0 * found.axis / aspect
+            spectrum = np.conj(np.fft.rfft2(weight))
+            return EllipseWindow(aspect, extents, area, found.eigenvalue, weight, spectrum)
+        least = min(room) ** 2
+    return None
+
+
+class _Unstable(NamedTuple):
+    """Eigenvector on a box, semi-axis along x (m), number of nodes, lowest eigenvalue (Pa/m)."""
+
+    vector: Array
+    axis: float
+    nodes: int
+    eigenvalue: float
+
+
+def _smallest_unstable(
+    column: Array,
+    spacings: tuple[float, float],
+    rate: float,
+    aspect: float,
+    least: float,
+    axis: float,
+) -> _Unstable | None:
+    """Smallest unstable ellipse in a box, by bisection of its semi-axis up to `axis`.
+
+    Parameters
+    ----------
+    column : (mx, my) array
+        Stress (Pa) at each node of the box by unit slip at node (0, 0).
+    least : float
+        Square of a semi-axis that is known to be stable, m^2.
+    """
+    shape = column.shape
+    symbol = np.ascontiguousarray(np.fft.rfft2(column).real)
+    operator = make_operator(symbol, rate, shape)._replace(
+        rate=np.zeros(shape), inverse=1.0 / (np.maximum(symbol, 0.0) + 0.5 * rate)
+    )
+    distance = squared_radius(shape, spacings, aspect)
+    radii = np.unique(distance)
+    # Nodes that are equally far by symmetry differ by round-off.
+    radii = radii[np.append(np.diff(radii) > 1e-9 * radii[1:], True)] * (1.0 + 1e-9)
+    low, high = int(np.searchsorted(radii, least)) - 1, int(np.searchsorted(radii, axis**2))
+    if high <= low + 1:
         return None
     found = None
     guess = np.ones(shape)
-    probe = max(1, high // 16)  # small ones first: they cost the fewest iterations
+    probe = max(1, (high - low) // 16)  # small ones first: they cost the fewest iterations
     while high - low > 1:
         middle = min(low + probe, high - 1) if probe else (low + high) // 2
         inside = distance <= radii[middle]
         vector = guess.copy()
-        value = _lowest(operator, inside, rate, vector)
+        if not (vector[inside] != 0.0).any():
+            vector[:] = 1.0
+        value = lowest_eigenvector(operator, inside, vector, TOLERANCE * rate, ITERATIONS)[0]
         if value <= rate:
             high, found, guess, probe = middle, (inside, value, vector), vector, 0
         else:
@@ -104,14 +177,7 @@ def ellipse_window(
     if found is None:
         return None
     inside, value, vector = found
-    weight = np.maximum(vector, 0.0)
-    weight /= weight.sum()
-    axis = float(np.sqrt(radii[high]))
-    cell = lengths[0] * lengths[1] / (shape[0] * shape[1])
-    return EllipseWindow(
-        aspect, (2.0 * axis, 2.0 * axis / aspect), float(inside.sum()) * cell, value, weight,
-        np.conj(np.fft.rfft2(weight)),
-    )  # fmt: skip
+    return _Unstable(vector, float(np.sqrt(radii[high])), int(inside.sum()), value)
 
 
 class LocalOnset(NamedTuple):
