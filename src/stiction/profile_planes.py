@@ -48,7 +48,9 @@ def labelled_plane(source: Any, quantity: str, interface: Interface, factor: Fac
     if hasattr(source, "data_vars"):
         names = [str(name) for name in source.data_vars]
         if quantity not in names:
-            raise InputError(f"holds no variable {quantity!r} (it has {', '.join(names) or 'none'})")
+            raise InputError(
+                f"holds no variable {quantity!r} (it has {', '.join(names) or 'none'})"
+            )
         source = source[quantity]
     dims = [str(name) for name in source.dims]
     if all(name.startswith("dim_") for name in dims):  # never named: order counts

@@ -61,11 +61,11 @@ def warn_if_coarse(problem: Problem, rate: float) -> None:
     unit = problem.nucleation_length_of(rate) / problem.effective_modulus
     spacings = dict(zip("xy", problem.interface.spacings, strict=True))
     nodes = {dim: unit * across[dim] / spacings[dim] for dim in "xy"}
-    coarse = " and ".join(f"{nodes[dim]:.1f} nodes along {dim}" for dim in "xy" if nodes[dim] < FINE)
+    coarse = " and ".join(
+        f"{nodes[dim]:.1f} nodes along {dim}" for dim in "xy" if nodes[dim] < FINE
+    )
     if coarse:
-        warn_accuracy(
-            f"the nucleation length spans {coarse} (better {FINE:g} or more): {ROUGHLY}"
-        )
+        warn_accuracy(f"the nucleation length spans {coarse} (better {FINE:g} or more): {ROUGHLY}")
 
 
 class PlaneSolver:
