@@ -46,7 +46,7 @@ def test_strength_along_one_axis_equals_the_line(solid, mode):
     # The multiplier is that of a load 1e-10 off; its own error goes with the root of the gap.
     assert summed == pytest.approx(exact["sensitivity"].values, abs=1e-4 * summed.max())
     assert float(found["slip"].std(still).max()) < 1e-6 * float(found["slip"].max())
-    # The line's patch is all of a run, the plane's is where y is above a tenth of its largest value.
+    # The line's patch is all of a run, the plane's where y is above a tenth of its largest value.
     place = found["critical_position"].sel(direction=along).values
     assert np.abs(place - exact["critical_position"].values).max() < 2.0 * length / nodes
     extent = found["critical_patch_extent"]

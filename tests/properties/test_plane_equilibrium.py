@@ -72,12 +72,13 @@ def test_sensitivity_is_the_gradient_of_the_mean_stress(solid):
     strength = strength_of(1)
     method = st.Equilibrium(gap=1e-10, sensitivity=True)
     found = st.onset(problem, strength, method=method)
-    direction = 10.0 * (smooth(8, 1.0) - 0.3)
+    direction = smooth(8, 1.0) - 0.3
     ends = np.array([strength + direction, strength - direction])
     up, down = st.onset(problem, ends, method=method)["first_instability"].values
     slope = (found["sensitivity"].values[0] * direction).sum()
-    # A step of 1e-5 of the strength moves the onset by 1e-5 of it, known to 1e-10.
-    assert 0.5 * (up - down) == pytest.approx(slope, rel=1e-3)
+    # A step of 1e-6 of the strength, since with longer ones nodes join; loads are known to 1e-10,
+    # and to better where, as here, it is the same bound that decides.
+    assert 0.5 * (up - down) == pytest.approx(slope, rel=1e-5)
     # Under a uniform load it sums to one.
     weighted = (found["sensitivity"].values[0] * problem.load.profile).sum()
     assert weighted == pytest.approx(problem.load.profile.mean(), rel=1e-12)

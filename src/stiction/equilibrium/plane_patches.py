@@ -76,7 +76,7 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):
-        start, length = _span(mask.any(axis=1 - axis), int(peak[axis]))
+        start, length = _span(np.any(mask, axis=1 - axis), int(peak[axis]))
         profile = np.where(mask, weight, 0.0).sum(axis=1 - axis)
         n = mask.shape[axis]
         along = profile[(start + np.arange(length)) % n]

@@ -63,7 +63,7 @@ def draw_plane_onset(problem: Problem, tau_p: Array, results: Mapping[str, xr.Da
         ratio = _relative_height(problem)
         heights = 0.9 * PAGE * ratio + 1.7, 2.0 * (0.44 * PAGE * ratio + 0.3) + 1.0
         figure = new_figure(PAGE, sum(heights))
-        parts = figure.subfigures(2, 1, height_ratios=heights)
+        parts: Any = figure.subfigures(2, 1, height_ratios=heights)
     else:
         figure = new_figure(PAGE, 0.46 * PAGE * _relative_height(problem) + 1.7)
         parts = figure.subfigures(1, 2, width_ratios=(1.0, 0.96))
