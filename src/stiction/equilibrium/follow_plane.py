@@ -16,7 +16,6 @@ from stiction.equilibrium.conjugate_gradients import inner
 from stiction.equilibrium.least_equilibrium import (
     AT_FLOOR,
     BALANCED,
-    SLIDING,
     UNDECIDED,
     PlaneSample,
     Relaxed,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from stiction.errors import InputError
 from stiction.report.style import PAGE, color, new_figure, panel, paper_style, save_figure, series
+from stiction.results import DIRECTION
 from stiction.statistics.densities import density
 from stiction.statistics.quantiles import quantiles
 from stiction.stored_run import StoredRun
@@ -91,7 +92,12 @@ def _single(result: xr.Dataset) -> Figure:
     figure = new_figure(PAGE, 2.6)
     left, right = figure.subplots(1, 2)
     _density_curve(left, _finite(result["critical_stress"]) * 1e-6, None, 0)
-    _histogram(right, _finite(result["critical_position"]) * 1e3, None, 0)
+    if DIRECTION in result.dims:
+        for number, dim in enumerate(result[DIRECTION].values):
+            _histogram(right, _positions(result, str(dim)), f"${dim}$", number)
+        right.legend()
+    else:
+        _histogram(right, _positions(result), None, 0)
     _finish(left, right)
     return figure
 
@@ -104,8 +110,8 @@ def _densities(result: xr.Dataset, along: str) -> Figure:
         part = result.isel({along: step})
         label = _shown(result[along][step])
         _density_curve(left, _finite(part["critical_stress"]) * 1e-6, label, number)
-        _histogram(right, _finite(part["critical_position"]) * 1e3, label, number)
-    _finish(left, right)
+        _histogram(right, _positions(part), label, number)
+    _finish(left, right, " along $x$" if DIRECTION in result.dims else "")
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, title=_label(result[along]))
     return figure
@@ -128,11 +134,17 @@ def _histogram(axes: Axes, values: NDArray[np.float64], label: str | None, numbe
         axes.stairs(counts, edges, label=label, **series(number))
 
 
-def _finish(left: Axes, right: Axes) -> None:
+def _positions(result: xr.Dataset, dim: str = "x") -> NDArray[np.float64]:
+    """Critical positions, mm; on a plane those along one direction."""
+    place = result["critical_position"]
+    return _finite(place.sel({DIRECTION: dim}) if DIRECTION in place.dims else place) * 1e3
+
+
+def _finish(left: Axes, right: Axes, along: str = "") -> None:
     left.set_xlabel("critical stress (MPa)")
     left.set_ylabel("density (1/MPa)")
     left.set_ylim(bottom=0.0)
-    right.set_xlabel("critical position (mm)")
+    right.set_xlabel(f"critical position{along} (mm)")
     right.set_ylabel("density (1/mm)")
     right.set_ylim(bottom=0.0)
     panel(left, "a")
