@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stiction as st
+from stiction.equilibrium.plane_onset import Plane, plane_onset
 
 RATE = 0.5e12
 LENGTH = 3.46e-3  # nucleation length h_n along x
@@ -179,3 +180,45 @@ def test_discretization_error_is_of_the_size_of_the_error(solid):
     # The estimate is meant to be twice the error at most, and not a hundred times as much.
     assert (error < 2.0 * estimate).mean() >= 0.75
     assert np.sqrt((estimate**2).mean()) < 30.0 * np.sqrt((error**2).mean())
+
+
+def rough_case(seed):
+    """A strength that changes from node to node, on a grid of few nodes in h_n."""
+    rng = np.random.default_rng(seed)
+    nu = rng.choice([0.0, 0.2, 0.33, 0.45])
+    nucleation = 2.0 * 0.57889 * 1e9 / (1.0 - nu) / RATE
+    shape = tuple(int(n) for n in rng.choice([16, 24, 32, 48, 64], 2))
+    few = rng.uniform(1.5, 6.0, 2)
+    lengths = (shape[0] * nucleation / few[0], shape[1] * nucleation * (1.0 - nu) / few[1])
+    strength = rng.uniform(0.66e6, 0.66e6 + rng.choice([1e4, 1e5, 1e6, 1e7]), shape)
+    profile = np.ones(shape) if seed % 2 else rng.uniform(0.8, 1.3, shape)
+    rate = RATE * (np.ones(shape) if seed % 3 else rng.uniform(0.3, 1.0, shape))
+    return Plane(lengths, 1e9, nu, "lattice"), strength, profile, rate
+
+
+# In these no eigenvector of an unstable set bounds the onset closely: cuts do.
+@pytest.mark.parametrize("seed", [32, 104, 224, 283, 293])
+def test_bounds_of_a_lattice_meet_however_rough_the_strength(seed):
+    plane, strength, profile, rate = rough_case(seed)
+    found = plane_onset(plane, strength, profile, rate, 1e-6)
+    assert found.closed
+    assert 0.0 <= found.upper - found.lower <= 1e-6 * found.upper
+    best = plane_onset(plane, strength, profile, rate, 1e-9)
+    assert best.closed
+    # Bounds of one number, whatever they were computed with.
+    assert best.lower <= found.upper * (1.0 + 1e-12)
+    assert best.upper >= found.lower * (1.0 - 1e-12)
+
+
+def test_spectral_bounds_hold_where_they_do_not_meet():
+    closed = []
+    for seed in range(30):
+        plane, strength, profile, rate = rough_case(seed)
+        lattice = plane_onset(plane, strength, profile, rate, 1e-4)
+        spectral = plane_onset(plane._replace(wavenumbers="spectral"), strength, profile, rate)
+        closed.append(spectral.closed)
+        assert spectral.lower <= spectral.upper
+        # Far fewer nodes than it takes: they agree to the error of such a grid.
+        assert spectral.lower < 1.5 * lattice.upper
+        assert spectral.upper > 0.6 * lattice.lower
+    assert 10 < sum(closed) < 30

@@ -76,8 +76,8 @@ class Equilibrium:
         Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are always
         solved to round-off.
     wavenumbers : {"spectral", "lattice"}
-        Of planes: those of the nodes, most accurate, or of a lattice, (2/h) sin(k h/2), for which
-        the theory holds without exception; see `docs/planes-equilibrium.md`.
+        Of planes: those of the nodes, most accurate, or of a lattice, (2/h) sin(k h/2), whose
+        bounds always meet, at a larger error; see `docs/planes-equilibrium.md`.
 
     Notes
     -----

@@ -14,6 +14,7 @@ from stiction._typing import Array
 from stiction.equilibrium.conjugate_gradients import NEGATIVE, SOLVED
 from stiction.equilibrium.controlled_equilibrium import equilibrate
 from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
+from stiction.equilibrium.minimal_cut import Cutter
 from stiction.equilibrium.onset_certificates import (
     lifting_field,
     lower_bound,
@@ -106,7 +107,9 @@ def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Arr
     return Bracket(make_operator(symbol, rate, excess.shape), excess, profile)
 
 
-def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Array:
+def bisect(
+    bracket: Bracket, gap: float, accuracy: float, steps: int = 60, cuts: bool = False
+) -> Array:
     """Narrow a bracket to a relative gap; returns the last unstable direction, unit norm.
 
     Parameters
@@ -118,6 +121,9 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
     accuracy : float
         Largest residual stress as a share of the mean strength.
     steps : int
+    cuts : bool
+        Prove each load without equilibrium to be one, also where its eigenvector does not, or find
+        its equilibrium where the set of slipping nodes was taken too large.
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     none = np.zeros_like(excess)
@@ -151,4 +157,11 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
         if value <= 0.0:
             direction = np.maximum(vector, 0.0)
             high = min(high, bracket.raise_multiplier(vector))
+        if cuts and bracket.upper > load:
+            cutter = Cutter(operator, accuracy * bracket.scale)
+            y, slip = cutter.cut(load * profile - excess, stable)
+            if y is not None:
+                high = min(high, bracket.raise_multiplier(y))
+            elif bracket.raise_slip(slip) > low:  # it was the rough solutions that looked unstable
+                low, high, stable = bracket.lower, bracket.upper, bracket.slip.copy()
     return direction

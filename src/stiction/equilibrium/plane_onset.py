@@ -88,15 +88,15 @@ def narrow(bracket: Bracket, gap: float) -> float:
     """Close a bracket from nothing: bisection until Newton's method succeeds; returns the bend."""
     share = 5e-3
     bend = 0.0
+    cuts = False
     while not bracket.closed(gap):
         before = bracket.gap
-        direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
-        if share <= 0.1 * gap:
-            break
-        closed, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
-        if not closed and share < 1e-3 and bracket.gap > 0.5 * before:
+        direction = bisect(bracket, share, 0.05 * min(share, 1e-4), cuts=cuts)
+        if cuts and not bracket.closed(2.0 * share):
             break  # the bounds of a stiffness that is no Z-matrix may not meet
-        share *= 0.2
+        closed, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
+        cuts = cuts or (not closed and share <= 1e-3 and bracket.gap > 0.5 * before)
+        share = max(0.2 * share, 0.1 * gap)
     return bend
 
 

@@ -182,10 +182,12 @@ class PlaneSolver:
         magnitude = np.maximum(np.abs(load), 1e-300)
         wide = np.flatnonzero(certified & ~(gap <= OPEN * self.gap * magnitude))
         if wide.size:
+            spectral = self.plane.wavenumbers == "spectral"
+            advice = "take more nodes" + ", or wavenumbers='lattice'" * spectral
             warn_accuracy(
                 f"the bounds of the first instability did not close to {self.gap:g} of it in"
                 f" {wide.size} of {gap.size} samples ({listed(wide)}): they hold, and are up to"
-                f" {(gap / magnitude)[wide].max():.2g} of it apart; take more nodes"
+                f" {(gap / magnitude)[wide].max():.2g} of it apart; {advice}"
             )
         free = np.flatnonzero(~certified)
         if free.size:

@@ -73,7 +73,10 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     if status != SOLVED:
         return None
     slope = np.where(inside, guess.slope, 0.0)
-    slope *= 1.0 / (spring * inner(held, slope))
+    share = inner(held, slope)
+    if not share > 0.0:  # none of the patch slips any more
+        return None
+    slope *= 1.0 / (spring * share)
     residual_of(operator, spring, held, held, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
@@ -92,9 +95,11 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     )  # fmt: skip
 
 
-def other_patch(bracket: Bracket) -> Array:
-    """The patch that became unstable beside the one that was held, unit norm."""
-    vector = np.abs(bracket.room[1])
+def other_patch(bracket: Bracket) -> Array | None:
+    """The patch that became unstable beside the one that was held, unit norm; None if none did."""
+    vector = np.where(bracket.inside, np.abs(bracket.room[1]), 0.0)
+    if not vector.any():
+        return None
     value, taken = lowest_eigenvector(
         bracket.operator, bracket.inside, vector, 1e-3 * float(bracket.operator.rate.max()), 12
     )
@@ -189,9 +194,10 @@ def close(
         state = hold(bracket, held, guess, accuracy)
         if state is None:
             switches += 1
-            if switches > SWITCHES:
+            other = other_patch(bracket)
+            if switches > SWITCHES or other is None:
                 break
-            held = other_patch(bracket)
+            held = other
             load = min(guess.load, bracket.upper)
             load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
             slip = slip if first is None else first.slip
