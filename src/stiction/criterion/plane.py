@@ -98,18 +98,16 @@ class PlaneSolver:
         cell = np.array(problem.interface.spacings)
         load, aspect, area = (np.empty(samples.samples) for _ in range(3))
         place, extent = np.empty((samples.samples, 2)), np.empty((samples.samples, 2))
-        for number, rate in enumerate(rates):
+        for rate in np.unique(rates):
             windows = windows_of(problem, float(rate))
-            found = local_onset(windows, excess[number], samples.load_profile)
-            window = windows[found.window]
-            # The weights keep to this bound; only the rounding of the transforms may not.
-            least = float((excess[number] / samples.load_profile).min())
-            load[number], place[number] = max(found.load, least), found.node * cell
-            aspect[number], area[number], extent[number] = (
-                window.aspect,
-                window.area,
-                window.extents,
-            )
+            for number in np.flatnonzero(rates == rate):
+                found = local_onset(windows, excess[number], samples.load_profile)
+                # The weights keep to this bound; only the rounding of the transforms may not.
+                least = float((excess[number] / samples.load_profile).min())
+                load[number], place[number] = max(found.load, least), found.node * cell
+                window = windows[found.window]
+                aspect[number], area[number] = window.aspect, window.area
+                extent[number] = window.extents
         stress = samples.mean_stress(load)
         return {
             "critical_load": load,
