@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from stiction._progress import Meter, duration
@@ -142,7 +143,8 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
             for key in ("critical_stress", "critical_load", "first_instability")
         )
         mark = " *" if _in_gap(result) else ""
-        place = f"{float(result['critical_position'][0]) * 1e3:.4f} mm{mark}"
+        at = np.atleast_1d(result["critical_position"].values[0])
+        place = ", ".join(f"{float(one) * 1e3:.4f}" for one in at) + f" mm{mark}"
         row = [name, stress, load, first, place, duration(seconds)]
         if with_coefficient:
             row.insert(2, f"{float(result['friction_coefficient'][0]):.6f}")

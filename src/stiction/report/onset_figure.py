@@ -15,6 +15,7 @@ from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed
 from stiction.problem import Problem
+from stiction.report.plane_figures import draw_plane_onset
 from stiction.report.style import (
     PAGE,
     PALE,
@@ -43,11 +44,13 @@ def draw_onset(
     Parameters
     ----------
     problem : Problem
-    tau_p : (nodes,) array
+    tau_p : (*shape) array
         Pa.
     results : mapping of Dataset
         By the type of the method, one sample each.
     """
+    if problem.interface.is_plane:
+        return draw_plane_onset(problem, tau_p, results, NAMES)
     figure = new_figure(PAGE, 2.8)
     axes = figure.subplots()
     x = problem.interface.x * 1e3
