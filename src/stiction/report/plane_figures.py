@@ -17,7 +17,7 @@ from stiction._typing import Array
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.report.style import COLUMN, PAGE, marker, new_figure, panel, paper_style
+from stiction.report.style import COLUMN, PAGE, color, marker, new_figure, panel, paper_style
 
 _MAP = "cividis"
 _EDGE = "white"
@@ -29,7 +29,7 @@ NEAR = 2.0
 def _image(figure: Figure, axes: Axes, values: Array, box: Box, label: str) -> None:
     """A field of a plane (nx, ny), Pa, over `box` in the units of the axes."""
     drawn = axes.imshow(values.T * 1e-6, origin="lower", extent=box, cmap=_MAP)
-    figure.colorbar(drawn, ax=axes, label=label, shrink=0.85)
+    figure.colorbar(drawn, ax=axes, label=label, shrink=0.75)
 
 
 def draw_plane_onset(
@@ -79,9 +79,9 @@ def _mark(axes: Axes, result: xr.Dataset, number: int, name: str, lengths: list[
         y,
         linestyle="none",
         marker=marker(number),
-        markersize=6.0,
-        markerfacecolor="none",
-        markeredgecolor=_EDGE if number == 0 else f"C{number}",
+        markersize=5.0,
+        markerfacecolor=_EDGE,
+        markeredgecolor=color(number + 1),
         label=f"{name}: {load:.4f} MPa at ({x:.2f}, {y:.2f}) mm",
     )
     if "critical_aspect" not in result:
