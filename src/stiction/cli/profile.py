@@ -44,13 +44,6 @@ def profile_of(
     """The strength in a file, on the nodes of a problem."""
     from stiction.profiles import read_profile
 
-    if problem.interface.is_plane:
-        given = {
-            "--x": x, "--x-unit": x_unit, "--value": value, "--interpolate": interpolate,
-            "--fill-gaps": fill_gaps,
-        }  # fmt: skip
-        return _on_plane(path, problem, unit, [name for name, one in given.items() if one])
-
     def column(text: str | None) -> str | int | None:
         return int(text) if text is not None and text.isdecimal() else text
 
@@ -64,21 +57,3 @@ def profile_of(
         interpolate=interpolate,
         gaps="fill" if fill_gaps else "refuse",
     )
-
-
-def _on_plane(path: Path, problem: Any, unit: str | None, useless: list[str]) -> Any:
-    """The strength of a plane: a .npy file with one value a node."""
-    import xarray as xr
-
-    from stiction.errors import InputError
-    from stiction.profile_planes import read_plane
-    from stiction.units import factor_to
-
-    if useless:
-        raise InputError(
-            f"{', '.join(useless)}: of no use for a plane, whose profile is a .npy file with one"
-            " value a node"
-        )
-    factor = 1.0 if unit is None else factor_to("Pa", unit)
-    values = read_plane(path, problem.interface) * factor
-    return xr.DataArray(values, dims=problem.interface.dims, attrs={"units": "Pa"})

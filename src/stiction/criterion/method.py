@@ -71,7 +71,7 @@ class LocalCriterion:
         reasons = []
         if problem.interface.is_plane and self.weights != "exact":
             reasons.append(
-                f"weights = {self.weights!r} are those of a line; on a plane leave weights = 'exact'"
+                f"weights = {self.weights!r} are those of a line; on a plane leave them 'exact'"
             )
         rate = problem.friction.weakening_rate
         if rate is not None and problem.uniform_rate is None:

@@ -42,6 +42,14 @@ def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights =
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the moving average is a coarse sum."""
+    if problem.interface.is_plane:
+        problem.warn_if_coarse(
+            rows,
+            8.0,
+            "the local criterion takes the lowest node and critical patches of whole nodes, which"
+            " makes it about 0.15 % too high at 8 nodes, 0.4 % at 5 and 0.7 % at 4",
+        )
+        return
     problem.warn_if_coarse(
         rows,
         12.0,
@@ -69,6 +77,16 @@ def uniform_rates(rows: Sample) -> Array:
             " the local criterion does not hold, use st.Equilibrium() or st.Rupture()"
         )
     return np.ascontiguousarray(rows.weakening_rate.reshape(rows.samples, -1)[:, 0])
+
+
+def check_aspect(problem: Problem, weights: Weights, aspect: Any) -> None:
+    """Refuse the options of a plane on a line, and the other way round."""
+    plane = problem.interface.is_plane
+    if aspect is not None and not (plane and is_real(aspect) and 0.0 < aspect < np.inf):
+        valid = "a positive number" if plane else "left out on a line"
+        raise InputError(f"aspect: must be {valid}, got {describe(aspect)}")
+    if plane and weight_of(weights) is not exact_weight():
+        raise InputError("weights: 'rounded' is of a line; on a plane leave weights = 'exact'")
 
 
 def nucleation_stress(
@@ -107,12 +125,8 @@ def nucleation_stress(
         a critical patch is larger than the interface.
     """
     check_instance("problem", problem, Problem)
+    check_aspect(problem, weights, aspect)
     plane = problem.interface.is_plane
-    if aspect is not None and not (plane and is_real(aspect) and 0.0 < aspect < np.inf):
-        valid = "a positive number" if plane else "left out on a line"
-        raise InputError(f"aspect: must be {valid}, got {describe(aspect)}")
-    if plane and weight_of(weights) is not exact_weight():
-        raise InputError("weights: 'rounded' is of a line; on a plane leave weights = 'exact'")
     rows = problem.sample(tau_p)
     if problem.friction.weakening_rate is None:
         rate = float(uniform_rates(rows)[0])

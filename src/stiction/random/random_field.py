@@ -19,9 +19,9 @@ from stiction.interface import Interface
 from stiction.random.draws import block_of, standard_normal
 from stiction.random.hermite import correlation_of_mapped, hermite_coefficients, share_unaccounted
 from stiction.random.marginals import Marginal
+from stiction.random.modes import Modes, line_modes, plane_modes
 from stiction.random.quantile_table import from_normal
 from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
-from stiction.random.modes import Modes, line_modes, plane_modes
 from stiction.random.synthesis import gaussian_planes, gaussian_rows
 
 FEWEST_LENGTHS = 4.0

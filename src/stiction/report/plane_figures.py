@@ -1,217 +1,133 @@
-"""Maps of a plane: strength with what slips at the onset, and how patches grow until then."""
+"""Figures of planes: strength, nucleation stress and where each method sees it let go."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
-from pathlib import Path
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.colors import LinearSegmentedColormap, PowerNorm
-from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
 
 from stiction._typing import Array
-from stiction.equilibrium.path import equilibrium_path
-from stiction.equilibrium.plane_patches import critical_patch
+from stiction.criterion.nucleation import nucleation_stress
+from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.report.style import (
-    ACCENT,
-    INK,
-    PAGE,
-    color,
-    marker,
-    new_figure,
-    paper_style,
-    save_figure,
-)
+from stiction.report.style import COLUMN, PAGE, color, marker, new_figure, panel, paper_style
 
-SHARES = (0.9, 0.96, 0.99, 1.0 - 1e-5)
-"""Of the load of the first instability, at which the growth of patches is shown."""
-WIDE = 1.6
-"""Ratio of the lengths along x and y from which on the panels lie below each other."""
-_GREYS = LinearSegmentedColormap.from_list("pale greys", ["#6e6e6e", "#fbfbfb"])
-"""Light enough for outlines to be seen on it."""
-_BAR: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "pad": 0.02, "aspect": 40}
-_MILLI = 1e3
-_MEGA = 1e-6
+_MAP = "cividis"
+_EDGE = "white"
+Box = tuple[float, float, float, float]
+NEAR = 2.0
+"""Nucleation lengths on either side that are shown of weak spots."""
 
 
-def draw_plane_onset(problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]) -> Figure:
-    """Map of the strength with the onset by each method, and the growth of the slip patches.
+def _image(figure: Figure, axes: Axes, values: Array, box: Box, label: str) -> None:
+    """A field of a plane (nx, ny), Pa, over `box` in the units of the axes."""
+    drawn = axes.imshow(values.T * 1e-6, origin="lower", extent=box, cmap=_MAP)
+    figure.colorbar(drawn, ax=axes, label=label, shrink=0.75)
+
+
+def draw_plane_onset(
+    problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset], names: Mapping[str, str]
+) -> Figure:
+    """Strength and nucleation stress of a plane, with the onset by each method.
 
     Parameters
     ----------
     problem : Problem
-        On a plane.
     tau_p : (nx, ny) array
         Pa.
     results : mapping of Dataset
-        By the type of the method, one sample each. Patches are drawn if one of them has `slip` and
-        `sensitivity`.
+        By the type of the method, one sample each.
+    names : mapping of str
+        What methods are called, by their type.
     """
-    exact = next((r for r in results.values() if {"slip", "sensitivity"} <= set(r)), None)
-    lengths = problem.interface.lengths
-    below = lengths[0] > WIDE * lengths[1]
-    if exact is None:
-        figure = new_figure(0.6 * PAGE, 0.5 * PAGE * _relative_height(problem) + 1.6)
-        _draw_strength(figure, problem, tau_p, results, None)
-        return figure
-    if below:
-        ratio = _relative_height(problem)
-        heights = 0.9 * PAGE * ratio + 1.7, 2.0 * (0.44 * PAGE * ratio + 0.3) + 1.0
-        figure = new_figure(PAGE, sum(heights))
-        parts: Any = figure.subfigures(2, 1, height_ratios=heights)
-    else:
-        figure = new_figure(PAGE, 0.46 * PAGE * _relative_height(problem) + 1.7)
-        parts = figure.subfigures(1, 2, width_ratios=(1.0, 0.96))
-    _draw_strength(parts[0], problem, tau_p, results, exact)
-    loads = float(exact["first_instability"][0] - _initial(problem)) / _mean_profile(problem)
-    path = equilibrium_path(problem, tau_p, loads * np.array(SHARES))
-    draw_growth(parts[1], problem, path)
+    fields = [(tau_p, r"strength $\tau_p$ (MPa)")]
+    with suppress(InputError):  # without one critical patch the strength alone is shown
+        fields.append((nucleation_stress(problem, tau_p), r"nucleation stress $\tau_n$ (MPa)"))
+    lengths = [1e3 * length for length in problem.interface.lengths]
+    across = min(max(lengths[1] / lengths[0], 0.3), 1.5)
+    figure = new_figure(PAGE, 0.9 + 0.42 * PAGE * across)
+    panels = np.atleast_1d(figure.subplots(1, len(fields), sharey=True))
+    step = [1e3 * spacing for spacing in problem.interface.spacings]
+    # A pixel around each node; the first node is at the origin.
+    box = (-0.5 * step[0], lengths[0] - 0.5 * step[0], -0.5 * step[1], lengths[1] - 0.5 * step[1])
+    for letter, axes, (values, label) in zip("ab", panels, fields, strict=False):
+        _image(figure, axes, values, box, label)
+        for number, (name, result) in enumerate(results.items()):
+            _mark(axes, result, number, names.get(name, name), lengths)
+        axes.set_xlim(box[0], box[1])
+        axes.set_ylim(box[2], box[3])
+        axes.set_xlabel("$x$, along the slip (mm)")
+        panel(axes, letter)
+    panels[0].set_ylabel("$y$ (mm)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center")
     return figure
 
 
-def _initial(problem: Problem) -> float:
-    return float(np.mean(problem.load.initial_stress))
-
-
-def _mean_profile(problem: Problem) -> float:
-    return float(np.mean(problem.load.profile))
-
-
-def _relative_height(problem: Problem) -> float:
-    x, y = problem.interface.lengths
-    return float(np.clip(y / x, 0.2, 2.0))
-
-
-def _draw_strength(
-    figure: Any,
-    problem: Problem,
-    tau_p: Array,
-    results: Mapping[str, xr.Dataset],
-    exact: xr.Dataset | None,
-) -> None:
-    axes = figure.subplots()
-    image = _map(axes, problem, tau_p * _MEGA, cmap=_GREYS)
-    figure.colorbar(image, ax=axes, label=r"strength $\tau_p$ (MPa)", **_BAR)
-    handles = []
-    if exact is not None:
-        slips = exact["slip"].values[0] > 0.0
-        inside, _ = critical_patch(exact["sensitivity"].values[0], problem.interface.spacings)
-        _outline(axes, problem, slips, color(1), 0.9)
-        _outline(axes, problem, inside, ACCENT, 1.6)
-        handles = [
-            Line2D([], [], color=color(1), linewidth=0.9, label="slips at the first instability"),
-            Line2D([], [], color=ACCENT, linewidth=1.6, label="critical patch"),
-        ]
-    for number, (name, result) in enumerate(results.items()):
-        x, y = result["critical_position"].values[0] * _MILLI
-        (point,) = axes.plot(
-            x, y, linestyle="none", marker=marker(number), markersize=6.0 - number,
-            markerfacecolor="white", markeredgecolor=INK, markeredgewidth=1.1,
-            label=f"{_name(name)}: {float(result['critical_load'][0]) * _MEGA:.4f} MPa",
+def _mark(axes: Axes, result: xr.Dataset, number: int, name: str, lengths: list[float]) -> None:
+    x, y = (float(one) * 1e3 for one in result["critical_position"].values[0])
+    load = float(result["critical_load"][0]) * 1e-6
+    axes.plot(
+        x,
+        y,
+        linestyle="none",
+        marker=marker(number),
+        markersize=5.0,
+        markerfacecolor=_EDGE,
+        markeredgecolor=color(number + 1),
+        label=f"{name}: {load:.4f} MPa at ({x:.2f}, {y:.2f}) mm",
+    )
+    if "critical_aspect" not in result:
+        return
+    extent = result["critical_extent"].values[0] * 1e3
+    for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
+        axes.add_patch(
+            Ellipse(
+                (x + i * lengths[0], y + j * lengths[1]), *extent, fill=False, edgecolor=_EDGE,
+                linewidth=0.9,
+            )
         )  # fmt: skip
-        handles.append(point)
-    _label(axes)
-    figure.legend(handles=handles, loc="outside lower center", ncols=1)
 
 
-def _name(method: str) -> str:
-    from stiction.report.onset_figure import NAMES
-
-    return NAMES.get(method, method)
-
-
-def draw_growth(figure: Figure | SubFigure, problem: Problem, path: xr.Dataset) -> None:
-    """Slip at several loads, a panel each, on one scale of colours.
+def plane_weak_spot_figure(failing: xr.Dataset, nucleation_length: float) -> Figure:
+    """Mean strength of failing samples of a plane, each moved so that it lets go in the middle.
 
     Parameters
     ----------
-    figure : Figure or SubFigure
-        An empty one to draw on.
-    problem : Problem
-        On a plane.
-    path : Dataset
-        From `equilibrium_path`; loads at which the interface slides are left out.
+    failing : Dataset
+        `failing_profiles` of a `FailureProbability`.
+    nucleation_length : float
+        h_n, m; the unit of length.
     """
-    slip = path["slip"].values * 1e6
-    loads = path["load"].values
-    balanced = np.flatnonzero(~path["sliding"].values)
-    most = max(float(np.nanmax(slip[balanced])), 1e-300) if balanced.size else 1.0
-    columns = 2 if balanced.size > 1 else 1
-    rows = max(1, -(-balanced.size // columns))
-    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).reshape(-1)
-    for axes in panels[balanced.size :]:
-        axes.set_axis_off()
-    image = None
-    for axes, number in zip(panels, balanced, strict=False):
-        # Slip grows steeply with the load: a root shows small patches beside the last ones.
-        image = _map(
-            axes, problem, slip[number], cmap="viridis", norm=PowerNorm(0.4, vmin=0.0, vmax=most)
-        )
-        moving = slip[number] > 0.0
-        _outline(axes, problem, moving, "white", 0.4)
-        share = 100.0 * moving.mean()
-        axes.set_title(
-            rf"$\tau_0$ = {loads[number] * _MEGA:.4f} MPa, {share:.2g} % slips", fontsize=7.5
-        )
-        _label(axes)
-        axes.label_outer()
-    if image is not None:
-        ticks = [0.0, *(float(f"{most * share:.1g}") for share in (0.01, 0.1, 0.4, 1.0))]
-        ticks = [tick for tick in ticks if tick <= most]
-        figure.colorbar(
-            image, ax=list(panels), label=r"slip ($\mu$m)", ticks=ticks, format="%g", **_BAR
-        )
-
-
-def _map(axes: Any, problem: Problem, field: Array, **options: Any) -> Any:
-    """A field (nx, ny) with x to the right and y upwards; a node is the centre of its cell."""
-    return axes.imshow(
-        field.T, origin="lower", extent=_edges(problem), interpolation="nearest", aspect="equal",
-        **options,
-    )  # fmt: skip
-
-
-def _edges(problem: Problem) -> tuple[float, float, float, float]:
-    (x, y), (dx, dy) = problem.interface.lengths, problem.interface.spacings
-    left, right, bottom, top = -0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy
-    return left * _MILLI, right * _MILLI, bottom * _MILLI, top * _MILLI
-
-
-def _outline(axes: Any, problem: Problem, mask: NDArray[np.bool_], ink: str, width: float) -> None:
-    """The border of a set of nodes, closed across the borders of the map."""
-    if not mask.any() or mask.all():
-        return
-    padded = np.pad(mask.astype(float), 1, mode="wrap")
-    (dx, dy), (nx, ny) = problem.interface.spacings, mask.shape
-    x, y = np.arange(-1, nx + 1) * dx * _MILLI, np.arange(-1, ny + 1) * dy * _MILLI
-    axes.contour(x, y, padded.T, levels=[0.5], colors=[ink], linewidths=[width])
-    left, right, bottom, top = _edges(problem)
-    axes.set_xlim(left, right)
-    axes.set_ylim(bottom, top)
-
-
-def _label(axes: Any) -> None:
-    axes.set_xlabel("$x$ (mm), direction of slip")
-    axes.set_ylabel("$y$ (mm)")
-
-
-def write_plane_onset(
-    problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset], path: Path
-) -> None:
-    """`draw_plane_onset` as a file."""
+    places = [failing[dim].values for dim in ("x", "y")]
+    spacings = [float(place[1] - place[0]) for place in places]
+    middle = [place.size // 2 for place in places]
+    positions = failing["critical_position"].values
+    total: Any = 0.0
+    for strength, at in zip(failing["strength"].values, positions, strict=True):
+        shift = [m - round(float(a) / h) for m, a, h in zip(middle, at, spacings, strict=True)]
+        total = total + np.roll(strength, shift, (0, 1)) / positions.shape[0]
+    reach = [
+        min(m, max(1, int(NEAR * nucleation_length / h)))
+        for m, h in zip(middle, spacings, strict=True)
+    ]
+    near = total[
+        middle[0] - reach[0] : middle[0] + reach[0] + 1,
+        middle[1] - reach[1] : middle[1] + reach[1] + 1,
+    ]
+    ends = [(r + 0.5) * h / nucleation_length for r, h in zip(reach, spacings, strict=True)]
     with paper_style():
-        save_figure(draw_plane_onset(problem, tau_p, results), path)
-
-
-def write_growth(problem: Problem, path: xr.Dataset, file: Path) -> None:
-    """`draw_growth` as a file."""
-    rows = max(1, -(-int((~path["sliding"].values).sum()) // 2))
-    with paper_style():
-        figure = new_figure(PAGE, 0.5 * PAGE * _relative_height(problem) * rows + 1.2)
-        draw_growth(figure, problem, path)
-        save_figure(figure, file)
+        figure = new_figure(COLUMN * 1.2, 2.7)
+        axes = figure.subplots()
+        box = (-ends[0], ends[0], -ends[1], ends[1])
+        _image(figure, axes, near, box, "mean strength (MPa)")
+        axes.set_xlabel(r"$(x - x_{\mathrm{cr}})/h_n$")
+        axes.set_ylabel(r"$(y - y_{\mathrm{cr}})/h_n$")
+    return figure
