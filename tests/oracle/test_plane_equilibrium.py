@@ -143,6 +143,20 @@ def test_arrest_equals_relaxation_node_by_node(wide):
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
+def test_what_moves_next_to_nothing_is_no_instability(wide, wavenumbers):
+    # On the way nodes reach their residual strength one by one, which looks unstable to long steps.
+    problem, _ = wide
+    shape = problem.interface.shape
+    strength = 0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(5), shape)
+    found = st.onset(problem, strength, method=st.Equilibrium(wavenumbers=wavenumbers))
+    assert found["arrested_events"].item() == 1
+    first, last = found["first_instability"].item(), found["critical_load"].item()
+    # 1.01045 and 1.01046: stopping at the first step that looked unstable gave 1.01224.
+    assert last / first == pytest.approx(1.01045, abs=2e-4)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_path_balances_where_it_slips(wide):
     problem, strength = wide
     path = st.equilibrium_path(problem, strength[2], np.array([5e5, 8e5, 1e6]))

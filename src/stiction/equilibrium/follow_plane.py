@@ -163,15 +163,18 @@ def follow_plane(plane: Plane, sample: PlaneSample, gap: float = 1e-6) -> PlaneP
         else:
             stable, beyond, before, relaxed = _step_on(operator, sample, load, slip, gap)
             direction = _direction(operator, sample, before, relaxed.slip)
-        if path is None:
-            upper = found.upper if found is not None else beyond
-            path = PlanePath(stable, upper, before, direction, found is not None)
-        if relaxed.status != BALANCED:
-            path.load, path.outcome = stable, relaxed.status
-            path.sliding_slip, path.sliding_direction = before, direction
-            return path
+        slides = relaxed.status != BALANCED
         weakens = sample.critical > 0.0
-        if (relaxed.slip - before > MOVED * sample.critical)[weakens].any():
+        moved = slides or bool((relaxed.slip - before > MOVED * sample.critical)[weakens].any())
+        if moved:
+            if path is None:
+                proved = found is not None and not at_residual(sample, slip)[weakens].any()
+                upper = beyond if found is None else found.upper
+                path = PlanePath(stable, upper, before, direction, proved)
+            if slides:
+                path.load, path.outcome = stable, relaxed.status
+                path.sliding_slip, path.sliding_direction = before, direction
+                return path
             path.events.append(PlaneEvent(stable, before, relaxed.slip))
         load, slip = beyond, relaxed.slip
 
