@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,6 @@ from stiction.report.style import (
     color,
     marker,
     new_figure,
-    paper_style,
-    save_figure,
 )
 
 SHARES = (0.9, 0.96, 0.99, 1.0 - 1e-5)
@@ -186,12 +183,3 @@ def _outline(axes: Any, problem: Problem, mask: NDArray[np.bool_], ink: str, wid
 def _label(axes: Any) -> None:
     axes.set_xlabel("$x$ (mm), direction of slip")
     axes.set_ylabel("$y$ (mm)")
-
-
-def write_growth(problem: Problem, path: xr.Dataset, file: Path) -> None:
-    """`draw_growth` as a file."""
-    rows = max(1, -(-int((~path["sliding"].values).sum()) // 2))
-    with paper_style():
-        figure = new_figure(PAGE, 0.5 * PAGE * _relative_height(problem) * rows + 1.2)
-        draw_growth(figure, problem, path)
-        save_figure(figure, file)
