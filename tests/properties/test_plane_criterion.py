@@ -133,13 +133,13 @@ def test_variance_ratios_on_an_infinite_plane_and_their_limits(plane):
 
 def test_failure_probability_is_that_of_counting(plane):
     field = field_of()
-    options = {"method": METHOD, "progress": False, "target_cov": 0.15}
+    options = {"method": METHOD, "progress": False, "target_cov": 0.25}
     onsets = st.monte_carlo(
-        plane, field, method=METHOD, samples=6000, seed=9, progress=False
+        plane, field, method=METHOD, samples=3000, seed=9, progress=False
     ).critical_stress.values
     stress = float(np.quantile(onsets, 0.01))
     counted = 0.01
-    own = 1.0 / np.sqrt(60.0)
+    own = 1.0 / np.sqrt(30.0)
     for algorithm in ("subset", "importance"):
         found = st.failure_probability(plane, field, stress, algorithm=algorithm, seed=1, **options)
         error = np.hypot(own, found.coefficient_of_variation)
@@ -155,12 +155,12 @@ def test_failure_probability_is_that_of_counting(plane):
 def test_dips_count_the_onsets_that_are_low(plane):
     """Euler characteristic against onsets of other samples, where it says it can."""
     field = field_of(1.0)
-    rice = st.rice_distribution(plane, field, profiles=1500, seed=3)
+    rice = st.rice_distribution(plane, field, profiles=1000, seed=3)
     onsets = st.monte_carlo(
-        plane, field, method=METHOD, samples=3000, seed=4, progress=False
+        plane, field, method=METHOD, samples=1500, seed=4, progress=False
     ).critical_stress.values
     seen = 0
-    for stress in rice.stress[rice.trusted][::5]:
+    for stress in rice.stress[rice.trusted][::2]:
         share = float(np.mean(onsets <= stress))
         error = np.sqrt(share / onsets.size + share / rice.profiles)
         chance = rice.failure_probability(stress)

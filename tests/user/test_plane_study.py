@@ -102,3 +102,58 @@ def test_commands(path, tmp_path):
     assert (run / "figures" / "densities.png").stat().st_size > 10_000
     command("report", run)
     assert "30" in (run / "report.html").read_text()
+
+
+def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
+    """Names decide, whatever the order; units are converted; what is elsewhere is refused."""
+    plan = st.Study.from_toml(path).plans[0]
+    plane = plan.problem.interface
+    tau_p = plan.random.strength.sample(plane, seed=1)[0]
+    turned = xr.DataArray(
+        tau_p.T * 1e-6,
+        dims=("y", "x"),
+        coords={
+            "x": ("x", plane.x * 1e3, {"units": "mm"}),
+            "y": ("y", plane.coordinates["y"]),
+        },
+        attrs={"units": "MPa"},
+        name="strength",
+    )
+    plain, labelled = (
+        st.onset(plan.problem, given, method=st.LocalCriterion()) for given in (tau_p, turned)
+    )
+    # Conversion of units rounds.
+    np.testing.assert_allclose(plain.critical_load, labelled.critical_load, rtol=1e-14)
+    turned.to_netcdf(tmp_path / "strength.nc")
+    np.save(tmp_path / "strength.npy", tau_p)
+    np.save(tmp_path / "turned.npy", tau_p.T)
+    for name in ("strength.nc", "strength.npy"):
+        read = st.read_profile(tmp_path / name, interface=plane)
+        assert read.dims == ("x", "y")
+        np.testing.assert_allclose(read, tau_p, rtol=1e-14)
+    with pytest.raises(st.InputError, match="x and y have changed places"):
+        st.read_profile(tmp_path / "turned.npy", interface=plane)
+    with pytest.raises(st.InputError, match=r"call them 'x', .* and 'y'"):
+        st.onset(plan.problem, turned.rename(x="u"), method=st.LocalCriterion())
+    elsewhere = turned.assign_coords(y=2.0 * plane.coordinates["y"])
+    with pytest.raises(st.InputError, match="y reaches from 0 to"):
+        st.onset(plan.problem, elsewhere, method=st.LocalCriterion())
+    figure = tmp_path / "onset.png"
+    options = "--method", "local_criterion", "--out", figure
+    text = command("onset", path, "--strength", tmp_path / "strength.nc", *options)
+    assert f"{plain.critical_load.item() * 1e-6:.6f} MPa" in text
+    assert figure.stat().st_size > 10_000
+
+
+def test_failing_profiles_are_drawn(path):
+    from stiction.report.reliability_figures import weak_spot_figure
+
+    plan = st.Study.from_toml(path).plans[0]
+    found = st.failure_probability(
+        plan.problem, plan.random, 0.72e6, method=plan.method, algorithm="plain",
+        target_cov=0.5, max_evaluations=300, progress=False,
+    )  # fmt: skip
+    assert found.failing_profiles.sizes["sample"] >= 2
+    axes = weak_spot_figure(found.failing_profiles, plan.problem.nucleation_length, 0.72e6).axes[0]
+    middle = axes.images[0].get_array()
+    assert middle.min() < 0.9 * middle.mean()

@@ -85,8 +85,8 @@ def too_small(problem: Problem, rate: float, aspect: float) -> InputError:
     size = " x ".join(f"{one:.4g}" for one in grid.lengths)
     return InputError(
         f"interface.length: a critical patch of aspect {aspect:.3g} does not fit on a plane of"
-        f" {size} m (about twice the nucleation length, {length:.4g} m, is needed in each"
-        " direction); the local criterion does not hold there, use st.Equilibrium()"
+        f" {size} m (in each direction nearly twice the nucleation length, {length:.4g} m, is"
+        " needed); the local criterion does not hold there, use st.Equilibrium()"
     )
 
 
