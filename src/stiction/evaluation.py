@@ -205,9 +205,9 @@ def onset(
         Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane (samples, nx,
         ny) or (nx, ny); or several profiles by name, such as ``{"strength": ...,
         "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`. Of a
-        DataArray or Dataset the dimension 'x' runs along the interface, its coordinate (m) decides
-        where a value belongs, and `units` that are stated are converted; see
-        `stiction.read_profile`.
+        DataArray or Dataset the dimension 'x' runs along the interface (on a plane 'x' and 'y'),
+        its coordinate (m) decides where a value belongs, and `units` that are stated are converted;
+        see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
     gaps : {"refuse", "fill"}

@@ -21,6 +21,7 @@ from stiction._netcdf import write_dataset
 from stiction._progress import Meter
 from stiction.ensemble.files import cannot_write
 from stiction.errors import InputError, warn_accuracy
+from stiction.results import DIRECTION
 
 ROWS = 2**14
 OVERHEAD = 2**16
@@ -129,13 +130,17 @@ def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
         By ``name (unit)``: what is swept, the sample number, what was found.
     """
     named = {str(name): variable for name, variable in result.data_vars.items()}
-    narrow = {name: v for name, v in named.items() if not {"x", "kept_sample"} & set(v.dims)}
+    narrow = {name: v for name, v in named.items() if not {"x", "y", "kept_sample"} & set(v.dims)}
     wide = sorted(named.keys() - narrow.keys())
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: profiles along the interface do not fit into a table of samples"
             " and are left out; .nc holds them"
         )
+    for name, v in list(narrow.items()):
+        if DIRECTION in v.dims:  # a column for each component
+            del narrow[name]
+            narrow |= {f"{name}_{c.item()}": v.sel({DIRECTION: c}) for c in v[DIRECTION]}
     dims = tuple(dict.fromkeys(dim for v in narrow.values() for dim in v.dims))
     sizes = {dim: result.sizes[dim] for dim in dims}
     along = {str(name): v.variable for name, v in result.coords.items() if set(v.dims) <= set(dims)}

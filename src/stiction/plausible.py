@@ -55,7 +55,7 @@ def suspects(problem: Problem, ratio: float, strength: float | None = None) -> s
     """Which single value in another unit would bring L/h_n = `ratio` to where it usually is."""
     friction = problem.friction
     values = {
-        "problem.interface.length": problem.interface.extent,
+        "problem.interface.length": min(problem.interface.lengths),
         "problem.solid.shear_modulus": problem.solid.shear_modulus,
         "problem.friction.weakening_rate": friction.weakening_rate,
         "problem.friction.critical_slip": friction.critical_slip,
@@ -126,7 +126,7 @@ def warn_of_units(problem: Problem, strength: float, residual: float = 0.0) -> N
 
 def warn_of_length(problem: Problem, patch: float, strength: float | None = None) -> None:
     """Warn where the critical patch (m) fills the interface."""
-    length = problem.interface.extent
+    length = min(problem.interface.lengths)
     if patch < length:
         return
     _warn(

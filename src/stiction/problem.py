@@ -159,16 +159,20 @@ class Problem:
         Of a law that steepens with slip the steepest rate counts; on a plane the length across
         the slip, that of mode III, counts as well.
         """
+        return min(self._resolution(rate))
+
+    def _resolution(self, rate: float) -> list[float]:
+        """The same for each direction."""
         friction, interface = self.friction, self.interface
         steepest = rate * friction.steepest_slope / friction.initial_slope
         unit = 2.0 * SMALLEST_EIGENVALUE / steepest
         moduli = [self.effective_modulus]
         if interface.is_plane:
             moduli.append(self.solid.shear_modulus)
-        return min(
+        return [
             unit * modulus / spacing
             for modulus, spacing in zip(moduli, interface.spacings, strict=True)
-        )
+        ]
 
     def _too_few_nodes(self, highest_rate: float, strength: float | None = None) -> list[str]:
         resolution = self.nodes_in_nucleation_length(highest_rate)
@@ -190,11 +194,13 @@ class Problem:
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
-        if resolution < enough:
+        resolution = self._resolution(sample.steepest_rate)
+        if min(resolution) < enough:
+            nodes = f"{resolution[0]:.1f} nodes"
+            if self.interface.is_plane:
+                nodes = f"{nodes} along x and, in mode III, {resolution[1]:.1f} along y"
             warn_accuracy(
-                f"the nucleation length spans {resolution:.1f} nodes (better {enough:g} or more):"
-                f" {cost}"
+                f"the nucleation length spans {nodes} (better {enough:g} or more): {cost}"
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:

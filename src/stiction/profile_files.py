@@ -92,8 +92,8 @@ def read_npy(path: Path) -> Array:
     return np.squeeze(flat.reshape(shape, order="F" if column_major else "C"))
 
 
-def read_netcdf(path: Path) -> xr.Dataset:
-    """The variables along one dimension of a NetCDF file, loaded; units are left to the caller."""
+def read_netcdf(path: Path, dimensions: int = 1) -> xr.Dataset:
+    """The variables along one or two dimensions of a NetCDF file; units are left to the caller."""
     import xarray as xr
 
     try:
@@ -102,7 +102,9 @@ def read_netcdf(path: Path) -> xr.Dataset:
         with xr.open_dataset(
             path, engine="netcdf4", decode_times=False, decode_timedelta=False
         ) as opened:
-            chosen = opened[[name for name, one in opened.data_vars.items() if _fits(one)]]
+            chosen = opened[
+                [name for name, one in opened.data_vars.items() if _fits(one, dimensions)]
+            ]
             return chosen.squeeze(drop=True).load()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
@@ -110,7 +112,11 @@ def read_netcdf(path: Path) -> xr.Dataset:
         raise InputError(f"{path}: is no NetCDF file of numbers: {error}") from None
 
 
-def _fits(variable: Any) -> bool:
+def _fits(variable: Any, dimensions: int) -> bool:
     """Whether it is one profile of numbers, and small enough to be loaded."""
     along = [length for length in variable.shape if length != 1]
-    return variable.dtype.kind in "fiu" and len(along) == 1 and 8 * along[0] <= LARGEST
+    return (
+        variable.dtype.kind in "fiu"
+        and len(along) == dimensions
+        and 8 * math.prod(along) <= LARGEST
+    )

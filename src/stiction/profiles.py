@@ -18,6 +18,7 @@ from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
 from stiction.profile_text import Table, read_table
@@ -125,7 +126,8 @@ def read_profile(
         nothing is taken for a strength without one.
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
-        in any order and begin anywhere.
+        in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
+        shape (nx, ny), or from ``.nc`` or labelled arrays over 'x' and 'y'.
     interpolate : bool
         Whether points may lie elsewhere than the nodes; then linearly between them.
     gaps : {"refuse", "fill"}
@@ -159,6 +161,8 @@ def read_profile(
         raise InputError(f"interface: must be an Interface, got {describe(interface)}")
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
+    if interface is not None and interface.is_plane:
+        return _of_plane(name, source, quantity, interface, value, unit, (x, x_unit, strength))
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
@@ -180,6 +184,40 @@ def read_profile(
         coords[MEASURED] = ("x", measured, {"long_name": "measured, not filled in"})
     attributes = {"units": UNITS[quantity], "long_name": quantity.replace("_", " ")}
     return xr.DataArray(values, dims="x", coords=coords, name=quantity, attrs=attributes)
+
+
+def _of_plane(
+    name: str,
+    source: Any,
+    quantity: str,
+    interface: Interface,
+    value: Any,
+    unit: str | None,
+    others: tuple[Any, ...],
+) -> xr.DataArray:
+    """`read_profile` of a plane, which takes values at the nodes only."""
+    import xarray as xr
+
+    if any(other is not None for other in others):
+        raise InputError("x, x_unit and strength: are options of profiles of a line")
+    read = read_plane if isinstance(source, str | Path) else on_plane
+    given = Path(source) if isinstance(source, str | Path) else source
+    if read is on_plane and not is_labelled(source):
+        raise InputError(
+            f"source: must be a path, a DataArray or a Dataset, got {describe(source)}"
+        )
+    try:
+        values = read(given, quantity, UNITS[quantity], interface, value, unit)
+        if values.shape != interface.shape:
+            raise InputError(f"must hold one profile, got shape {values.shape}")
+    except InputError as error:
+        raise InputError([_prefixed(name, text) for text in error.problems]) from None
+    coords = {
+        dim: (dim, place, {"units": "m", "long_name": f"position along {dim}"})
+        for dim, place in interface.coordinates.items()
+    }
+    attributes = {"units": UNITS[quantity], "long_name": quantity.replace("_", " ")}
+    return xr.DataArray(values, dims=interface.dims, coords=coords, name=quantity, attrs=attributes)
 
 
 def _prefixed(name: str, text: str) -> str:
@@ -473,6 +511,8 @@ def at_nodes(
     """
     try:
         value = simplified(value, quantity)
+        if is_labelled(value) and interface.is_plane:
+            return AtNodes(on_plane(value, quantity, UNITS[quantity], interface), None)
         if is_labelled(value):
             points = labelled(value, quantity)
             if points.x is None and points.values.shape[1:] == (1,):  # one value a sample

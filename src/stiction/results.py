@@ -33,6 +33,14 @@ class Variable:
     long_name: str
     dims: tuple[str, ...] = ("sample",)
 
+    @property
+    def wide(self) -> bool:
+        """Whether a sample has one value a node, and not one or one a direction."""
+        return not set(self.dims[1:]) <= {DIRECTION}
+
+
+DIRECTION = "direction"
+"""Dimension of the components along x and y."""
 
 ONSET_VARIABLES: dict[str, Variable] = {
     "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
@@ -49,7 +57,7 @@ def along(interface: Interface, variable: Variable) -> Variable:
 
 def position(interface: Interface, variable: Variable) -> Variable:
     """The same variable as a place on the interface: on a plane it has two components."""
-    dims = (*variable.dims, "direction") if interface.is_plane else variable.dims
+    dims = (*variable.dims, DIRECTION) if interface.is_plane else variable.dims
     return replace(variable, dims=dims)
 
 
@@ -61,8 +69,8 @@ def onset_variables(interface: Interface) -> dict[str, Variable]:
 
 def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
     """Values and meaning of a dimension of the interface."""
-    if dim == "direction":
-        return np.array(interface.dims), Variable("", "direction of a component", ("direction",))
+    if dim == DIRECTION:
+        return np.array(interface.dims), Variable("", "direction of a component", (DIRECTION,))
     what = f"position along {dim}" if interface.is_plane else "position along the interface"
     return interface.coordinates[dim], Variable("m", what, (dim,))
 

@@ -39,6 +39,7 @@ from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError, StoreError
 from stiction.export import check_suffix, export
+from stiction.results import DIRECTION
 from stiction.study.study import Study
 
 FAILED = "failed_samples"
@@ -362,6 +363,10 @@ def _refuse_incomplete(folder: Path, state: Status) -> None:
         )
 
 
+INNER = ("sample", "kept_sample", "x", "y", DIRECTION)
+"""Dimensions of a result that no sweep adds."""
+
+
 def _outcomes_of(result: xr.Dataset, points: int) -> list[Outcome]:
     """A finished result as outcomes, one a point."""
     samples = result["sample"].values.astype(np.int64)
@@ -369,7 +374,7 @@ def _outcomes_of(result: xr.Dataset, points: int) -> list[Outcome]:
     swept = result.sizes
     values = {}
     for name, variable in result.data_vars.items():
-        inner = [dim for dim in variable.dims if dim in ("sample", "kept_sample", "x")]
+        inner = [dim for dim in variable.dims if dim in INNER]
         values[str(name)] = variable.values.reshape(points, *(swept[dim] for dim in inner))
     return [
         Outcome(point, samples, kept, {name: value[point] for name, value in values.items()})

@@ -51,7 +51,7 @@ def test_shift_moves_along_the_interface(system, mean_mode):
     )
     rng = np.random.default_rng(1)
     shift = rng.standard_normal(field.modes(system.interface).dimension)
-    mixture = Mixture(shift, 256, mean_mode)
+    mixture = Mixture(shift, (256,), field.modes(system.interface).numbers[:, 1:], mean_mode)
     moved = mixture.moved(np.array([0, 1, 100]))
     z = field.gaussian(system.interface, np.vstack([shift, moved]))
     for row, node in zip(z[1:], (0, 1, 100), strict=True):
@@ -66,7 +66,7 @@ def test_weights_make_the_mixture_normal_again():
     """E[w h] over the mixture is E[h] over the normal density, for h that the mixture covers."""
     shift = np.zeros(40)
     shift[:6] = (1.0, 0.5, 0.5, -0.5, 0.2, 0.1)
-    mixture = Mixture(shift, 64)
+    mixture = Mixture(shift, (64,), np.arange(1, 21)[None])
     draws = mixture.sample(200_000, np.random.default_rng(2))
     weights = np.exp(mixture.log_weights(draws))
     for values, expected in ((np.ones(len(draws)), 1.0), (draws[:, 0] ** 2, 1.0)):
@@ -79,7 +79,7 @@ def test_weights_make_the_mixture_normal_again():
 
 def test_log_weights_survive_six_hundred_dimensions():
     shift = np.full(600, 0.5)
-    mixture = Mixture(shift, 1024)
+    mixture = Mixture(shift, (1024,), np.arange(1, 301)[None])
     logs = mixture.log_weights(np.vstack([4.0 * shift, -4.0 * shift]))
     assert np.all(np.isfinite(logs))
     # At four times the shift the density ratio is about exp(4*150 - 75): far beyond underflow.

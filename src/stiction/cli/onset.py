@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,7 +32,8 @@ def onset(
         typer.Option(
             metavar="PROFILE",
             help="Peak strength: .npy, text (.csv, .txt, ...) or NetCDF, with or without x; in Pa"
-            " and m unless it states units, as in 'x (mm); strength (MPa)'.",
+            " and m unless it states units, as in 'x (mm); strength (MPa)'. Of a plane: .npy of"
+            " shape (nx, ny).",
         ),
     ],
     method: Annotated[
@@ -55,8 +57,8 @@ def onset(
 
     Takes the problem (and the method, if it has one) from a study file, which needs nothing else,
     and the strength from PROFILE, asks every method that applies, and prints a table; with --out
-    also draws the profile and where each method sees sliding begin. The method of the study keeps
-    its options, the others take their defaults.
+    also draws the profile and where each method sees sliding begin, of a plane its slip patches,
+    too. The method of the study keeps its options, the others take their defaults.
     """
     from stiction.study.study import read_setup
 
@@ -66,6 +68,8 @@ def onset(
         writable(out, "the figure")
     problem, own = read_setup(study)
     methods = _methods(own, method, loading_rate)
+    if out is not None and problem.interface.is_plane:
+        methods = [_with_maps(one) for one in methods]
     profile = profile_of(
         strength,
         problem,
@@ -126,6 +130,13 @@ def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any
     return found
 
 
+def _with_maps(method: Any) -> Any:
+    """The method with the maps that the figure of a plane shows, if it has them."""
+    maps = {"slip": True, "sensitivity": True}
+    names = {field.name for field in dataclasses.fields(method)}
+    return dataclasses.replace(method, **maps) if maps.keys() <= names else method
+
+
 def _ask(problem: Any, profile: Any, method: Any) -> tuple[Any, float]:
     from stiction.evaluation import onset as ask
 
@@ -142,7 +153,7 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
             for key in ("critical_stress", "critical_load", "first_instability")
         )
         mark = " *" if _in_gap(result) else ""
-        place = f"{float(result['critical_position'][0]) * 1e3:.4f} mm{mark}"
+        place = f"{_place(result['critical_position'][0])}{mark}"
         row = [name, stress, load, first, place, duration(seconds)]
         if with_coefficient:
             row.insert(2, f"{float(result['friction_coefficient'][0]):.6f}")
@@ -154,6 +165,16 @@ def _print_table(results: dict[str, Any], with_coefficient: bool) -> None:
     for line in [head, *rows]:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
         echo("  ".join(cells).rstrip())
+
+
+def _place(position: Any) -> str:
+    """A position in mm; on a plane along x and y."""
+    if position.ndim == 0:
+        return f"{float(position) * 1e3:.4f} mm"
+    return ", ".join(
+        f"{name} = {float(one) * 1e3:.4f} mm"
+        for name, one in zip(position["direction"].values, position, strict=True)
+    )
 
 
 def _in_gap(result: Any) -> bool:

@@ -214,8 +214,15 @@ def _resolution(problems: Any) -> list[tuple[str, str]]:
     except InputError:
         return [("nucleation length", "varies along the interface")]
     pairs = list(zip(problems, lengths, strict=True))
-    nodes = _range([length / problem.interface.spacing for problem, length in pairs], "nodes")
-    ratio = _range([problem.interface.extent / length for problem, length in pairs], "h_n")
+    rates = [problem.uniform_rate for problem in problems]
+    nodes = _range(
+        [p.nodes_in_nucleation_length(rate) for p, rate in zip(problems, rates, strict=True)],
+        "nodes",
+    )
+    ratio = " x ".join(
+        _range([problem.interface.lengths[i] / length for problem, length in pairs], "h_n")
+        for i in range(min(len(problem.interface.lengths) for problem in problems))
+    )
     return [("nucleation length", f"{_range(lengths, 'm')}: {nodes}, L = {ratio}")]
 
 

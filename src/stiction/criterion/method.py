@@ -19,6 +19,7 @@ from stiction.criterion.nucleation import (
     uniform_rates,
     warn_if_coarse,
 )
+from stiction.criterion.plane import PlaneSolver, own_variables
 from stiction.problem import Problem
 from stiction.results import Variable, onset_variables
 from stiction.sample import Sample
@@ -44,6 +45,12 @@ class LocalCriterion:
     Of a friction law that is not linear the weakening rate at zero slip counts, with an
     `AccuracyWarning`: strength that falls ever less steeply lets go later. A law that steepens
     is refused.
+
+    On a plane the average is over critical ellipses of five shapes, each the smallest on which the
+    stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
+    minimum is taken over nodes and shapes. Beside the variables of every method there are then
+    `critical_aspect`, `critical_extent` (m, along x and y) and `critical_area` (m²) of the ellipse
+    that decided.
     """
 
     weights: Weights = "exact"
@@ -61,13 +68,15 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """About how long a sample takes on one core, s."""
-        return 3e-8 * problem.interface.size
+        return (3e-8 if not problem.interface.is_plane else 6e-8) * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
         reasons = refused_laws(problem)
-        if problem.interface.is_plane:
-            reasons.append("it does not take interfaces of two dimensions")
+        if problem.interface.is_plane and self.weights != "exact":
+            reasons.append(
+                f"weights = {self.weights!r} are those of a line; on a plane leave them 'exact'"
+            )
         rate = problem.friction.weakening_rate
         if rate is not None and problem.uniform_rate is None:
             reasons.append(
@@ -78,7 +87,8 @@ class LocalCriterion:
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        return onset_variables(problem.interface)
+        own = own_variables(problem) if problem.interface.is_plane else {}
+        return onset_variables(problem.interface) | own
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """A solver for rows of this problem.
@@ -87,8 +97,10 @@ class LocalCriterion:
         ------
         InputError
             From the solver: if the weakening rate varies along the interface, or h_n is longer
-            than the interface.
+            than the interface, or a critical ellipse does not fit on the plane.
         """
+        if problem.interface.is_plane:
+            return PlaneSolver(problem)
         multipliers: dict[float, tuple[Array, int]] = {}
 
         def multiplier(rate: float) -> tuple[Array, int]:

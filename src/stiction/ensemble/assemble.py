@@ -58,13 +58,13 @@ class Gathered:
         self.kept = plans[0].keep_samples
         for name, variable in variables_in(plans).items():
             if only is None or name in only:
-                wide = len(variable.dims) > 1 and self.kept is not None
+                wide = variable.wide and self.kept is not None
                 dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
                 self.variables[name] = replace(variable, dims=dims)
         if self.kept is not None:
             inside = [s for s in self.kept if first <= s < first + samples]
             self._kept = np.array(sorted(inside), dtype=np.int64)
-        narrow = sum(len(variable.dims) == 1 for variable in self.variables.values())
+        narrow = sum(not variable.wide for variable in self.variables.values())
         check_memory("samples", 9.0 * len(plans) * samples * narrow)
         self._arrays: dict[str, NDArray[Any]] = {}
         self._seen: dict[str, NDArray[np.bool_]] = {}

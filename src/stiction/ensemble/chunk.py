@@ -171,10 +171,12 @@ class Table:
 def _plain_variables(values: Arrays) -> dict[str, Variable]:
     """Names of dimensions for columns that were read: rows, and what lies along the interface."""
     result = dict(ROWS)
+    rows = values["point"].size
     for name, value in values.items():
         if name not in ROWS:
             inner = tuple(f"{name}_{axis}" for axis in range(1, value.ndim))
-            result[name] = Variable("", "", ("wide_row" if inner else "row", *inner))
+            row = "row" if value.shape[0] == rows else "wide_row"
+            result[name] = Variable("", "", (row, *inner))
     return result
 
 
@@ -198,7 +200,7 @@ def tables_of(outcomes: Sequence[Outcome], variables: Mapping[str, Variable]) ->
         names = dict(ROWS)
         for name in group[0].values:
             variable = variables[name]
-            row = "wide_row" if len(variable.dims) > 1 else "row"
+            row = "wide_row" if variable.wide else "row"
             names[name] = replace(variable, dims=(row, *variable.dims[1:]))
             values[name] = np.concatenate([outcome.values[name] for outcome in group])
         yield Table(values, names, round(sum(outcome.seconds for outcome in group), 3))

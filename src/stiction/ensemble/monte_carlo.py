@@ -83,7 +83,7 @@ def _keep_of_method(
     def wide(name: str) -> bool:
         wider = dataclasses.replace(method, **{name: True}) if name in switches else method
         found = wider.variables(problem)
-        return name in found and len(found[name].dims) > 1
+        return name in found and found[name].wide
 
     problems = []
     for name in keep:

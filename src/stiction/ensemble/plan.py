@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from stiction._typing import Array
 from stiction.evaluation import Method, Values, accepted, solve, variables_of
 from stiction.problem import Problem
-from stiction.random.draws import BLOCK
+from stiction.random.draws import block_of
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, along
 from stiction.sample import PROFILES
 
 SLOW = 32
+MOST_NODES = 1 << 20
+"""Nodes of all samples of planes that are solved at once: 8 MiB for each profile."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,18 @@ class Plan:
 
     @property
     def wide(self) -> tuple[str, ...]:
-        """The variables that have more than one number a sample."""
-        return tuple(name for name, v in self.variables.items() if len(v.dims) > 1)
+        """The variables that have a number at each node."""
+        return tuple(name for name, v in self.variables.items() if v.wide)
 
     @property
     def piece(self) -> int:
-        """Samples solved at once, as the method likes it."""
-        size = int(self.method.chunk_size)
+        """Samples solved at once, as the method likes it; of planes no more than memory likes."""
+        interface, size = self.problem.interface, int(self.method.chunk_size)
+        block = block_of(len(interface.shape))
+        if block == 1:
+            return max(1, min(size, MOST_NODES // interface.size))
         # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
-        return size if size < SLOW else max(size, BLOCK)
+        return size if size < SLOW else max(size, block)
 
     def profiles(self, first: int, samples: int) -> dict[str, Array]:
         """The random profiles of samples first .. first + samples - 1, by name."""

@@ -16,7 +16,7 @@ from stiction.ensemble.plan import Plan
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome, do_work, process_mark
 from stiction.errors import WorkerError
-from stiction.random.draws import BLOCK
+from stiction.random.draws import BLOCK, block_of
 
 MOST_BYTES = 16 * 2**20
 RECENT = 4
@@ -64,17 +64,18 @@ class Sizer:
         """Samples of the next piece of `span`, of `left` samples in all, for `slots` workers."""
         rates = self._rates.get(span.point)
         rate = min(rates) if rates else self._last
+        block = block_of(len(plan.problem.interface.shape))
         size = min(plan.piece, BLOCK) if rate is None else int(self.seconds / max(rate, 1e-9))
         # A fair share of what is left, but not so small that drawing blocks in parts costs more.
-        size = min(size, max(-(-left // (2 * slots)), BLOCK))
+        size = min(size, max(-(-left // (2 * slots)), block))
         if plan.wide:
             nodes = plan.problem.interface.size
             bytes_each = max(self._bytes, 8.0 * nodes * len(plan.wide))
             size = min(size, int(MOST_BYTES / bytes_each))
         size = max(1, min(size, span.samples))
         end = span.first + size
-        if size > BLOCK and size < span.samples:  # draws come in blocks: do not cut one in two
-            end -= end % BLOCK
+        if size > block and size < span.samples:  # draws come in blocks: do not cut one in two
+            end -= end % block
         return end - span.first
 
 

@@ -23,11 +23,12 @@ SHARE = 0.5
 
 def check(problem: Problem) -> None:
     """`InputError` if every second node is not an even number of nodes."""
-    nodes = problem.interface.size
-    if nodes % 4:
+    shape = problem.interface.shape
+    if any(nodes % 4 for nodes in shape):
+        given, enough = (" x ".join(map(str, n)) for n in (shape, [n + -n % 4 for n in shape]))
         raise InputError(
-            f"interface.nodes: must be a multiple of four for discretization_error, got {nodes};"
-            f" take {nodes + 4 - nodes % 4}"
+            f"interface.nodes: must be a multiple of four for discretization_error, got {given};"
+            f" take {enough}"
         )
 
 

@@ -6,22 +6,25 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from stiction._checks import check_instance
+from stiction._checks import check_instance, check_memory
 from stiction._model import real_array, to_plain
 from stiction._typing import Array
 from stiction.equilibrium.continuation import State, at_rest, exceeds, follow
+from stiction.equilibrium.plane_path import plane_equilibria
 from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.results import Variable, coordinate, to_dataset
+from stiction.results import Variable, along, coordinate, to_dataset
+from stiction.sample import Sample as Samples
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {
-    "slip": Variable("m", "slip", ("load", "x")),
-    "stress": Variable("Pa", "shear stress on the interface", ("load", "x")),
+    "slip": Variable("m", "slip", ("load",)),
+    "stress": Variable("Pa", "shear stress on the interface", ("load",)),
     "mean_stress": Variable("Pa", "mean shear stress on the interface", ("load",)),
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
     "sliding": Variable("1", "whether the interface as a whole has let go", ("load",)),
@@ -93,7 +96,7 @@ def equilibrium_path(
     Returns
     -------
     xarray.Dataset
-        Over ('load', 'x'): `slip` (m) and `stress` (Pa); over 'load': `mean_stress` (Pa),
+        Over 'load' and the nodes: `slip` (m) and `stress` (Pa); over 'load': `mean_stress` (Pa),
         `arrested_events` so far, and `sliding`. From the onset of global sliding on slip and
         stress are NaN and `sliding` is true.
 
@@ -107,30 +110,41 @@ def equilibrium_path(
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")
+    interface = problem.interface
+    check_memory("loads", 16.0 * given.size * interface.size)
+    find = plane_equilibria if interface.is_plane else _line_equilibria
+    slip, stress, events, sliding = find(problem, rows, given)
+    values = {
+        "slip": slip,
+        "stress": stress,
+        "mean_stress": stress.mean(axis=tuple(range(1, stress.ndim))),
+        "arrested_events": events,
+        "sliding": sliding,
+    }
+    coordinates = {"load": (given, LOAD)}
+    coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
+    wide = {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    attributes = {"study": {"problem": to_plain(problem)}}
+    return to_dataset(values, VARIABLES | wide, coordinates, attributes)
+
+
+def _line_equilibria(
+    problem: Problem, rows: Samples, loads: Array
+) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.bool_]]:
+    """Slip (m) and stress (Pa), (loads, nodes), arrested events, and whether it slides."""
     setting = Setting(problem)
     sample = sample_of(rows, 0, setting.pieces)
     path = Path(setting, sample)
     initial = rows.initial_stress[0]
-    slip = np.full((given.size, problem.interface.size), np.nan)
-    stress = np.full((given.size, problem.interface.size), np.nan)
-    events = np.zeros(given.size, dtype=np.int64)
-    sliding = np.zeros(given.size, dtype=np.bool_)
-    for i, load in enumerate(given):
+    slip = np.full((loads.size, problem.interface.size), np.nan)
+    stress = np.full((loads.size, problem.interface.size), np.nan)
+    events = np.zeros(loads.size, dtype=np.int64)
+    sliding = np.zeros(loads.size, dtype=np.bool_)
+    for i, load in enumerate(loads):
         state = path.at(float(load))
         events[i] = len(state.events)
         sliding[i] = state.sliding
         if not state.sliding:
             slip[i] = state.slip
             stress[i] = initial + load * setting.profile - state.stiff
-    values = {
-        "slip": slip,
-        "stress": stress,
-        "mean_stress": stress.mean(axis=1),
-        "arrested_events": events,
-        "sliding": sliding,
-    }
-    coordinates = {
-        "load": (given, LOAD),
-        "x": coordinate(problem.interface, "x"),
-    }
-    return to_dataset(values, VARIABLES, coordinates, {"study": {"problem": to_plain(problem)}})
+    return slip, stress, events, sliding

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -16,35 +16,16 @@ from stiction._model import Flag, Positive, describe, model, real_array, whole
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.random.draws import standard_normal
+from stiction.random.draws import block_of, standard_normal
 from stiction.random.hermite import correlation_of_mapped, hermite_coefficients, share_unaccounted
 from stiction.random.marginals import Marginal
+from stiction.random.modes import Modes, line_modes, plane_modes
 from stiction.random.quantile_table import from_normal
 from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
-from stiction.random.synthesis import gaussian_rows
+from stiction.random.synthesis import gaussian_planes, gaussian_rows
 
 FEWEST_LENGTHS = 4.0
 ENOUGH_ACCOUNTED = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """The discrete spectrum on an interface.
-
-    Attributes
-    ----------
-    sigma : (J + 1,) array
-        Standard deviations sigma_j of modes 0..J; their squares sum to 1. sigma_0 is zero without
-        the mean mode.
-    count : int
-        J, the highest mode.
-    dimension : int
-        Number of standard normal draws a sample.
-    """
-
-    sigma: Array
-    count: int
-    dimension: int
 
 
 @model
@@ -61,6 +42,9 @@ class RandomField:
         Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every sample has
         the same mean of z, which is harmless only while the correlation length is short against
         the interface.
+    anisotropy : float, optional
+        On a plane, the correlation length along y over that along x, which is that of the
+        spectrum; 1 if left out.
 
     Raises
     ------
@@ -69,6 +53,10 @@ class RandomField:
 
     Notes
     -----
+    The same object serves lines and planes. On a plane the field is isotropic unless told
+    otherwise, and a line cut through it along x has the correlation of the field on a line, but
+    for what truncation leaves out, which is a little more on a plane.
+
     Translation process after Grigoriu (1995), spectral representation after Shinozuka and Deodatis
     (1991); Albertini et al. (2020), Eqs. 2 to 7.
     """
@@ -76,6 +64,7 @@ class RandomField:
     marginal: Marginal
     spectrum: Spectrum
     mean_mode: Flag = False
+    anisotropy: Positive | None = None
 
     @model_validator(mode="after")
     def _tabulated_marginal(self) -> RandomField:
@@ -100,7 +89,8 @@ class RandomField:
         Raises
         ------
         InputError
-            If truncation leaves no mode: the correlation length is too long for the interface.
+            If truncation leaves no mode: the correlation length is too long for the interface. If
+            a line is given an anisotropy.
         """
         if not isinstance(interface, Interface):
             raise InputError(f"interface: must be an Interface, got {describe(interface)}")
@@ -126,11 +116,12 @@ class RandomField:
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
         counts = check_counts(samples=samples, seed=seed, first=first, stream=stream)
-        modes = self.modes(interface).count
-        return standard_normal(**counts, modes=modes, mean_mode=self.mean_mode)
+        ranks = self.modes(interface).ranks
+        block = block_of(len(interface.shape))
+        return standard_normal(**counts, ranks=ranks, mean_mode=self.mean_mode, block=block)
 
     def gaussian(self, interface: Interface, draws: Array) -> Array:
-        """The underlying Gaussian field z of given draws, shape (samples, nodes), unit variance."""
+        """The underlying Gaussian field z of given draws, (samples, *shape), of unit variance."""
         modes = self.modes(interface)
         try:
             draws = real_array(draws)
@@ -142,6 +133,10 @@ class RandomField:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
+        if interface.is_plane:
+            return gaussian_planes(
+                draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape
+            )
         z = np.empty((draws.shape[0], interface.size))
         gaussian_rows(draws, modes.sigma, self.mean_mode, interface.size, z)
         return z
@@ -157,7 +152,7 @@ class RandomField:
 
         Returns
         -------
-        (samples, nodes) array, in the unit of the marginal
+        (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
         """
         return from_normal(self.marginal, self.gaussian(interface, draws))
 
@@ -186,7 +181,7 @@ class RandomField:
 
         Returns
         -------
-        (samples, nodes) array, in the unit of the marginal
+        (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
 
         Raises
         ------
@@ -204,7 +199,7 @@ class RandomField:
         return self.profiles(interface, draws)
 
     def correlation(self, interface: Interface, *, of: str = "strength") -> Array:
-        """Correlation at the lags ``interface.x``, shape (nodes,), on the periodic interface.
+        """Correlation at the lags ``interface.coordinates``, (*shape), on the periodic interface.
 
         Parameters
         ----------
@@ -218,9 +213,15 @@ class RandomField:
             If the tails of the marginal are too heavy for its correlation, with the largest error.
         """
         modes = self.modes(interface)
-        spectrum = np.zeros(interface.size)
-        np.add.at(spectrum, np.arange(modes.sigma.size) % interface.size, modes.sigma**2)
-        rho = np.fft.fft(spectrum).real
+        if interface.is_plane:  # the field whose amplitudes are its own standard deviations
+            draws = np.zeros((1, modes.dimension))
+            start = int(self.mean_mode)
+            draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
+            rho = self.gaussian(interface, draws)[0]
+        else:
+            spectrum = np.zeros(interface.size)
+            np.add.at(spectrum, np.arange(modes.sigma.size) % interface.size, modes.sigma**2)
+            rho = np.fft.fft(spectrum).real
         if _which(of) == "z":
             return rho
         return correlation_of_mapped(rho, self._map_coefficients())
@@ -238,6 +239,8 @@ class RandomField:
 
     def efolding_length(self, *, of: str = "strength") -> float:
         """Distance at which the correlation falls to 1/e, m, truncation included, infinite line.
+
+        On a plane it is that along x, to the accuracy at which a cut has the line's correlation.
 
         Parameters
         ----------
@@ -274,7 +277,7 @@ class RandomField:
             raise InputError(f"length: must be a positive number, got {length!r}") from None
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = self.spectrum.with_correlation_length(xi)
-        return RandomField(self.marginal, spectrum, self.mean_mode)
+        return dataclasses.replace(self, spectrum=spectrum)
 
 
 def _which(of: str) -> str:
@@ -297,60 +300,47 @@ def check_counts(**counts: Any) -> dict[str, int]:
     return {name: int(counts[name]) for name in numbers}
 
 
-MOST_MODES = 1 << 22
-
-
 @lru_cache(maxsize=256)
 def _modes(field: RandomField, interface: Interface) -> Modes:
-    spacing = 2.0 * math.pi / interface.extent
-    # A hair of tolerance: 2.5 lambda may fall exactly on a mode.
-    most = field.spectrum.cutoff / spacing * (1.0 + 1e-12)
-    if not most <= MOST_MODES:
+    if interface.is_plane:
+        ratio = field.anisotropy or 1.0
+        return plane_modes(field.spectrum, field.mean_mode, ratio, interface)
+    if field.anisotropy is not None:
         raise InputError(
-            f"spectrum: has {most:.10g} modes on an interface of {interface.length:g} m, at most"
-            f" {MOST_MODES} are possible; truncate it earlier, or check the units of the lengths"
+            f"anisotropy: is a ratio of correlation lengths along y and x, and a line has no y; got"
+            f" {field.anisotropy:g}, leave it out"
         )
-    count = math.floor(most)
-    if count < 1 and not field.mean_mode:
-        raise InputError(
-            f"spectrum: no mode is left on an interface of {interface.length:g} m: the first mode"
-            f" is at {spacing:.3g} rad/m, the spectrum is truncated at"
-            f" {field.spectrum.cutoff:.3g} rad/m; shorten the correlation length, lengthen the"
-            " interface or raise the truncation"
-        )
-    power = np.zeros(count + 1)
-    power[1:] = field.spectrum.density(spacing * np.arange(1, count + 1))
-    if field.mean_mode:
-        # A mode j >= 1 stands for the wavenumbers k and -k, the mean mode for one of them only.
-        power[0] = 0.5 * float(field.spectrum.density(np.zeros(1))[0])
-    total = power.sum()
-    if not 0.0 < total < np.inf:
-        raise InputError(
-            "spectrum: its power in the modes of this interface must be positive and finite,"
-            f" got {total:g}"
-        )
-    sigma = np.sqrt(power / total)
-    sigma.flags.writeable = False
-    return Modes(sigma, count, 2 * count + int(field.mean_mode))
+    return line_modes(field.spectrum, field.mean_mode, interface)
 
 
 def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
     """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
     modes = field.modes(interface)
-    lost = float(np.sum(modes.sigma[interface.size // 2 + 1 :] ** 2))
+    lost = modes.unresolved(interface)
     if lost > 1e-4:
+        nodes = " x ".join(map(str, interface.shape))
+        enough = " x ".join(str(2 * most) for most in modes.highest)
         warn_accuracy(
-            f"the grid of {interface.size} nodes is coarser than the spectrum: values at the nodes"
+            f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
             f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
-            f" grid does not resolve (interface.nodes >= {2 * modes.count} resolves all)"
+            f" grid does not resolve (interface.nodes >= {enough} resolves all)"
         )
     if isinstance(field.spectrum, CustomSpectrum):
-        _warn_of_lines(field.spectrum, modes.count, interface)
+        _warn_of_lines(field, interface)
     if field.mean_mode:
+        return
+    if interface.is_plane:
+        gap = _lowest_correlation(field, interface)
+        if gap > 0.02:
+            warn_accuracy(
+                "the plane is short against the correlation length and the field has no mean mode:"
+                f" the correlation falls to {-gap:.2f} instead of 0;"
+                " RandomField(mean_mode=True) restores the mean's variability"
+            )
         return
     ratio = interface.extent / field.spectrum.efolding_length
     if ratio < 2.0 * math.pi * FEWEST_LENGTHS:
-        gap = -float(field.correlation(interface, of="z").min())
+        gap = _lowest_correlation(field, interface)
         if gap > 0.02:
             warn_accuracy(
                 f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
@@ -359,17 +349,37 @@ def warn_if_inaccurate(field: RandomField, interface: Interface) -> None:
             )
 
 
-def _warn_of_lines(spectrum: CustomSpectrum, count: int, interface: Interface) -> None:
+@lru_cache(maxsize=64)
+def _lowest_correlation(field: RandomField, interface: Interface) -> float:
+    """By how much the correlation of z falls below zero."""
+    return -float(field.correlation(interface, of="z").min())
+
+
+def _warn_of_lines(field: RandomField, interface: Interface) -> None:
     """Warn where the modes of an interface fall beside or upon something narrow."""
-    apart = 2.0 * math.pi / interface.extent
-    if count < 1:
+    spectrum, modes = field.spectrum, field.modes(interface)
+    if modes.count < 1 or not isinstance(spectrum, CustomSpectrum):
         return
-    seen = apart * float(spectrum.density(apart * np.arange(1, count + 1)).sum())
-    ends = [spectrum.power_integral(k) for k in (0.5 * apart, (count + 0.5) * apart)]
-    ratio = seen / (ends[1] - ends[0]) if ends[1] > ends[0] else np.inf
+    if interface.is_plane:  # in units in which a whole plane of wave vectors is the integral
+        ratio_y = field.anisotropy or 1.0
+        cell = (2.0 * math.pi) ** 2 / interface.extent * ratio_y
+        k = modes.lengths(interface, ratio_y)[1:]
+        seen = cell * (
+            2.0 * float(spectrum.plane_density(k).sum())
+            + float(spectrum.plane_density(0.0 * k[:1]))
+        )
+        whole = 2.0 * math.pi * spectrum.plane_power_integral(spectrum.plane_cutoff)
+        apart = f"{2.0 * math.pi / max(interface.lengths):.3g}"
+    else:
+        step = 2.0 * math.pi / interface.extent
+        seen = step * float(spectrum.density(step * np.arange(1, modes.count + 1)).sum())
+        ends = [spectrum.power_integral(k) for k in (0.5 * step, (modes.count + 0.5) * step)]
+        whole = ends[1] - ends[0]
+        apart = f"{step:.3g}"
+    ratio = seen / whole if whole > 0.0 else np.inf
     if abs(ratio - 1.0) > 0.1:
         warn_accuracy(
-            f"the modes of this interface, {apart:.3g} rad/m apart, carry {ratio:.3g} times the"
+            f"the modes of this interface, {apart} rad/m apart, carry {ratio:.3g} times the"
             " power of the spectrum: it has lines or steps narrower than that, which a longer"
             " interface would resolve"
         )

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, model_validator
 
 from stiction._model import describe, model
@@ -15,7 +16,8 @@ from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
-from stiction.random.draws import standard_normal
+from stiction.random.draws import block_of, standard_normal
+from stiction.random.modes import Modes
 from stiction.random.random_field import RandomField, check_counts, warn_if_inaccurate
 from stiction.sample import PROFILES
 
@@ -108,8 +110,9 @@ class Layout:
     names : tuple of str
     starts : tuple of int
         First entry of each property.
-    modes : tuple of int
-        Modes drawn for each: those of the property with most modes that it is correlated with.
+    ranks : tuple of arrays of int
+        Modes drawn for each, by their `Modes.ranks`: its own and those of all that it is
+        correlated with.
     mean_mode : tuple of bool
         Whether the mean mode is drawn.
     dimension : int
@@ -118,7 +121,7 @@ class Layout:
 
     names: tuple[str, ...]
     starts: tuple[int, ...]
-    modes: tuple[int, ...]
+    ranks: tuple[NDArray[np.int64], ...]
     mean_mode: tuple[bool, ...]
     dimension: int
 
@@ -249,16 +252,17 @@ class RandomInterface:
         """
         counts = check_counts(samples=samples, seed=seed, first=first)
         layout = self.layout(interface)
+        options = {"first": counts["first"], "block": block_of(len(interface.shape))}
         parts = [
             standard_normal(
                 counts["seed"],
                 counts["samples"],
-                modes,
-                first=counts["first"],
+                ranks,
                 stream=NAMES.index(name),
                 mean_mode=mean,
+                **options,
             )
-            for name, modes, mean in zip(layout.names, layout.modes, layout.mean_mode, strict=True)
+            for name, ranks, mean in zip(layout.names, layout.ranks, layout.mean_mode, strict=True)
         ]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
@@ -275,8 +279,8 @@ class RandomInterface:
                 mixed = sum((factor[i, j] * own[j] for j in np.flatnonzero(factor[i])), 0.0 * mixed)
             if layout.mean_mode[i] and not field.mean_mode:
                 mixed = mixed[:, 1:]
-            dimension = field.modes(interface).dimension
-            found[name] = field.profiles(interface, np.ascontiguousarray(mixed[:, :dimension]))
+            mixed = _of_modes(mixed, layout.ranks[i], field.modes(interface))
+            found[name] = field.profiles(interface, np.ascontiguousarray(mixed))
         return found
 
     def profiles(
@@ -298,19 +302,28 @@ class RandomInterface:
             warn_if_inaccurate(field, interface)
 
 
+def _of_modes(draws: Array, ranks: NDArray[np.int64], modes: Modes) -> Array:
+    """Of draws for the modes of `ranks`, those of the modes of one field."""
+    if np.array_equal(ranks[: modes.count], modes.ranks):
+        return draws[:, : modes.dimension]
+    mean = modes.dimension - 2 * modes.count
+    pairs = mean + 2 * np.searchsorted(ranks, modes.ranks)[:, None] + np.arange(2)
+    return draws[:, np.concatenate((np.arange(mean), pairs.ravel()))]
+
+
 @lru_cache(maxsize=256)
 def _layout(random: RandomInterface, interface: Interface) -> Layout:
     names = random.names
-    own = [field.modes(interface).count for field in random.properties.values()]
+    own = [field.modes(interface).ranks for field in random.properties.values()]
     means = [field.mean_mode for field in random.properties.values()]
     linked = np.linalg.matrix_power(random.matrix != 0.0, max(len(names), 1))
-    modes, mean_mode, starts = [], [], [0]
+    ranks, mean_mode, starts = [], [], [0]
     for i in range(len(names)):
         group = np.flatnonzero(linked[i])
-        modes.append(max(own[j] for j in group))
+        ranks.append(reduce(np.union1d, [own[j] for j in group]))
         mean_mode.append(any(means[j] for j in group))
-        starts.append(starts[-1] + 2 * modes[-1] + int(mean_mode[-1]))
-    return Layout(names, tuple(starts[:-1]), tuple(modes), tuple(mean_mode), starts[-1])
+        starts.append(starts[-1] + 2 * ranks[-1].size + int(mean_mode[-1]))
+    return Layout(names, tuple(starts[:-1]), tuple(ranks), tuple(mean_mode), starts[-1])
 
 
 assert {field.name for field in fields(RandomInterface)} == {*NAMES, "correlation"}

@@ -4,6 +4,11 @@ A spectrum is known by its density g(k) and the wavenumber at which it is trunca
 is the truncated one, and so correlations and lengths are of that. Truncation is given as a
 multiple of lambda = 2 pi/xi_0 (`truncation`) or as the share of the power that is kept
 (`power_kept`).
+
+On a plane the field is isotropic, and a line cut through it has the correlation of the field on a
+line. That makes the density on the plane, as a function of the length of the wave vector, the
+inverse Abel transform of the line's: with the power of (1 + k^2) less by a half where the line's is
+a power of that, and the same where it is Gaussian.
 """
 
 from __future__ import annotations
@@ -58,6 +63,19 @@ class _Spectrum:
         """Wavenumber above which the spectrum is truncated, rad/m."""
         raise NotImplementedError
 
+    def plane_density(self, wavenumber: Array) -> Array:
+        """Density on a plane at wave vectors of length k in rad/m, up to a factor."""
+        raise NotImplementedError
+
+    def plane_power_within(self, wavenumber: float) -> float:
+        """Share of the power at wave vectors shorter than `wavenumber`, on an infinite plane."""
+        raise NotImplementedError
+
+    @property
+    def plane_cutoff(self) -> float:
+        """Length of wave vector above which the spectrum of a plane is truncated, rad/m."""
+        raise NotImplementedError
+
     @property
     def _edges(self) -> Array:
         """Wavenumbers from 0 to the cutoff; between them the density is looked at as a whole."""
@@ -74,13 +92,18 @@ class _Spectrum:
         return lag_of_correlation(self, math.exp(-1.0))
 
     def _power_quantile(self, share: float) -> float:
-        upper = 1.0
-        while self.power_within(upper) < share:
-            upper *= 2.0
-            if upper > 1e15:
-                raise InputError("spectrum: its power is not finite; give a truncation")
-        root: float = brentq(lambda k: self.power_within(k) - share, 0.0, upper, xtol=1e-300)
-        return root
+        return _quantile(self.power_within, share)
+
+
+def _quantile(power_within: Callable[[float], float], share: float) -> float:
+    """Wavenumber below which a share of the power lies, rad/m."""
+    upper = 1.0
+    while power_within(upper) < share:
+        upper *= 2.0
+        if upper > 1e15:
+            raise InputError("spectrum: its power is not finite; give a truncation")
+    root: float = brentq(lambda k: power_within(k) - share, 0.0, upper, xtol=1e-300)
+    return root
 
 
 @lru_cache(maxsize=256)
@@ -129,6 +152,16 @@ class _ScaledSpectrum(_Spectrum):
             return self.truncation * 2.0 * math.pi / self.correlation_length
         return self._power_quantile(self.power_kept or self._default_power)
 
+    @property
+    def plane_cutoff(self) -> float:
+        """Length of wave vector above which the spectrum of a plane is truncated, rad/m."""
+        if self.truncation is not None:
+            return self.cutoff
+        return self._plane_quantile(self.power_kept or self._default_power)
+
+    def _plane_quantile(self, share: float) -> float:
+        raise NotImplementedError
+
     def with_correlation_length(self, correlation_length: float) -> Any:
         """The same spectrum with another `correlation_length` (m)."""
         return dataclasses.replace(self, correlation_length=correlation_length)  # type: ignore[type-var]  # every subclass is a dataclass
@@ -155,7 +188,8 @@ class PowerLawSpectrum(_ScaledSpectrum):
 
     Notes
     -----
-    On an infinite line this is a Matern covariance of smoothness exponent - 1/2.
+    On an infinite line this is a Matern covariance of smoothness exponent - 1/2, and on a plane the
+    same with the density (k^2 + lambda^2)^-(exponent + 1/2).
     """
 
     correlation_length: Positive
@@ -177,6 +211,11 @@ class PowerLawSpectrum(_ScaledSpectrum):
         return (2.5 if self.truncation is None else self.truncation) * self.cutoff_wavenumber
 
     @property
+    def plane_cutoff(self) -> float:
+        """Length of wave vector above which the spectrum of a plane is truncated, rad/m."""
+        return self.cutoff if self.power_kept is None else self._plane_quantile(self.power_kept)
+
+    @property
     def cutoff_wavenumber(self) -> float:
         """lambda = 2 pi/xi_0, rad/m: the density falls as a power law above it."""
         return 2.0 * math.pi / self.correlation_length
@@ -196,6 +235,22 @@ class PowerLawSpectrum(_ScaledSpectrum):
         # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
         rest = float(betaincinv(self.exponent - 0.5, 0.5, 1.0 - share))
         return self.cutoff_wavenumber * math.sqrt((1.0 - rest) / rest)
+
+    def plane_density(self, wavenumber: Array) -> Array:
+        """(1 + (k/lambda)^2)^-(exponent + 1/2)."""
+        ratio = np.asarray(wavenumber) / self.cutoff_wavenumber
+        result: Array = (1.0 + ratio * ratio) ** -(self.exponent + 0.5)
+        return result
+
+    def plane_power_within(self, wavenumber: float) -> float:
+        """Share of the power at wave vectors shorter than `wavenumber`."""
+        ratio = wavenumber / self.cutoff_wavenumber
+        return -math.expm1((0.5 - self.exponent) * math.log1p(ratio * ratio))
+
+    def _plane_quantile(self, share: float) -> float:
+        return self.cutoff_wavenumber * math.sqrt(
+            math.expm1(math.log1p(-share) / (0.5 - self.exponent))
+        )
 
     def untruncated_correlation(self, lag: Array) -> Array:
         """Matern correlation at `lag` (m), on an infinite line."""
@@ -249,6 +304,17 @@ class SquaredExponentialSpectrum(_ScaledSpectrum):
     def _power_quantile(self, share: float) -> float:
         return 2.0 / self.correlation_length * float(erfinv(share))
 
+    def plane_density(self, wavenumber: Array) -> Array:
+        """The same as on a line."""
+        return self.density(wavenumber)
+
+    def plane_power_within(self, wavenumber: float) -> float:
+        """Share of the power at wave vectors shorter than `wavenumber`."""
+        return -math.expm1(-((wavenumber * self.correlation_length / 2.0) ** 2))
+
+    def _plane_quantile(self, share: float) -> float:
+        return 2.0 / self.correlation_length * math.sqrt(-math.log1p(-share))
+
     def untruncated_correlation(self, lag: Array) -> Array:
         """exp(-(lag/xi_0)^2)."""
         result: Array = np.exp(-((np.asarray(lag) / self.correlation_length) ** 2))
@@ -294,6 +360,19 @@ class ExponentialSpectrum(_ScaledSpectrum):
     def _power_quantile(self, share: float) -> float:
         return math.tan(share * math.pi / 2.0) / self.correlation_length
 
+    def plane_density(self, wavenumber: Array) -> Array:
+        """(1 + (k xi_0)^2)^(-3/2)."""
+        ratio = np.asarray(wavenumber) * self.correlation_length
+        result: Array = (1.0 + ratio * ratio) ** -1.5
+        return result
+
+    def plane_power_within(self, wavenumber: float) -> float:
+        """Share of the power at wave vectors shorter than `wavenumber`."""
+        return 1.0 - 1.0 / math.hypot(1.0, wavenumber * self.correlation_length)
+
+    def _plane_quantile(self, share: float) -> float:
+        return math.sqrt((1.0 - share) ** -2 - 1.0) / self.correlation_length
+
     def untruncated_correlation(self, lag: Array) -> Array:
         """exp(-|lag|/xi_0)."""
         result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
@@ -317,6 +396,8 @@ class CustomSpectrum(_Spectrum):
     ----------
     function : callable
         g(k): takes an array of wavenumbers (rad/m), returns an array, not negative, integrable.
+        On a plane it is the density there, at wave vectors of length k, so that g(k) k must be
+        integrable; a line cut through the plane then has another spectrum than g.
     max_wavenumber : float, optional
         Truncation, rad/m; by `power_kept` if left out.
     power_kept : float, optional
@@ -395,6 +476,25 @@ class CustomSpectrum(_Spectrum):
             return self.max_wavenumber
         return _cutoff_of(self, 0.9997 if self.power_kept is None else self.power_kept)
 
+    def plane_density(self, wavenumber: Array) -> Array:
+        """g(k): of a spectrum of one's own it is the density of what it is used for."""
+        return self.density(wavenumber)
+
+    def plane_power_integral(self, wavenumber: float) -> float:
+        """Integral of g(k) k from 0 to `wavenumber`, or to `max_wavenumber` if that is less."""
+        return _whole_plane(self).within(wavenumber)
+
+    def plane_power_within(self, wavenumber: float) -> float:
+        """Share of the power at wave vectors shorter than `wavenumber`."""
+        return min(self.plane_power_integral(wavenumber) / _whole_plane(self).total, 1.0)
+
+    @property
+    def plane_cutoff(self) -> float:
+        """Length of wave vector above which the spectrum of a plane is truncated, rad/m."""
+        if self.max_wavenumber is not None:
+            return self.max_wavenumber
+        return _plane_cutoff_of(self, 0.9997 if self.power_kept is None else self.power_kept)
+
     def untruncated_correlation(self, lag: Array) -> Array:
         """Correlation of the whole spectrum at `lag` (m), up to `max_wavenumber` if given."""
         pieces = _whole(self)
@@ -411,6 +511,22 @@ def _whole(spectrum: CustomSpectrum) -> Pieces:
 @lru_cache(maxsize=64)
 def _cutoff_of(spectrum: CustomSpectrum, share: float) -> float:
     return spectrum._power_quantile(share)
+
+
+@lru_cache(maxsize=64)
+def _whole_plane(spectrum: CustomSpectrum) -> Pieces:
+    end = SHORTEST if spectrum.max_wavenumber is None else spectrum.max_wavenumber
+    return in_pieces(lambda k: k * spectrum.density(k), spectrum._edges_to(end))
+
+
+@lru_cache(maxsize=64)
+def _plane_cutoff_of(spectrum: CustomSpectrum, share: float) -> float:
+    if 1.0 - spectrum.plane_power_within(1e-3 * SHORTEST) > 1e-3:
+        raise InputError(
+            "spectrum: on a plane the power of g(k) is the integral of g(k) k, which does not"
+            " converge; give max_wavenumber"
+        )
+    return _quantile(spectrum.plane_power_within, share)
 
 
 def _as_spectrum(value: Any) -> Any:

@@ -365,7 +365,8 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         )
         counted = by_counting(request, reason)
         return replace(counted, warnings=(*counted.warnings, *say([text])))
-    mixture = Mixture(point.draws, problem.interface.size, field.mean_mode)
+    modes = field.modes(problem.interface)
+    mixture = Mixture(point.draws, problem.interface.shape, modes.numbers[:, 1:], field.mean_mode)
     rng = generator(request.seed, 4)
     found: list[Array] = []
     kept: list[Array] = []

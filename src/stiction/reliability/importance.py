@@ -2,11 +2,13 @@
 
 Where the problem looks the same everywhere there is one most likely failure for each place, so the
 sampling density is a mixture of normal densities shifted by the same dip at all nodes. Its weights
-are sums over the nodes, taken as logarithms: in hundreds of dimensions densities underflow.
+are sums over the nodes, taken as logarithms: in hundreds of dimensions densities underflow. On a
+plane the dip is that of the middle one of the critical ellipses.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +17,7 @@ from scipy.special import logsumexp
 
 from stiction._typing import Array
 from stiction.criterion.nucleation import multiplier_of
+from stiction.criterion.plane import windows_of
 from stiction.problem import Problem
 from stiction.random.quantile_table import from_normal
 from stiction.random.random_field import RandomField
@@ -22,6 +25,8 @@ from stiction.random.random_field import RandomField
 SIZES = (1.0, 1.15)
 """Shifts in units of the design point: the failures lie a little beyond it."""
 ITERATIONS = 200
+AT_ONCE = 1 << 22
+"""Nodes of all samples whose weights are summed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,19 +55,19 @@ def _slope(field: RandomField, z: Array) -> Array:
 def _draws_of(field: RandomField, problem: Problem, nodal: Array) -> Array:
     """Draws u = A^T w, where z = A u is the field of draws u at the nodes."""
     modes = field.modes(problem.interface)
-    spectrum = np.fft.fft(nodal)
-    j = np.arange(1, modes.count + 1)
-    waves = modes.sigma[1:] * spectrum[j % nodal.size]
+    spectrum = np.fft.fftn(nodal)
+    numbers = modes.numbers[:, 1:] % np.array(nodal.shape)[:, None]
+    waves = modes.sigma[1:] * spectrum[tuple(numbers)]
     start = int(field.mean_mode)
     draws = np.zeros(modes.dimension)
     draws[start::2], draws[start + 1 :: 2] = waves.real, -waves.imag
     if field.mean_mode:
-        draws[0] = modes.sigma[0] * spectrum[0].real
+        draws[0] = modes.sigma[0] * spectrum.flat[0].real
     return draws
 
 
 def design_point(problem: Problem, field: RandomField, excess: float) -> DesignPoint:
-    """Most likely draws whose nucleation stress at x = 0 is as low as given.
+    """Most likely draws whose nucleation stress at the first node is as low as given.
 
     Parameters
     ----------
@@ -80,13 +85,13 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
     Der Kiureghian (1995) does not fall. The gradient is the criterion's weight g times the slope
     of the map.
     """
-    nodes = problem.interface.size
-    weight = np.fft.irfft(multiplier_of(problem, problem.nucleation_length), nodes)
+    weight = _critical_weight(problem)
     draws = np.zeros(field.modes(problem.interface).dimension)
 
     def miss(u: Array) -> tuple[float, Array]:
         z = field.gaussian(problem.interface, u[None])[0]
-        return float(weight @ from_normal(field.marginal, z)) - excess, z
+        strength: Array = from_normal(field.marginal, z)
+        return float(weight.ravel() @ strength.ravel()) - excess, z
 
     height, z = miss(draws)
     scale = abs(height) if height != 0.0 else 1.0
@@ -116,6 +121,15 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
     return DesignPoint(draws, float(np.linalg.norm(draws)), converged)
 
 
+def _critical_weight(problem: Problem) -> Array:
+    """Weight of the critical patch around the first node, (*shape)."""
+    if not problem.interface.is_plane:
+        multiplier = multiplier_of(problem, problem.nucleation_length)
+        return problem.interface.inverse_transform(multiplier)
+    windows = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
+    return windows[len(windows) // 2].weight
+
+
 @dataclass(frozen=True, eq=False)
 class Mixture:
     """Normal densities shifted by one dip, at every node and in several sizes, equally likely.
@@ -123,17 +137,26 @@ class Mixture:
     Attributes
     ----------
     shift : (dimension,) array
-        Draws of the dip at x = 0.
-    nodes : int
+        Draws of the dip at the first node.
+    shape : tuple of int
+        Nodes in each direction.
+    numbers : (dimensions, modes) array of int
+        Wave vectors in units of 2 pi/length, without the mean.
     mean_mode : bool
         Whether the first draw belongs to the mean.
     sizes : tuple of float
     """
 
     shift: Array
-    nodes: int
+    shape: tuple[int, ...]
+    numbers: NDArray[np.int64]
     mean_mode: bool = False
     sizes: tuple[float, ...] = SIZES
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return math.prod(self.shape)
 
     def _waves(self, draws: Array) -> NDArray[np.complex128]:
         start = int(self.mean_mode)
@@ -142,9 +165,12 @@ class Mixture:
 
     def moved(self, node: NDArray[np.int64]) -> Array:
         """The shift with its dip at given nodes, shape (len(node), dimension)."""
-        wave = self._waves(self.shift)
-        j = np.arange(1, wave.size + 1)
-        turned = wave * np.exp(-2j * np.pi * ((node[:, None] * j) % self.nodes) / self.nodes)
+        place = np.unravel_index(node, self.shape)
+        phase = sum(
+            2.0 * np.pi * ((at[:, None] * j) % n) / n
+            for at, j, n in zip(place, self.numbers, self.shape, strict=True)
+        )
+        turned = self._waves(self.shift) * np.exp(-1j * np.asarray(phase))
         start = int(self.mean_mode)
         draws = np.empty((node.size, self.shift.size))
         draws[:, start::2], draws[:, start + 1 :: 2] = turned.real, -turned.imag
@@ -164,15 +190,23 @@ class Mixture:
         """Product of each sample with the shift at each node, shape (samples, nodes)."""
         product = self._waves(draws) * np.conj(self._waves(self.shift))
         spectrum = np.zeros((draws.shape[0], self.nodes), dtype=np.complex128)
-        for j in range(product.shape[1]):
-            spectrum[:, (j + 1) % self.nodes] += product[:, j]
-        found: Array = np.fft.ifft(spectrum, axis=1).real * self.nodes
+        modes = np.ravel_multi_index(list(self.numbers), self.shape, mode="wrap")
+        for column, mode in zip(product.T, modes, strict=True):
+            spectrum[:, mode] += column
+        axes = tuple(range(1, 1 + len(self.shape)))
+        waves = spectrum.reshape(-1, *self.shape)
+        found: Array = np.fft.ifftn(waves, axes=axes).real.reshape(spectrum.shape) * self.nodes
         if self.mean_mode:
             found += (draws[:, 0] * self.shift[0])[:, None]
         return found
 
     def log_weights(self, draws: Array) -> Array:
         """Logarithm of the normal density over the mixture's, shape (samples,)."""
+        some = max(1, AT_ONCE // self.nodes)
+        parts = [self._log_weights(draws[i : i + some]) for i in range(0, len(draws), some)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _log_weights(self, draws: Array) -> Array:
         projected = self.projections(draws)
         square = float(self.shift @ self.shift)
         parts = [logsumexp(a * projected, axis=1) - 0.5 * a * a * square for a in self.sizes]

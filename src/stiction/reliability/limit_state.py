@@ -15,6 +15,7 @@ from stiction._checks import is_whole
 from stiction._model import describe
 from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
+from stiction.criterion.plane import windows_of
 from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
@@ -153,9 +154,15 @@ class LimitState:
         """Why the local criterion cannot serve as a first stage, or None if it can."""
         if not self.problem.friction.linear:
             return "strength does not fall linearly with slip"
-        if self.problem.uniform_rate is None or set(SCALES) & set(self.random.names):
+        rate = self.problem.uniform_rate
+        if rate is None or set(SCALES) & set(self.random.names):
             return "the weakening rate is not uniform"
-        if self.problem.nucleation_length > self.problem.interface.lengths[0]:
+        if self.problem.interface.is_plane:
+            try:
+                windows_of(self.problem, rate)
+            except InputError:
+                return "a critical patch does not fit on the plane"
+        elif self.problem.nucleation_length > self.problem.interface.extent:
             return "the nucleation length is longer than the interface"
         return None
 

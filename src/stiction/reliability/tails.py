@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -66,6 +67,9 @@ def weakest_link(probability: Array, ratio: float) -> Array:
 def longer(problem: Problem, ratio: int) -> Problem:
     """The same system with `ratio` times the length at the same spacing.
 
+    Of a plane it is `ratio` times the area, at the same proportions if that is a square number and
+    along x otherwise.
+
     Raises
     ------
     InputError
@@ -85,7 +89,14 @@ def longer(problem: Problem, ratio: int) -> Problem:
     varying = [name for name, value in parts.items() if isinstance(value, np.ndarray)]
     if varying:
         raise InputError([f"{name}: is given node by node; give a number" for name in varying])
-    interface = Interface(ratio * problem.interface.extent, ratio * problem.interface.size)
+    old = problem.interface
+    if isinstance(old.length, tuple) and isinstance(old.nodes, tuple):
+        side = math.isqrt(ratio)
+        along, across = (side, side) if side * side == ratio else (ratio, 1)
+        (length, width), (nodes, rows) = old.length, old.nodes
+        interface = Interface((along * length, across * width), (along * nodes, across * rows))
+    else:
+        interface = Interface(ratio * old.extent, ratio * old.size)
     return Problem(problem.solid, interface, friction, load, problem.mode)
 
 

@@ -15,6 +15,8 @@ from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed
 from stiction.problem import Problem
+from stiction.report.patch_figures import draw_patches, has_maps
+from stiction.report.plane_figures import draw_plane_onset
 from stiction.report.style import (
     PAGE,
     PALE,
@@ -43,11 +45,15 @@ def draw_onset(
     Parameters
     ----------
     problem : Problem
-    tau_p : (nodes,) array
+    tau_p : (*shape) array
         Pa.
     results : mapping of Dataset
         By the type of the method, one sample each.
     """
+    if problem.interface.is_plane:
+        with_maps = any(has_maps(result) for result in results.values())
+        draw = draw_patches if with_maps else draw_plane_onset
+        return draw(problem, tau_p, results, NAMES)
     figure = new_figure(PAGE, 2.8)
     axes = figure.subplots()
     x = problem.interface.x * 1e3

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from stiction._typing import Array
 from stiction.reliability.result import bounded
 from stiction.reliability.tails import LONGER, TailStudy, weakest_link
+from stiction.report.plane_figures import plane_weak_spot_figure
 from stiction.report.style import (
     ACCENT,
     COLUMN,
@@ -129,6 +130,8 @@ def weak_spot_figure(failing: xr.Dataset, nucleation_length: float, stress: floa
     stress : float
         Pa.
     """
+    if "y" in failing.dims:
+        return plane_weak_spot_figure(failing, nucleation_length)
     x = failing["x"].values
     spacing = float(x[1] - x[0])
     middle = x.size // 2

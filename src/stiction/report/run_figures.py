@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from stiction.errors import InputError
 from stiction.report.style import PAGE, color, new_figure, panel, paper_style, save_figure, series
+from stiction.results import DIRECTION
 from stiction.statistics.densities import density
 from stiction.statistics.quantiles import quantiles
 from stiction.stored_run import StoredRun
@@ -89,23 +90,37 @@ def _finite(values: Any) -> NDArray[np.float64]:
 
 def _single(result: xr.Dataset) -> Figure:
     figure = new_figure(PAGE, 2.6)
-    left, right = figure.subplots(1, 2)
+    places = _components(result)
+    left, *rest = figure.subplots(1, 1 + len(places))
     _density_curve(left, _finite(result["critical_stress"]) * 1e-6, None, 0)
-    _histogram(right, _finite(result["critical_position"]) * 1e3, None, 0)
-    _finish(left, right)
+    for right, values in zip(rest, places.values(), strict=True):
+        _histogram(right, _finite(values) * 1e3, None, 0)
+    _finish(left, dict(zip(places, rest, strict=True)))
     return figure
+
+
+def _components(result: xr.Dataset) -> dict[str, xr.DataArray]:
+    """The critical position by what it is called; on a plane along each direction."""
+    place = result["critical_position"]
+    if DIRECTION not in place.dims:
+        return {"critical position": place}
+    return {
+        f"critical position, {direction.item()}": place.sel({DIRECTION: direction})
+        for direction in place[DIRECTION]
+    }
 
 
 def _densities(result: xr.Dataset, along: str) -> Figure:
     figure = new_figure(PAGE, 3.0)
-    left, right = figure.subplots(1, 2)
+    left, *rest = figure.subplots(1, 1 + len(_components(result)))
     steps = np.unique(np.linspace(0, result.sizes[along] - 1, CURVES).round().astype(int))
     for number, step in enumerate(steps):
         part = result.isel({along: step})
         label = _shown(result[along][step])
         _density_curve(left, _finite(part["critical_stress"]) * 1e-6, label, number)
-        _histogram(right, _finite(part["critical_position"]) * 1e3, label, number)
-    _finish(left, right)
+        for right, values in zip(rest, _components(part).values(), strict=True):
+            _histogram(right, _finite(values) * 1e3, label, number)
+    _finish(left, dict(zip(_components(result), rest, strict=True)))
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, title=_label(result[along]))
     return figure
@@ -128,15 +143,16 @@ def _histogram(axes: Axes, values: NDArray[np.float64], label: str | None, numbe
         axes.stairs(counts, edges, label=label, **series(number))
 
 
-def _finish(left: Axes, right: Axes) -> None:
+def _finish(left: Axes, places: dict[str, Axes]) -> None:
     left.set_xlabel("critical stress (MPa)")
     left.set_ylabel("density (1/MPa)")
     left.set_ylim(bottom=0.0)
-    right.set_xlabel("critical position (mm)")
-    right.set_ylabel("density (1/mm)")
-    right.set_ylim(bottom=0.0)
     panel(left, "a")
-    panel(right, "b")
+    for letter, (name, right) in zip("bc", places.items(), strict=False):
+        right.set_xlabel(f"{name} (mm)")
+        right.set_ylabel("density (1/mm)")
+        right.set_ylim(bottom=0.0)
+        panel(right, letter)
 
 
 def _quantiles(result: xr.Dataset, along: str, within: list[str]) -> Figure:

@@ -12,11 +12,20 @@ from scipy.integrate import simpson
 
 from stiction._checks import check_flag, check_instance
 from stiction.criterion.eigenproblem import Weight
-from stiction.criterion.nucleation import Weights, check_law, multiplier_of, weight_of
+from stiction.criterion.ellipse_windows import EllipseWindow
+from stiction.criterion.nucleation import (
+    Weights,
+    check_aspect,
+    check_law,
+    multiplier_of,
+    weight_of,
+)
+from stiction.criterion.plane import middle_aspect, too_small, window_of
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
 from stiction.random.random_field import RandomField
+from stiction.statistics.plane_moments import plane_infinite_ratio, plane_longest_ratio
 
 Array = NDArray[np.float64]
 
@@ -60,13 +69,15 @@ class NucleationLimits:
     Attributes
     ----------
     short_slope : float
-        For xi_0 << h_n the variance ratio is `short_slope` times xi_0/h_n (L >> h_n).
+        For xi_0 << h_n the variance ratio is `short_slope` times xi_0/h_n (L >> h_n); on a plane
+        times its square.
     short_stress : float
         tau_n and tau_cr for xi_0 -> 0 at fixed L: the mean strength, Pa. At fixed L/xi_0 there is
         no such limit: L would fall below h_n, where the local criterion ends.
     long_ratio_fixed_length : float
         Variance ratio for xi_0 -> infinity at fixed L: the interface then holds the longest modes
-        only. 1 with the mean mode, |g(2 pi/L)|^2 averaged over the harmonics without it.
+        only. 1 with the mean mode, |g(2 pi/L)|^2 averaged over the harmonics without it. On a
+        plane two waves are left where the lengths along x and y are the same.
     long_ratio_fixed_share : float
         Variance ratio for xi_0 -> infinity with L/xi_0 fixed, that is h_n -> 0: 1.
     long_stress_fixed_share : str
@@ -89,6 +100,7 @@ def nucleation_statistics(
     *,
     weights: Weights = "exact",
     infinite: bool = False,
+    aspect: float | None = None,
 ) -> NucleationStatistics:
     """Exact mean and variance of the nucleation stress.
 
@@ -101,6 +113,10 @@ def nucleation_statistics(
         As in `nucleation_stress`.
     infinite : bool
         For an infinitely long interface and an untruncated spectrum instead of the problem's own.
+    aspect : float, optional
+        On a plane, the extent along x over that along y of the critical ellipse over which tau_n
+        is the average; the middle one of `LocalCriterion` if left out. The least over several
+        shapes, which `LocalCriterion` takes, has no moments in closed form.
 
     Returns
     -------
@@ -109,8 +125,8 @@ def nucleation_statistics(
     Raises
     ------
     InputError
-        If the weakening rate, the load or the initial stress varies along the interface, or h_n is
-        longer than the interface.
+        If the weakening rate, the load or the initial stress varies along the interface, or a
+        critical patch is larger than the interface.
 
     Notes
     -----
@@ -125,7 +141,16 @@ def nucleation_statistics(
     check_flag("infinite", infinite)
     weight = weight_of(weights)
     total = math.pi / 2.0 * float(weight.sine[0])
-    if infinite:
+    check_aspect(problem, weights, aspect)
+    if problem.interface.is_plane:
+        window = _window(problem, aspect)
+        if infinite:
+            ratio = plane_infinite_ratio(problem.interface, strength, window.weight)
+        else:
+            power = np.abs(window.spectrum) ** 2
+            ratio = float(np.sum(strength_spectrum(problem, strength) * power))
+        total = 1.0
+    elif infinite:
         ratio = _infinite_ratio(problem, strength, weights)
     else:
         multiplier = multiplier_of(problem, problem.nucleation_length, weights)
@@ -140,10 +165,10 @@ def nucleation_statistics(
 
 
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
-    """Share of Var[tau_p] at each wavenumber of the grid, (nodes//2 + 1,); it sums to 1."""
+    """Share of Var[tau_p] at each wave of `Interface.transform`; it sums to 1."""
     interface = problem.interface
-    power = np.fft.rfft(strength.correlation(interface)).real / interface.size
-    power[1 : interface.size // 2] *= 2.0
+    power = interface.transform(strength.correlation(interface)).real / interface.size
+    power[..., 1 : interface.shape[-1] // 2] *= 2.0
     return np.maximum(power, 0.0)
 
 
@@ -175,12 +200,26 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
     if xi is None:
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")
     weight = weight_of("exact")
+    plane = problem.interface.is_plane
     lags = np.linspace(0.0, REACH * xi, 16385)
-    area = 2.0 * float(simpson(_strength_correlation(strength, lags), x=lags))
-    slope = 2.0 * _square_integral(weight) * area / xi
+    correlation = _strength_correlation(strength, lags)
+    if plane:
+        cell = problem.interface.cell
+        stretched = strength.anisotropy or 1.0
+        area = 2.0 * math.pi * stretched * float(simpson(correlation * lags, x=lags))
+        square = float(np.sum(_window(problem, None).weight ** 2)) / cell
+        slope = square * area * (problem.nucleation_length / xi) ** 2
+    else:
+        area = 2.0 * float(simpson(correlation, x=lags))
+        slope = 2.0 * _square_integral(weight) * area / xi
     if strength.mean_mode:
         long_ratio = 1.0
         long_text = "the distribution of tau_p at a point: the interface is uniform"
+    elif plane:
+        long_ratio = plane_longest_ratio(problem, strength, _window(problem, None).spectrum)
+        long_text = (
+            "the minimum of one or two mapped sine waves of random amplitude: it no longer falls"
+        )
     else:
         # One wave is left, of unit variance: its harmonics m carry c_m^2 through the map.
         h = problem.nucleation_length
@@ -201,6 +240,21 @@ def nucleation_limits(problem: Problem, strength: RandomField) -> NucleationLimi
         long_stress_fixed_share="the distribution of min tau_p of the same field",
         long_stress_fixed_length=long_text,
     )
+
+
+def _window(problem: Problem, aspect: float | None) -> EllipseWindow:
+    """The critical ellipse of one aspect, by default the middle one."""
+    rate = problem.uniform_rate
+    if rate is None:
+        raise InputError(
+            "friction.weakening_rate: varies along the interface or with the strength, so there is"
+            " no one critical patch"
+        )
+    aspect = middle_aspect(problem) if aspect is None else aspect
+    window = window_of(problem, rate, aspect)
+    if window is None:
+        raise too_small(problem, rate, aspect)
+    return window
 
 
 def _uniform_load(problem: Problem, strength: RandomField) -> tuple[float, float]:

@@ -1,0 +1,243 @@
+"""The turning point of the load, where the stable and the unstable equilibria of a patch meet.
+
+With the patch held by a spring along phi (`controlled_equilibrium`), equilibria exist on both sides
+of it. Let a = <phi, d> and mu the force of the spring. On the slipping nodes A d = tau_0 p - s +
+mu phi, and the slope d' = dd/da at fixed load satisfies A d' = mu' phi. At the turning point
+mu = mu' = 0: Newton's method in a (with the slope of mu' by secant) and tau_0.
+
+Bounds: d is feasible at tau_0 if mu >= 0. The combination y of two slopes, one with mu' > 0 and one
+with mu' < 0, for which A y = 0 where both slip, is a multiplier; nodes that slip in one state only
+have A y <= 0 and hardly slip at the turning point, so the error of its bound is of second order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction._typing import Array
+from stiction.equilibrium.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
+from stiction.equilibrium.controlled_equilibrium import equilibrate
+from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
+from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
+
+SWITCHES = 4
+"""Patches to hold one after the other, at most."""
+PATIENCE = 8
+PROGRESS = 0.95
+"""States that may leave more than this share of the gap, one after the other."""
+RETREAT = 2e-3
+"""Share by which the load is lowered when another patch is held, twice as much each time."""
+
+
+class State(NamedTuple):
+    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, d, d' (<phi, d'> = 1)."""
+
+    load: float
+    amplitude: float
+    force: float
+    stiffness: float
+    relief: float
+    slip: Array
+    slope: Array
+
+
+def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State | None:
+    """Equilibrium with a patch held; None if something else is unstable.
+
+    Parameters
+    ----------
+    bracket : Bracket
+    held : (nx, ny) array
+        phi, unit norm.
+    guess : State
+        Load, amplitude at which the spring is without force, slip and slope to start from.
+    accuracy : float
+        Largest residual stress as a share of the mean strength.
+    """
+    operator, excess, profile, room = (
+        bracket.operator, bracket.excess, bracket.profile, bracket.room,
+    )  # fmt: skip
+    load, amplitude = guess.load, guess.amplitude
+    spring = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
+    slip = guess.slip.copy()
+    inside = bracket.inside
+    inside[:] = (slip > 0.0) | (excess < load * profile)
+    right = load * profile - excess + (spring * amplitude) * held
+    status, taken = equilibrate(
+        operator, right, spring, held, inside, slip, bracket.residual, room,
+        accuracy * bracket.scale, ITERATIONS,
+    )  # fmt: skip
+    bracket.iterations += taken
+    if status != SOLVED:
+        return None
+    slope = np.where(inside, guess.slope, 0.0)
+    share = inner(held, slope)
+    if not share > 0.0:  # none of the patch slips any more
+        return None
+    slope *= 1.0 / (spring * share)
+    residual_of(operator, spring, held, held, slope, bracket.residual)
+    # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
+    cost = float(np.abs(excess - load * profile).sum())
+    tolerance = accuracy * spring * bracket.scale * inner(profile, slope) / cost
+    status, taken = solve_inside(
+        operator, inside, spring, held, slope, bracket.residual, room, tolerance, ITERATIONS
+    )
+    bracket.iterations += taken
+    if status != SOLVED:
+        return None
+    share = inner(held, slope)
+    reached = inner(held, slip)
+    return State(
+        load, reached, spring * (amplitude - reached), 1.0 / share - spring,
+        -inner(profile, slope) / share, slip, slope / share,
+    )  # fmt: skip
+
+
+def other_patch(bracket: Bracket) -> Array | None:
+    """The patch that became unstable beside the one that was held, unit norm; None if none did."""
+    vector = np.where(bracket.inside, np.abs(bracket.room[1]), 0.0)
+    if not vector.any():
+        return None
+    value, taken = lowest_eigenvector(
+        bracket.operator, bracket.inside, vector, 1e-3 * float(bracket.operator.rate.max()), 12
+    )
+    bracket.iterations += taken
+    if value <= 0.0:
+        bracket.raise_multiplier(vector)
+    held: Array = np.maximum(vector, 0.0)
+    return held / np.sqrt(inner(held, held))
+
+
+def load_at(state: State, amplitude: float, curvature: float = 0.0) -> float:
+    """Load without force of the spring at an amplitude, extrapolated from a state, Pa."""
+    step = amplitude - state.amplitude
+    force = state.force + (state.stiffness + 0.5 * curvature * step) * step
+    return state.load - force / state.relief
+
+
+def amplitude_between(below: State, above: State, turn: int) -> float:
+    """Guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
+    if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
+        share = below.stiffness / (below.stiffness - above.stiffness)
+    else:  # mu' has one step, as where a single node joins: where the two `load_at` agree
+        here, there = load_at(below, below.amplitude), load_at(above, below.amplitude)
+        rise = below.stiffness / -below.relief
+        fall = above.stiffness / -above.relief
+        share = (there - here) / ((rise - fall) * (above.amplitude - below.amplitude))
+        share = min(max(share, 0.0), 1.0)
+    return below.amplitude + share * (above.amplitude - below.amplitude)
+
+
+def step_across(state: State, step: float, last: float, curvature: float, moved: bool) -> float:
+    """Step of the amplitude that is likely to change the sign of mu'.
+
+    `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
+    join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
+    """
+    longest = 0.3 * state.amplitude
+    if curvature >= 0.0:
+        return float(np.copysign(longest / 3.0, state.stiffness))
+    newton = -1.2 * state.stiffness / curvature
+    stalled = moved and state.stiffness / last > 0.7
+    step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
+    return min(max(step, -longest), longest)
+
+
+def close(
+    bracket: Bracket,
+    held: Array,
+    load: float,
+    slip: Array,
+    gap: float,
+    bend: float = 0.0,
+    steps: int = 40,
+) -> tuple[bool, float]:
+    """Close a bracket by Newton's method on the turning point of a patch.
+
+    If another patch turns out to be unstable, it is held instead.
+
+    Parameters
+    ----------
+    bracket : Bracket
+        Changed.
+    held : (nx, ny) array
+        phi >= 0, unit norm: the patch.
+    load, slip : float, (nx, ny) array
+        Guess.
+    gap : float
+        As a share of the load.
+    bend : float
+        Curvature a d mu'/da if known, Pa/m, negative.
+    steps : int
+        Held equilibria to solve for, at most.
+
+    Returns
+    -------
+    closed : bool
+    bend : float
+        The curvature found.
+    """
+    if bracket.closed(gap):
+        return True, bend
+    if not slip.any() and not (bracket.excess < load * bracket.profile).any():  # nothing to hold
+        load = 0.5 * (bracket.lower + bracket.upper)
+    accuracy = 0.05 * gap
+    first: State | None = None
+    below: State | None = None  # mu' > 0, the one with the largest a
+    above: State | None = None
+    guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
+    step = last = 0.0
+    switches = idle = 0
+    for turn in range(steps):
+        state = hold(bracket, held, guess, accuracy)
+        if state is None:
+            switches += 1
+            other = other_patch(bracket)
+            if switches > SWITCHES or other is None:
+                break
+            held = other
+            load = min(guess.load, bracket.upper)
+            load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
+            slip = slip if first is None else first.slip
+            guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
+            first = below = above = None
+            step = bend = 0.0
+            continue
+        before = bracket.gap
+        bracket.raise_slip(state.slip)
+        stable = state.stiffness > 0.0
+        if stable:
+            below = state
+        else:
+            above = state
+            bracket.raise_multiplier(state.slope)
+        if below is not None and above is not None:
+            bracket.raise_multiplier(below.slope * -above.stiffness + above.slope * below.stiffness)
+        if bracket.closed(gap):
+            return True, bend
+        idle = idle + 1 if bracket.gap > PROGRESS * before else 0
+        if idle > PATIENCE:
+            break
+        first = first or state
+        moved = state.amplitude - first.amplitude
+        curvature = bend / state.amplitude
+        if moved:
+            curvature = (state.stiffness - first.stiffness) / moved
+        if curvature < 0.0:
+            bend = curvature * state.amplitude
+        if below is not None and above is not None and below.amplitude < above.amplitude:
+            amplitude = amplitude_between(below, above, turn)
+            step = amplitude - state.amplitude
+            load = min(load_at(below, amplitude), load_at(above, amplitude))
+        else:
+            step = step_across(state, step, last, curvature, bool(moved))
+            load = load_at(state, state.amplitude + step, min(curvature, 0.0))
+        last = state.stiffness
+        load = min(load, bracket.upper - 0.3 * gap * bracket.magnitude)
+        guess = State(
+            load, state.amplitude + step, 0.0, 0.0, 0.0,
+            np.maximum(state.slip + step * state.slope, 0.0), state.slope,
+        )  # fmt: skip
+    return False, bend

@@ -1,0 +1,210 @@
+"""Random fields on planes against sums of their modes, closed forms and the line."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import stiction as st
+from stiction.reliability.importance import Mixture
+
+BETA = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+LINE = st.Interface(length=4.0, nodes=128)
+PLANE = st.Interface(length=(4.0, 4.0), nodes=(128, 128))
+SPECTRA = [
+    st.PowerLawSpectrum(correlation_length=0.3, power_kept=0.9999),
+    st.PowerLawSpectrum(correlation_length=0.3, exponent=1.2, power_kept=0.9),
+    st.SquaredExponentialSpectrum(correlation_length=0.3),
+    st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.95),
+]
+
+
+def field_of(spectrum, **options):
+    return st.RandomField(marginal=BETA, spectrum=spectrum, **options)
+
+
+@pytest.mark.parametrize("shape", [(16, 10), (32, 32), (8, 48)])
+@pytest.mark.parametrize("mean_mode", [False, True])
+def test_field_is_the_sum_of_its_modes_on_any_grid(shape, mean_mode):
+    """Waves that a grid does not resolve, and those of Nyquist, included."""
+    field = field_of(
+        st.PowerLawSpectrum(correlation_length=0.05), mean_mode=mean_mode, anisotropy=1.7
+    )
+    plane = st.Interface(length=(0.4, 0.3), nodes=shape)
+    modes, draws = field.modes(plane), field.draws(plane, 2, seed=3)
+    assert modes.highest == (20, 8)
+    x, y = np.meshgrid(*plane.coordinates.values(), indexing="ij")
+    mean = int(mean_mode)
+    direct = np.zeros((2, *shape)) + (modes.sigma[0] * draws[:, 0] * mean)[:, None, None]
+    for j in range(1, modes.count + 1):
+        phase = 2.0 * np.pi * (modes.numbers[0, j] * x / 0.4 + modes.numbers[1, j] * y / 0.3)
+        a, b = draws[:, mean + 2 * j - 2], draws[:, mean + 2 * j - 1]
+        direct += modes.sigma[j] * (
+            a[:, None, None] * np.cos(phase) + b[:, None, None] * np.sin(phase)
+        )
+    # Round-off of a sum of 548 terms.
+    np.testing.assert_allclose(field.gaussian(plane, draws), direct, atol=1e-12)
+    assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-13)
+
+
+def test_every_wave_vector_in_the_ellipse_is_a_mode_once():
+    field = field_of(st.PowerLawSpectrum(correlation_length=0.05), anisotropy=1.7)
+    plane = st.Interface(length=(0.4, 0.3), nodes=(32, 32))
+    modes = field.modes(plane)
+    found = {tuple(pair) for pair in modes.numbers[:, 1:].T.tolist()}
+    cutoff = 2.5 * 2.0 * np.pi / 0.05 * (1.0 + 1e-12)  # (20, 0) lies on it
+    wanted = {
+        (i, j)
+        for i in range(-40, 41)
+        for j in range(41)
+        if (j > 0 or i > 0) and 2.0 * np.pi * np.hypot(i / 0.4, 1.7 * j / 0.3) <= cutoff
+    }
+    assert len(found) == modes.count
+    assert found == wanted
+
+
+@pytest.mark.parametrize(
+    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
+)
+def test_a_cut_has_the_correlation_of_the_line(spectrum):
+    """Of z and of the strength, on the periodic grid, but for what truncation leaves out."""
+    field = field_of(spectrum, mean_mode=True)
+    left_out = 1.0 - spectrum.plane_power_within(spectrum.plane_cutoff)
+    for of in ("z", "strength"):
+        plane, line = field.correlation(PLANE, of=of), field.correlation(LINE, of=of)
+        assert plane[0, 0] == pytest.approx(1.0, rel=1e-12)
+        # Each is a mean of cosines with its share missing, and 1 at zero lag.
+        assert np.abs(plane[:, 0] - line).max() <= 2.0 * left_out + 1e-6
+        np.testing.assert_allclose(plane, plane.T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
+)
+def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
+    """g(kx) of the line is the integral over ky of the plane's: inverse Abel transform, checked."""
+    wave = 2.0 * np.pi / 0.3
+    k = np.array([0.0, 0.3, 1.0, 2.0]) * wave
+    across = [
+        quad(lambda q, a=a: spectrum.plane_density(np.hypot(a, q * wave)), 0.0, np.inf)[0]
+        for a in k
+    ]
+    np.testing.assert_allclose(
+        np.array(across) / across[0],
+        spectrum.density(k) / spectrum.density(k)[0],
+        rtol=1e-7,  # of the quadrature, or of the integral at k = 0
+        atol=1e-9,
+    )
+    cutoff = spectrum.plane_cutoff
+    inside = quad(lambda k: k * spectrum.plane_density(k), 0.0, cutoff, limit=200)[0]
+    whole = inside + quad(lambda k: k * spectrum.plane_density(k), cutoff, np.inf, limit=200)[0]
+    assert inside / whole == pytest.approx(spectrum.plane_power_within(cutoff), rel=1e-6)
+    assert inside / whole == pytest.approx(spectrum.power_kept or spectrum._default_power, rel=1e-6)
+
+
+def test_own_spectrum_is_the_density_on_the_plane():
+    named = st.SquaredExponentialSpectrum(correlation_length=0.3, power_kept=0.99)
+    own = st.CustomSpectrum(function=named.plane_density, power_kept=0.99)
+    assert own.plane_cutoff == pytest.approx(named.plane_cutoff, rel=1e-8)
+    one, other = (field_of(s, mean_mode=True).modes(PLANE).sigma for s in (named, own))
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+    slow = st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + (0.3 * k) ** 2))
+    with pytest.raises(st.InputError, match="does not converge; give max_wavenumber"):
+        field_of(slow).modes(PLANE)
+
+
+def test_sampled_correlation_is_the_exact_one():
+    """Mean, variance and correlation of the strength, anisotropy included, without a mean mode."""
+    plane = st.Interface(length=(1.0, 1.5), nodes=(32, 24))
+    field = field_of(st.PowerLawSpectrum(correlation_length=0.25), anisotropy=2.0)
+    samples = 1500
+    strength = field.sample(plane, samples=samples, seed=1)
+    scaled = (strength - field.mean) / field.standard_deviation
+    power = np.abs(np.fft.fft2(scaled)) ** 2
+    each = np.fft.ifft2(power).real / plane.size  # correlation of each sample, over all places
+    error = each.std(axis=0) / np.sqrt(samples)
+    gap = np.abs(each.mean(axis=0) - field.correlation(plane))
+    # Of 768 lags, largely dependent, none is likely to be 4.5 standard errors off.
+    assert (gap < 4.5 * error).all()
+    means = scaled.mean(axis=(1, 2))
+    assert abs(means.mean()) < 4.5 * means.std() / np.sqrt(samples)
+    # Twice as far along y; the modes of a small plane are few.
+    along, across = field.correlation(plane)[4, 0], field.correlation(plane)[0, 4]
+    assert across == pytest.approx(along, abs=0.01)
+
+
+def test_sample_i_is_the_same_in_every_batch_and_finer_grids_extend_the_field():
+    plane = st.Interface(length=(1.0, 1.5), nodes=(64, 64))
+    field = field_of(st.PowerLawSpectrum(correlation_length=0.25))
+    many = field.sample(plane, samples=300, seed=5)
+    assert np.array_equal(field.sample(plane, samples=2, seed=5, first=255), many[255:257])
+    assert not np.array_equal(field.sample(plane, seed=5, stream=1), many[:1])
+    coarse = st.Interface(length=(1.0, 1.5), nodes=(32, 16))
+    nodes = field.sample(coarse, samples=3, seed=5)
+    # Exact but for the round-off of two transforms through the map.
+    np.testing.assert_allclose(nodes, many[:3, ::2, ::4], rtol=1e-9)
+
+
+def test_a_mode_keeps_its_draws_whatever_the_spectrum():
+    """More modes, or an ellipse of others, extend the same field."""
+    plane = st.Interface(length=(1.0, 2.2), nodes=(32, 32))
+    fields = [
+        field_of(st.PowerLawSpectrum(correlation_length=0.25)),
+        field_of(st.PowerLawSpectrum(correlation_length=0.25, truncation=1.5)),
+        field_of(st.PowerLawSpectrum(correlation_length=0.25), anisotropy=2.5),
+        field_of(st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.8), mean_mode=True),
+    ]
+    known = {}
+    for field in fields:
+        modes, draws = field.modes(plane), field.draws(plane, 1, seed=2)[0]
+        pairs = draws[int(field.mean_mode) :].reshape(-1, 2)
+        for number, pair in zip(modes.numbers[:, 1:].T.tolist(), pairs, strict=True):
+            assert known.setdefault(tuple(number), tuple(pair)) == tuple(pair)
+    shared = fields[2].modes(plane).count
+    assert len(known) > shared
+
+
+def test_properties_are_correlated_mode_by_mode():
+    """Spectra of different lengths: each has the draws of its own modes."""
+    plane = st.Interface(length=(1.0, 1.0), nodes=(32, 32))
+    strength = field_of(st.PowerLawSpectrum(correlation_length=0.2))
+    residual = st.RandomField(
+        st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6),
+        st.PowerLawSpectrum(correlation_length=0.3),
+        anisotropy=2.0,
+    )
+    alone = st.RandomInterface(strength=strength, residual_strength=residual)
+    tied = dataclasses.replace(alone, correlation={("strength", "residual_strength"): 1.0})
+    first, second = (r.profiles(plane, samples=2, seed=3) for r in (alone, tied))
+    np.testing.assert_array_equal(first["strength"], second["strength"])
+    np.testing.assert_array_equal(first["strength"], strength.sample(plane, samples=2, seed=3))
+    np.testing.assert_array_equal(
+        second["residual_strength"], residual.sample(plane, samples=2, seed=3)
+    )
+    assert not np.array_equal(first["residual_strength"], second["residual_strength"])
+
+
+def test_line_with_anisotropy_is_refused():
+    field = field_of(st.PowerLawSpectrum(correlation_length=0.3), anisotropy=2.0)
+    with pytest.raises(st.InputError, match=r"anisotropy: .*a line has no y; got 2"):
+        field.sample(LINE)
+
+
+def test_draws_move_along_the_plane():
+    """Shift and weights of importance sampling, against sums over all nodes."""
+    plane = st.Interface(length=(1.0, 1.5), nodes=(16, 12))
+    field = field_of(st.PowerLawSpectrum(correlation_length=0.25), mean_mode=True)
+    rng = np.random.default_rng(1)
+    modes = field.modes(plane)
+    shift = rng.standard_normal(modes.dimension)
+    mixture = Mixture(shift, plane.shape, modes.numbers[:, 1:], True)
+    nodes = np.array([0, 1, 100])
+    z = field.gaussian(plane, np.vstack([shift, mixture.moved(nodes)]))
+    for moved, node in zip(z[1:], nodes, strict=True):
+        np.testing.assert_allclose(
+            moved, np.roll(z[0], np.unravel_index(node, plane.shape), (0, 1)), atol=1e-12
+        )
+    draws = rng.standard_normal((3, shift.size))
+    direct = draws @ mixture.moved(np.arange(plane.size)).T
+    np.testing.assert_allclose(mixture.projections(draws), direct, atol=1e-10)

@@ -1,0 +1,177 @@
+"""st.Equilibrium on planes against HiGHS on dense programmes and against dumb relaxation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import stiction as st
+from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.equilibrium.transform_operator import stiffness_symbol
+
+RATE = 0.5e12
+LENGTH = 3.46e-3  # nucleation length h_n along x
+NODES = (24, 24)
+
+
+def noise(correlation, rng, shape=NODES):
+    """Smooth field between 0 and 1; correlation length in nodes."""
+    k = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :])
+    field = np.fft.irfft2(
+        np.fft.rfft2(rng.standard_normal(shape)) * np.exp(-((correlation * k) ** 2)), shape
+    )
+    return (field - field.min()) / np.ptp(field)
+
+
+def dense_stiffness(problem):
+    """K as a matrix, column by column."""
+    interface, solid = problem.interface, problem.solid
+    symbol = stiffness_symbol(
+        interface.shape, interface.lengths, solid.shear_modulus, solid.poisson_ratio
+    )
+    columns = []
+    for node in range(interface.size):
+        unit = np.zeros(interface.shape)
+        unit.flat[node] = 1.0
+        columns.append(np.fft.irfft2(symbol * np.fft.rfft2(unit), interface.shape).ravel())
+    return np.array(columns).T
+
+
+def by_linear_programme(problem, sample):
+    """max tau_0: (K - W) d + tau_p - tau_i - tau_0 p >= 0, d >= 0, by HiGHS; onset and slip."""
+    excess = (sample.strength - sample.initial_stress)[0].ravel() / 1e6
+    matrix = (dense_stiffness(problem) - np.diag(sample.weakening_rate[0].ravel())) / RATE
+    result = linprog(
+        np.r_[np.zeros(excess.size), -1.0],
+        A_ub=np.c_[-matrix, sample.load_profile.ravel()],
+        b_ub=excess,
+        bounds=[(0, None)] * excess.size + [(None, None)],
+        method="highs-ds",
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    assert result.status == 0
+    return result.x[-1] * 1e6, -result.ineqlin.marginals.reshape(NODES)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")  # 24 nodes are few
+@pytest.mark.parametrize("seed", range(4))
+def test_onset_and_sensitivity_equal_the_linear_programme(solid, seed):
+    rng = np.random.default_rng(seed)
+    problem = st.Problem(
+        solid,
+        st.Interface((3.0 * LENGTH, 3.0 * LENGTH), NODES),
+        st.SlipWeakening(weakening_rate=RATE * (0.8 + 0.3 * noise(6.0, rng))),
+        load=st.Load(profile=1.0 + 0.4 * noise(6.0, rng), initial_stress=2e5 * noise(3.0, rng)),
+    )
+    strength = 0.66e6 + 1e6 * noise(rng.choice([2.0, 4.0, 8.0]), rng)
+    sample = problem.sample(strength)
+    exact, multiplier = by_linear_programme(problem, sample)
+    found = st.onset(problem, strength, method=st.Equilibrium(gap=1e-10, sensitivity=True))
+    mean = sample.initial_stress.mean() + exact * sample.load_profile.mean()
+    assert found["first_instability"].item() == pytest.approx(mean, rel=1e-9)
+    assert found["certified"].item()
+    sensitivity = multiplier * sample.load_profile.mean()
+    # The multiplier is that of a load 1e-10 off, with a quadratic fold between: the root of it.
+    error = np.abs(found["sensitivity"].values[0] - sensitivity).max()
+    assert error < 1e-4 * sensitivity.max()
+
+
+def by_relaxation(problem, sample, load, slip, limit=60_000):
+    """Every overloaded node slips a little at a time; None if the whole slides."""
+    interface, solid = problem.interface, problem.solid
+    symbol = stiffness_symbol(
+        interface.shape, interface.lengths, solid.shear_modulus, solid.poisson_ratio
+    )
+    step = 1.0 / np.fft.irfft2(symbol, interface.shape)[0, 0]
+    critical = (sample.strength - sample.residual_strength)[0] / RATE
+    for _ in range(limit):
+        stress = load - np.fft.irfft2(symbol * np.fft.rfft2(slip), interface.shape)
+        drive = stress - np.maximum(sample.strength[0] - RATE * slip, sample.residual_strength[0])
+        if drive.max() < 1e-8 * sample.strength.mean():
+            return slip
+        if (slip > critical).all():
+            return None
+        slip = slip + step * np.maximum(drive, 0.0)
+    raise AssertionError("did not settle")
+
+
+@pytest.fixture(scope="module")
+def wide():
+    """Strength over a wide range, so that ruptures are arrested: a problem and three samples."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
+    shape = (32, 32)
+    problem = st.Problem(
+        solid,
+        st.Interface((5.0 * LENGTH, 5.0 * LENGTH), shape),
+        st.SlipWeakening(weakening_rate=RATE, residual_strength=3.5e5),
+    )
+    strength = [0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(s), shape) for s in (20, 23, 0)]
+    return problem, np.array(strength)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_arrest_equals_relaxation_node_by_node(wide):
+    problem, strength = wide
+    found = st.onset(problem, strength, method=st.Equilibrium())
+    events = st.equilibrium_events(problem, strength)
+    assert list(found["arrested_events"].values) == [1, 1, 0]
+    assert not found["certified"].values.any()
+    for number in range(2):
+        first = found["first_instability"].values[number]
+        last = found["critical_load"].values[number]
+        assert first < last
+        (event,) = np.flatnonzero(events["sample"].values == number)
+        assert events["load"].values[event] == pytest.approx(first, rel=1e-5)
+        # Before and after each instability, at some distance: near one, relaxation takes for ever.
+        loads = np.array([first * 0.998, first * 1.002, last * 0.998, last * 1.002])
+        path = st.equilibrium_path(problem, strength[number], loads)
+        assert list(path["arrested_events"].values) == [0, 1, 1, 1]
+        assert list(path["sliding"].values) == [False, False, False, True]
+        slip = np.zeros(problem.interface.shape)
+        sample = problem.sample(strength[number])
+        for load, ours in zip(loads[:3], path["slip"].values, strict=False):
+            slip = by_relaxation(problem, sample, load, slip)
+            # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
+            assert np.abs(ours - slip).max() < 1e-4 * 9e-6
+        assert by_relaxation(problem, sample, loads[3], slip) is None
+        around = st.equilibrium_path(problem, strength[number], first * (1 + np.r_[-1e-7, 3e-6]))
+        moved = np.diff(around["slip"].values, axis=0)
+        moment = problem.solid.shear_modulus * moved.sum() * problem.interface.cell
+        # Slip goes with the root of the distance to the instability, and this jump is a short one.
+        assert events["moment"].values[event] == pytest.approx(moment, rel=0.1)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
+def test_what_moves_next_to_nothing_is_no_instability(wide, wavenumbers):
+    # On the way nodes reach their residual strength one by one, which looks unstable to long steps.
+    problem, _ = wide
+    shape = problem.interface.shape
+    strength = 0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(5), shape)
+    found = st.onset(problem, strength, method=st.Equilibrium(wavenumbers=wavenumbers))
+    assert found["arrested_events"].item() == 1
+    first, last = found["first_instability"].item(), found["critical_load"].item()
+    # 1.01045 and 1.01046: stopping at the first step that looked unstable gave 1.01224.
+    assert last / first == pytest.approx(1.01045, abs=2e-4)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_path_balances_where_it_slips(wide):
+    problem, strength = wide
+    path = st.equilibrium_path(problem, strength[2], np.array([5e5, 8e5, 1e6]))
+    slip, stress = path["slip"].values, path["stress"].values
+    held = np.maximum(strength[2] - RATE * slip, 3.5e5)
+    moving = slip > 0.0
+    assert moving.any()
+    # 1e-7 of the mean strength is the accuracy of relaxation.
+    assert np.abs(stress - held)[moving].max() < 1e-6 * strength[2].mean()
+    assert (stress - held).max() < 1e-6 * strength[2].mean()
+    assert path["mean_stress"].values == pytest.approx(path["load"].values, rel=1e-12)
+    assert path["stress"].dims == ("load", "x", "y")
+
+
+def test_symbol_of_the_plane_is_the_lines_along_x():
+    column = stiffness_column(32, 0.01, 1e9 / 0.67)
+    symbol = stiffness_symbol((32, 8), (0.01, 0.01), 1e9, 0.33)[:17, 0]
+    assert symbol == pytest.approx(np.fft.rfft(column).real, abs=1e-9 * symbol.max())

@@ -1,0 +1,159 @@
+"""A study of a plane from a file: run, stored, exported, drawn and reported like that of a line."""
+
+import csv
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import stiction as st
+from stiction.cli.app import app
+
+STUDY = """
+[problem.solid]
+shear_modulus = 1e9
+poisson_ratio = 0.33
+density = 1170.0
+[problem.interface]
+length = [0.02, 0.014]
+nodes = [72, 60]
+[problem.friction]
+weakening_rate = 0.5e12
+[random.strength]
+anisotropy = 1.5
+mean_mode = true
+[random.strength.marginal]
+type = "beta"
+alpha = 1.5
+beta = 3.0
+low = 0.66e6
+high = 1.66e6
+[random.strength.spectrum]
+type = "power_law"
+correlation_length = 2e-3
+[method]
+type = "local_criterion"
+[ensemble]
+samples = 30
+seed = 3
+keep = ["strength"]
+keep_samples = [0, 4]
+[sweep]
+"random.strength.spectrum.correlation_length" = [2e-3, 4e-3]
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "plane.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def command(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_stored_run_is_that_in_memory(path, tmp_path):
+    study = st.Study.from_toml(path)
+    assert st.Study.from_dict(study.to_dict()) == study
+    memory = study.run(progress=False)
+    assert memory.critical_position.dims == ("correlation_length", "sample", "direction")
+    assert memory.strength.shape == (2, 2, 72, 60)
+    stored = study.run(out=tmp_path / "run", progress=False)
+    xr.testing.assert_equal(memory, stored)
+    xr.testing.assert_equal(memory, st.open_run(tmp_path / "run").dataset())
+    field = study.plans[1].random.strength
+    own = field.sample(study.plans[1].problem.interface, seed=3, first=4)
+    assert np.array_equal(own[0], memory.strength[1, 1])
+    again = st.onset(study.plans[1].problem, own, method=st.LocalCriterion())
+    assert again.critical_load.item() == memory.critical_load.values[1, 4]
+
+
+def test_run_that_was_left_and_goes_on(path, tmp_path):
+    few = tmp_path / "few.toml"
+    few.write_text(STUDY.replace("samples = 30", "samples = 11"))
+    command("run", few, "--out", tmp_path / "run")
+    command("run", path, "--out", tmp_path / "run")
+    xr.testing.assert_equal(
+        st.Study.from_toml(path).run(progress=False), st.open_run(tmp_path / "run").dataset()
+    )
+
+
+def test_commands(path, tmp_path):
+    run = tmp_path / "run"
+    text = command("check", path)
+    assert "L = 5.78697 h_n x 4.05088 h_n" in text
+    command("run", path, "--out", run)
+    assert "60 of 60" in command("status", run)
+    command("export", run, tmp_path / "run.csv")
+    rows = list(csv.DictReader((tmp_path / "run.csv").open()))
+    assert len(rows) == 60
+    stored = st.open_run(run).dataset()
+    for dim in ("x", "y"):
+        found = float(rows[7][f"critical_position_{dim} (m)"])
+        assert found == stored.critical_position.sel(direction=dim).values.ravel()[7]
+    command("export", run, tmp_path / "run.nc")
+    xr.testing.assert_equal(xr.load_dataset(tmp_path / "run.nc"), stored)
+    command("plot", run)
+    assert (run / "figures" / "densities.png").stat().st_size > 10_000
+    command("report", run)
+    assert "30" in (run / "report.html").read_text()
+
+
+def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
+    """Names decide, whatever the order; units are converted; what is elsewhere is refused."""
+    plan = st.Study.from_toml(path).plans[0]
+    plane = plan.problem.interface
+    tau_p = plan.random.strength.sample(plane, seed=1)[0]
+    turned = xr.DataArray(
+        tau_p.T * 1e-6,
+        dims=("y", "x"),
+        coords={
+            "x": ("x", plane.x * 1e3, {"units": "mm"}),
+            "y": ("y", plane.coordinates["y"]),
+        },
+        attrs={"units": "MPa"},
+        name="strength",
+    )
+    plain, labelled = (
+        st.onset(plan.problem, given, method=st.LocalCriterion()) for given in (tau_p, turned)
+    )
+    # Conversion of units rounds.
+    np.testing.assert_allclose(plain.critical_load, labelled.critical_load, rtol=1e-14)
+    turned.to_netcdf(tmp_path / "strength.nc")
+    np.save(tmp_path / "strength.npy", tau_p)
+    np.save(tmp_path / "turned.npy", tau_p.T)
+    for name in ("strength.nc", "strength.npy"):
+        read = st.read_profile(tmp_path / name, interface=plane)
+        assert read.dims == ("x", "y")
+        np.testing.assert_allclose(read, tau_p, rtol=1e-14)
+    with pytest.raises(st.InputError, match="x and y have changed places"):
+        st.read_profile(tmp_path / "turned.npy", interface=plane)
+    with pytest.raises(st.InputError, match=r"call them 'x', .* and 'y'"):
+        st.onset(plan.problem, turned.rename(x="u"), method=st.LocalCriterion())
+    elsewhere = turned.assign_coords(y=2.0 * plane.coordinates["y"])
+    with pytest.raises(st.InputError, match="y reaches from 0 to"):
+        st.onset(plan.problem, elsewhere, method=st.LocalCriterion())
+    figure = tmp_path / "onset.png"
+    options = "--method", "local_criterion", "--out", figure
+    text = command("onset", path, "--strength", tmp_path / "strength.nc", *options)
+    assert f"{plain.critical_load.item() * 1e-6:.6f} MPa" in text
+    assert figure.stat().st_size > 10_000
+
+
+def test_failing_profiles_are_drawn(path):
+    from stiction.report.reliability_figures import weak_spot_figure
+
+    plan = st.Study.from_toml(path).plans[0]
+    found = st.failure_probability(
+        plan.problem, plan.random, 0.72e6, method=plan.method, algorithm="plain",
+        target_cov=0.5, max_evaluations=300, progress=False,
+    )  # fmt: skip
+    assert found.failing_profiles.sizes["sample"] >= 2
+    axes = weak_spot_figure(found.failing_profiles, plan.problem.nucleation_length, 0.72e6).axes[0]
+    middle = axes.images[0].get_array()
+    assert middle.min() < 0.9 * middle.mean()
