@@ -10,7 +10,8 @@ import numpy as np
 
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
-from stiction.interface import Interface
+from stiction.interface import FEWEST, Interface
+from stiction.profile_files import read_npy
 from stiction.profile_nodes import check_gaps
 from stiction.profiles import UNITS, Points, labelled, points_of
 
@@ -100,7 +101,12 @@ def placed_profile(given: Any, field: str, folder: Any) -> Any:
                 " st.read_profile(path)"
             )
         try:
-            points = points_of(Path(folder) / given, quantity, **options)
+            path = Path(folder) / given
+            if path.suffix.lower() == ".npy" and not options:
+                array = read_npy(path)
+                if array.ndim == 2 and min(array.shape) >= FEWEST:  # a plane, and no columns
+                    return array
+            points = points_of(path, quantity, **options)
         except InputError as error:
             raise InputError([f"{given}: {text}" for text in error.problems]) from None
     else:

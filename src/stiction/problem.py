@@ -78,6 +78,8 @@ class Problem:
         nodes = " x ".join(map(str, shape))
         problems = [
             f"{name}: must have one entry for each of the {nodes} nodes, got {describe(value)}"
+            + "; x and y have changed places: the first axis of a profile is x"
+            * (value.shape == shape[::-1] and len(shape) == 2)
             for name, value in arrays.items()
             if isinstance(value, np.ndarray) and value.shape != shape
         ]

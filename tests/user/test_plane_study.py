@@ -157,3 +157,19 @@ def test_failing_profiles_are_drawn(path):
     axes = weak_spot_figure(found.failing_profiles, plan.problem.nucleation_length, 0.72e6).axes[0]
     middle = axes.images[0].get_array()
     assert middle.min() < 0.9 * middle.mean()
+
+
+def test_load_of_a_plane_from_a_file(path, tmp_path):
+    profile = 1.0 + 0.1 * np.random.default_rng(0).random((72, 60))
+    np.save(tmp_path / "load.npy", profile)
+    np.save(tmp_path / "turned.npy", profile.T)
+    text = STUDY.replace(
+        "[random.strength]", '[problem.load]\nprofile = "load.npy"\n[random.strength]', 1
+    )
+    path.write_text(text)
+    study = st.Study.from_toml(path)
+    assert np.array_equal(study.plans[0].problem.load.profile, profile)
+    assert st.Study.from_dict(study.to_dict()) == study
+    path.write_text(text.replace("load.npy", "turned.npy"))
+    with pytest.raises(st.InputError, match="load.profile.*x and y have changed places"):
+        st.Study.from_toml(path)
