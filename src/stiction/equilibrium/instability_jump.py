@@ -21,7 +21,7 @@ from stiction.equilibrium.linear_program import (
     singular_direction,
     stress_tolerance,
 )
-from stiction.equilibrium.pieces import piece_at, start_of
+from stiction.equilibrium.pieces import AT_CORNER, piece_at, start_of
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample, make_room
 
 SLIDING = 0
@@ -87,11 +87,14 @@ def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     count = 0
     for q in range(2 * n):
         i = q if q < n else q - n
-        piece = piece_at(sample.pieces, sample.critical[i], slip[i]) if slip[i] > 0.0 else ZERO
-        count += piece
-        run = run + 1 if slip[i] > 0.0 and piece == sample.pieces.ends.shape[0] else 0
+        residual = slip[i] > 0.0 and slip[i] >= AT_CORNER * sample.critical[i]
+        run = run + 1 if residual else 0
+        if q < n and residual:
+            count += sample.pieces.ends.shape[0]
+        elif q < n and slip[i] > 0.0:
+            count += piece_at(sample.pieces, sample.critical[i], slip[i])
         longest = max(longest, run)
-    return min(longest, n), count // 2
+    return min(longest, n), count
 
 
 @jit
