@@ -38,13 +38,15 @@ def test_what_is_returned(plane):
     np.testing.assert_allclose(found.critical_load, averages.min(axis=(1, 2)), rtol=1e-13)
     aspects = middle_aspect(plane) * np.array(STRETCHES)
     assert np.isin(found.critical_aspect.values, aspects).all()
-    ratio = found.critical_extent.sel(direction="x") / found.critical_extent.sel(direction="y")
+    ratio = found.critical_patch_extent.sel(direction="x") / found.critical_patch_extent.sel(
+        direction="y"
+    )
     np.testing.assert_allclose(ratio, found.critical_aspect, rtol=1e-12)
     each = [st.nucleation_stress(plane, strength[0], aspect=a).min() for a in aspects]
     assert aspects[int(np.argmin(each))] == found.critical_aspect.values[0]
     # Of an ellipse of these extents, as far as whole nodes make one.
-    area = 0.25 * np.pi * found.critical_extent.prod("direction")
-    np.testing.assert_allclose(found.critical_area, area, rtol=0.15)
+    area = 0.25 * np.pi * found.critical_patch_extent.prod("direction")
+    np.testing.assert_allclose(found.critical_patch_area, area, rtol=0.15)
 
 
 def test_weights_certify_the_bound(plane):

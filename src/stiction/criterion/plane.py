@@ -27,8 +27,8 @@ STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
 
 OWN_VARIABLES = {
     "critical_aspect": Variable("1", "extent of the critical ellipse along x over that along y"),
-    "critical_extent": Variable("m", "extents of the critical ellipse"),
-    "critical_area": Variable("m2", "area of the critical ellipse"),
+    "critical_patch_extent": Variable("m", "extents of the critical ellipse"),
+    "critical_patch_area": Variable("m2", "area of the critical ellipse"),
 }
 
 
@@ -42,8 +42,8 @@ def middle_aspect(problem: Problem) -> float:
 
 def own_variables(problem: Problem) -> dict[str, Variable]:
     """What the criterion says of each sample of a plane besides its onset."""
-    extent = position(problem.interface, OWN_VARIABLES["critical_extent"])
-    return OWN_VARIABLES | {"critical_extent": extent}
+    extent = position(problem.interface, OWN_VARIABLES["critical_patch_extent"])
+    return OWN_VARIABLES | {"critical_patch_extent": extent}
 
 
 @lru_cache(maxsize=64)
@@ -142,8 +142,8 @@ class PlaneSolver:
             "first_instability": stress.copy(),
             "critical_position": place,
             "critical_aspect": aspect,
-            "critical_extent": extent,
-            "critical_area": area,
+            "critical_patch_extent": extent,
+            "critical_patch_area": area,
         }
 
 

@@ -86,7 +86,7 @@ def _mark(axes: Axes, result: xr.Dataset, number: int, name: str, lengths: list[
     )
     if "critical_aspect" not in result:
         return
-    extent = result["critical_extent"].values[0] * 1e3
+    extent = result["critical_patch_extent"].values[0] * 1e3
     for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
         axes.add_patch(
             Ellipse(
