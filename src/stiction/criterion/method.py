@@ -49,8 +49,8 @@ class LocalCriterion:
     On a plane the average is over critical ellipses of five shapes, each the smallest on which the
     stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
     minimum is taken over nodes and shapes. Beside the variables of every method there are then
-    `critical_aspect`, `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) of the ellipse
-    that decided.
+    `critical_aspect`, `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) of
+    the ellipse that decided.
     """
 
     weights: Weights = "exact"
