@@ -206,6 +206,7 @@ class OwnLaw(FrictionLaw):
         return OwnParameters()
 
 
+@pytest.mark.slow  # its functions are compiled anew
 def test_law_of_ones_own(with_law, tau_p):
     own = with_law(OwnLaw(weakening_rate=0.5e12))
     found, expected = (
