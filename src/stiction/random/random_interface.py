@@ -162,9 +162,10 @@ class RandomInterface:
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=256, residual_strength=0.3e6)
+    >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> residual = st.RandomField(st.Beta(2.0, 2.0, low=0.2e6, high=0.4e6), strength.spectrum)
+    >>> marginal = st.Beta(alpha=2.0, beta=2.0, low=0.2e6, high=0.4e6)
+    >>> residual = st.RandomField(marginal, strength.spectrum)
     >>> random = st.RandomInterface(
     ...     strength=strength,
     ...     residual_strength=residual,

@@ -78,9 +78,9 @@ def _mesh(axes: Axes, x: Floats, times: Floats, rate: Floats) -> Any:
 
 def _nucleation_arrow(axes: Axes, problem: Problem, run: xr.Dataset, height: float) -> None:
     """h_n as a double arrow centred on the critical position."""
-    steepest = float(np.max(problem.friction.weakening_rate or np.nan))
-    if not np.isfinite(steepest):
+    if problem.friction.weakening_rate is None:
         return
+    steepest = float(np.max(problem.friction.weakening_rate))
     half = 0.5 * problem.nucleation_length_of(steepest) * _MILLI
     centre = float(run["critical_position"]) * _MILLI
     axes.annotate(
