@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 import stiction as st
+from stiction.criterion.assumptions import excess_of
 from stiction.criterion.eigenproblem import (
     eigenvalues_and_vector,
     exact_weight,
     rounded_weight,
 )
 from stiction.criterion.grid_weights import grid_weights, transform
-from stiction.criterion.nucleation import excess_of, multiplier_of
+from stiction.criterion.nucleation import multiplier_of
 from stiction.problem import SMALLEST_EIGENVALUE
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 import stiction as st
 from stiction.elasticity.line_stiffness import stiffness_column
-from stiction.equilibrium.transform_operator import stiffness_symbol
+from stiction.elasticity.transform_operator import stiffness_symbol
 
 RATE = 0.5e12
 LENGTH = 3.46e-3  # nucleation length h_n along x

@@ -7,11 +7,11 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import linprog
 
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
+from stiction.elasticity.transform_operator import make_operator
 from stiction.equilibrium.follow_plane import follow_plane, plane_slip_at
 from stiction.equilibrium.least_equilibrium import BALANCED, SLIDING, PlaneSample
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of
-from stiction.equilibrium.transform_operator import make_operator
 
 RATE = 0.5e12
 LENGTH = 3.46e-3  # nucleation length h_n of plane strain at G = 1 GPa, nu = 0.33 and that rate

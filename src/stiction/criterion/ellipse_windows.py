@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._typing import Array
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
-from stiction.equilibrium.transform_operator import make_operator
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
+from stiction.elasticity.transform_operator import make_operator
 
 TOLERANCE = 1e-9
 """Residual of an eigenvector, as a share of W."""

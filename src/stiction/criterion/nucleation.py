@@ -9,12 +9,18 @@ import numpy as np
 from stiction._checks import check_choice, check_instance, is_real
 from stiction._model import describe
 from stiction._typing import Array
+from stiction.criterion.assumptions import (
+    check_law,
+    excess_of,
+    uniform_rates,
+    warn_if_coarse,
+)
 from stiction.criterion.eigenproblem import Weight, exact_weight, rounded_weight
 from stiction.criterion.grid_weights import grid_weights, transform
 from stiction.criterion.moving_average import average_rows
-from stiction.errors import InputError, warn_accuracy
+from stiction.criterion.plane import plane_nucleation_stress
+from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.sample import Sample
 
 Weights = Literal["exact", "rounded"]
 
@@ -23,33 +29,6 @@ def weight_of(weights: Weights) -> Weight:
     """The exact weight or the printed, rounded one."""
     check_choice("weights", weights, ("exact", "rounded"))
     return exact_weight() if weights == "exact" else rounded_weight()
-
-
-def refused_laws(problem: Problem) -> list[str]:
-    """Why the criterion of the initial slope says nothing on a friction law; nothing if it does."""
-    friction = problem.friction
-    if not friction.steepens:
-        return []
-    times = friction.steepest_slope / friction.initial_slope
-    return [
-        f"friction: the local criterion takes the weakening rate at zero slip, and this law falls"
-        f" up to {times:.3g} times as steeply later, so that patches become unstable at lower"
-        " loads than it says; use st.Equilibrium() or st.Rupture()"
-    ]
-
-
-def check_law(problem: Problem) -> None:
-    """Refuse a law that steepens; warn of one that is not linear, with the error to expect."""
-    if reasons := refused_laws(problem):
-        raise InputError(reasons)
-    if not problem.friction.linear:
-        warn_accuracy(
-            "friction: the local criterion takes the weakening rate at zero slip for that at any;"
-            " as strength falls ever less steeply, patches become unstable later than it says: for"
-            " an exponential law and strength from 0.66 to 1.66 MPa by 2 % (at most 7 %) at a"
-            " correlation length of a quarter of h_n, by 0.6 % (at most 3 %) at one of h_n;"
-            " st.Equilibrium() follows polygons exactly"
-        )
 
 
 def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights = "exact") -> Array:
@@ -66,45 +45,6 @@ def multiplier_of(problem: Problem, nucleation_length: float, weights: Weights =
         )
     half_width = 0.5 * nucleation_length / problem.interface.spacing
     return transform(grid_weights(weight_of(weights), half_width), problem.interface.size)
-
-
-def warn_if_coarse(problem: Problem, rows: Sample) -> None:
-    """Warn where the moving average is a coarse sum."""
-    if problem.interface.is_plane:
-        problem.warn_if_coarse(
-            rows,
-            8.0,
-            "the local criterion takes the lowest node and critical patches of whole nodes, which"
-            " makes it about 0.15 % too high at 8 nodes, 0.4 % at 5 and 0.7 % at 4",
-        )
-        return
-    problem.warn_if_coarse(
-        rows,
-        12.0,
-        "where the strength varies within a quarter of it, the local criterion is off by about"
-        " 0.8 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less",
-    )
-
-
-def excess_of(rows: Sample) -> Array:
-    """tau_p - tau_i, Pa; `InputError` where the strength is not finite."""
-    if not np.isfinite(rows.strength).all():
-        raise InputError(
-            "strength: the local criterion averages the strength over the nucleation length, so it"
-            " must be finite everywhere; where some of it cannot break, give a large finite"
-            " strength, or use st.Equilibrium() or st.Rupture()"
-        )
-    return np.ascontiguousarray(rows.strength - rows.initial_stress)
-
-
-def uniform_rates(rows: Sample) -> Array:
-    """W of each sample, shape (samples,); `InputError` where it varies along the interface."""
-    if not rows.uniform_weakening:
-        raise InputError(
-            "weakening_rate: varies along the interface, so there is no single nucleation length;"
-            " the local criterion does not hold, use st.Equilibrium() or st.Rupture()"
-        )
-    return np.ascontiguousarray(rows.weakening_rate.reshape(rows.samples, -1)[:, 0])
 
 
 def check_aspect(problem: Problem, weights: Weights, aspect: Any) -> None:
@@ -165,8 +105,6 @@ def nucleation_stress(
         rate = float(rows.weakening_rate.flat[0])
     warn_if_coarse(problem, rows)
     if plane:
-        from stiction.criterion.plane import plane_nucleation_stress
-
         found = plane_nucleation_stress(problem, rows, aspect)
         return found[0] if np.ndim(tau_p) == 2 else found
     multiplier = multiplier_of(problem, problem.nucleation_length_of(rate), weights)

@@ -8,14 +8,14 @@ from functools import lru_cache
 import numpy as np
 
 from stiction._typing import Array
+from stiction.criterion.assumptions import check_law, excess_of, uniform_rates, warn_if_coarse
 from stiction.criterion.ellipse_windows import (
     EllipseWindow,
     LocalOnset,
     ellipse_window,
     local_onset,
 )
-from stiction.criterion.nucleation import excess_of, uniform_rates, warn_if_coarse
-from stiction.equilibrium.transform_operator import stiffness_symbol
+from stiction.elasticity.transform_operator import stiffness_symbol
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.results import Variable, position
@@ -116,6 +116,7 @@ class PlaneSolver:
     """Onset of samples of a plane, each at the least average over place and shape."""
 
     def __init__(self, problem: Problem) -> None:
+        check_law(problem)
         self.problem = problem
 
     def __call__(self, samples: Sample) -> dict[str, Array]:
@@ -149,6 +150,7 @@ class PlaneSolver:
 
 def plane_nucleation_stress(problem: Problem, sample: Sample, aspect: float | None) -> Array:
     """Nucleation stress of every node, (samples, nx, ny), Pa, of the weakest or of one shape."""
+    check_law(problem)
     rate = float(uniform_rates(sample)[0])
     if aspect is None:
         windows = windows_of(problem, rate)

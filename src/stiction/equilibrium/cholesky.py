@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._jit import jit
-from stiction._lanes import LANES, add, load, multiply_add, total, totals, zeros
+from stiction._lanes import LANES, load, multiply_add, totals, zeros
 from stiction._typing import Array
+from stiction.elasticity.inner_product import dot
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""
@@ -21,34 +22,6 @@ def row_start(row: int) -> int:
     """Where a row begins in the flat array."""
     block = row >> 3
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
-
-
-@jit
-def dot(first: Array, second: Array, count: int) -> float:
-    """Sum of products; numpy's own takes threads for long arrays, and then depends on how many."""
-    a = zeros()
-    b = zeros()
-    c = zeros()
-    d = zeros()
-    t = 0
-    while t + 4 * LANES <= count:
-        a = multiply_add(load(first, t), load(second, t), a)
-        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
-        c = multiply_add(load(first, t + 2 * LANES), load(second, t + 2 * LANES), c)
-        d = multiply_add(load(first, t + 3 * LANES), load(second, t + 3 * LANES), d)
-        t += 4 * LANES
-    if t + 2 * LANES <= count:
-        a = multiply_add(load(first, t), load(second, t), a)
-        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
-        t += 2 * LANES
-    if t + LANES <= count:
-        c = multiply_add(load(first, t), load(second, t), c)
-        t += LANES
-    rest = 0.0
-    while t < count:
-        rest = multiply_add(first[t], second[t], rest)
-        t += 1
-    return total(add(add(a, b), add(c, d))) + rest
 
 
 @jit

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import (
+from stiction.elasticity.conjugate_gradients import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
@@ -20,7 +20,7 @@ from stiction.equilibrium.conjugate_gradients import (
     residual_of,
     solve_inside,
 )
-from stiction.equilibrium.transform_operator import Operator
+from stiction.elasticity.transform_operator import Operator
 
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""

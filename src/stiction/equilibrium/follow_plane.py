@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import inner
+from stiction.elasticity.conjugate_gradients import inner
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
+from stiction.elasticity.transform_operator import Operator, make_operator
 from stiction.equilibrium.least_equilibrium import (
     AT_FLOOR,
     BALANCED,
@@ -23,9 +25,7 @@ from stiction.equilibrium.least_equilibrium import (
     contiguous,
     least_equilibrium,
 )
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.plane_onset import Plane, PlaneOnset, plane_onset, symbol_of
-from stiction.equilibrium.transform_operator import Operator, make_operator
 
 FIRST_STEP = 0.01
 """Step of the load where the path is followed in steps, as a share of the load."""

@@ -14,16 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import (
+from stiction.elasticity.conjugate_gradients import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
     residual_of,
     solve_inside,
 )
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
+from stiction.elasticity.transform_operator import Operator
 from stiction.equilibrium.controlled_equilibrium import equilibrate
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
-from stiction.equilibrium.transform_operator import Operator
 
 BALANCED = 0
 SLIDING = 1

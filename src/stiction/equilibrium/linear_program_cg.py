@@ -19,7 +19,7 @@ import numpy as np
 import scipy.fft
 
 from stiction._typing import Array
-from stiction.equilibrium.cholesky import dot
+from stiction.elasticity.inner_product import dot
 from stiction.equilibrium.linear_program import OVERSTRESS, PIVOT, SOLVED, STALLED, solve_program
 from stiction.equilibrium.segments import Segments
 from stiction.equilibrium.window_test import OUT_OF_REACH, circle_of, padded

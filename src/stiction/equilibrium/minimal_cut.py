@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import SOLVED, Mask, residual_of, solve_inside
-from stiction.equilibrium.transform_operator import Operator, product
+from stiction.elasticity.conjugate_gradients import SOLVED, Mask, residual_of, solve_inside
+from stiction.elasticity.transform_operator import Operator, product
 
 ITERATIONS = 1000
 ROUNDS = 200

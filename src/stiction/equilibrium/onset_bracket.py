@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import NEGATIVE, SOLVED
+from stiction.elasticity.conjugate_gradients import NEGATIVE, SOLVED
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
+from stiction.elasticity.transform_operator import Operator, make_operator
 from stiction.equilibrium.controlled_equilibrium import equilibrate
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.minimal_cut import Cutter
 from stiction.equilibrium.onset_certificates import (
     lifting_field,
     lower_bound,
     upper_bound,
 )
-from stiction.equilibrium.transform_operator import Operator, make_operator
 
 ITERATIONS = 3000
 """Of conjugate gradients, for one equilibrium."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.equilibrium.transform_operator import Operator, filtered, product
+from stiction.elasticity.transform_operator import Operator, filtered, product
 
 
 @jit

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._typing import Array
+from stiction.elasticity.inner_product import dot
 from stiction.equilibrium import batch, discretization
 from stiction.equilibrium.batch import solve_batch
-from stiction.equilibrium.cholesky import dot
 from stiction.equilibrium.continuation import (
     Event,
     State,

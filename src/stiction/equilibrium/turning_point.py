@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
+from stiction.elasticity.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
+from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.controlled_equilibrium import equilibrate
-from stiction.equilibrium.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
 
 SWITCHES = 4

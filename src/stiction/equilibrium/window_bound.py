@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.elasticity.inner_product import dot
 from stiction.elasticity.line_stiffness import stiffness_column
-from stiction.equilibrium.cholesky import dot
 from stiction.problem import SMALLEST_EIGENVALUE
 
 GROWTH = 1.04

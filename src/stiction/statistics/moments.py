@@ -11,15 +11,10 @@ from numpy.typing import NDArray
 from scipy.integrate import simpson
 
 from stiction._checks import check_flag, check_instance
+from stiction.criterion.assumptions import check_law
 from stiction.criterion.eigenproblem import Weight
 from stiction.criterion.ellipse_windows import EllipseWindow
-from stiction.criterion.nucleation import (
-    Weights,
-    check_aspect,
-    check_law,
-    multiplier_of,
-    weight_of,
-)
+from stiction.criterion.nucleation import Weights, check_aspect, multiplier_of, weight_of
 from stiction.criterion.plane import middle_aspect, too_small, window_of
 from stiction.errors import InputError
 from stiction.problem import Problem

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.equilibrium.cholesky import dot
-from stiction.equilibrium.transform_operator import Operator, filtered, product
+from stiction.elasticity.inner_product import dot
+from stiction.elasticity.transform_operator import Operator, filtered, product
 
 SOLVED = 0
 NEGATIVE = 1

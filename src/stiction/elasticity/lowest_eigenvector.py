@@ -6,8 +6,8 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
-from stiction.equilibrium.conjugate_gradients import Mask, add_scaled, cut, inner
-from stiction.equilibrium.transform_operator import Operator, filtered, product
+from stiction.elasticity.conjugate_gradients import Mask, add_scaled, cut, inner
+from stiction.elasticity.transform_operator import Operator, filtered, product
 
 
 @jit
