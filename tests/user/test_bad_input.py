@@ -238,6 +238,18 @@ CASES = {
         ),
         ["draws", "finite"],
     ),
+    "rupture on a plane": (
+        lambda: st.simulate_rupture(
+            st.Problem(
+                st.Solid(**GOOD_SOLID | {"plane": "strain"}),
+                st.Interface(length=(0.1, 0.1), nodes=(64, 64)),
+                st.SlipWeakening(weakening_rate=0.05e12),
+            ),
+            np.full((64, 64), 1e6),
+            method=st.Rupture(loading_rate=1e7),
+        ),
+        ["rupture", "two dimensions"],
+    ),
     "rate that is nan": (
         lambda: st.onset(
             make_problem(),

@@ -263,6 +263,8 @@ def simulate_rupture(
     """
     _check(dict(locals()))
     check_variables(variables)
+    if reasons := method.supports(problem):
+        raise InputError([f"method: the {method.label} cannot take this: {r}" for r in reasons])
     given, measured = gather(problem, named_profiles(profiles), "refuse")
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
