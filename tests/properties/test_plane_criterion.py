@@ -198,7 +198,7 @@ def test_refusals_name_what_is_wrong(plane):
     varying = np.full((48, 48), RATE)
     varying[3, 4] *= 0.9
     uneven = dataclasses.replace(plane, friction=st.SlipWeakening(weakening_rate=varying))
-    with pytest.raises(st.InputError, match="weakening rate varies"):
+    with pytest.raises(st.InputError, match="weakening_rate varies"):
         st.monte_carlo(uneven, field, method=METHOD, samples=2, progress=False)
     line = st.Problem(plane.solid, st.Interface(0.1, 512), plane.friction)
     with pytest.raises(st.InputError, match="aspect: must be left out on a line"):
