@@ -24,7 +24,9 @@ RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
 FRICTION = st.SlipWeakening(weakening_rate=0.5e12)
-NUCLEATION_LENGTH = st.Problem(SOLID, st.Interface(length=0.1, nodes=512), FRICTION).nucleation_length
+NUCLEATION_LENGTH = st.Problem(
+    SOLID, st.Interface(length=0.1, nodes=512), FRICTION
+).nucleation_length
 RESAMPLED = 500
 QUARTERS = 4
 """How often a small interface fits into the large one of the same kind."""
@@ -98,14 +100,19 @@ def studies(case: Case, most: int) -> dict[str, st.Study]:
 
 def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str, xr.Dataset]:
     """Run what is missing; one dataset a case, with dimensions ratio and sample."""
+    folder.mkdir(parents=True, exist_ok=True)
     found = {}
     for case in CASES:
         pair = studies(case, most)
         if progress:
             cost = probe_time(pair["exact"].plans, pair["exact"].ensemble.samples, budget=1.0)
-            print(f"{case.name}: about {cost.seconds / 60.0:.1f} min of one core, if nothing is done yet")
+            print(
+                f"{case.name}: about {cost.seconds / 60.0:.1f} min of one core, if nothing is done yet"
+            )
         results = {
-            which: study.run(out=folder / f"{case.name.replace(', ', '-')}-{which}", progress=progress)
+            which: study.run(
+                out=folder / f"{case.name.replace(', ', '-')}-{which}", progress=progress
+            )
             for which, study in pair.items()
         }
         data = results["exact"].assign(local=results["local"].first_instability)

@@ -1,1 +1,2 @@
-def draw(*a): pass
+def draw(*a):
+    pass
