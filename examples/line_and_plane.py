@@ -19,6 +19,7 @@ from scipy.stats import spearmanr
 
 import stiction as st
 from stiction.ensemble.cost_estimate import probe_time
+from stiction.statistics.estimates import Estimate, mean
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
@@ -106,9 +107,7 @@ def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str,
         pair = studies(case, most)
         if progress:
             cost = probe_time(pair["exact"].plans, pair["exact"].ensemble.samples, budget=1.0)
-            print(
-                f"{case.name}: about {cost.seconds / 60.0:.1f} min of one core, if nothing is done yet"
-            )
+            print(f"{case.name}: about {cost.seconds / 60.0:.1f} min of one core from the start")
         results = {
             which: study.run(
                 out=folder / f"{case.name.replace(', ', '-')}-{which}", progress=progress
@@ -119,3 +118,175 @@ def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str,
         data = data.assign_coords(ratio=("correlation_length", list(RATIOS)))
         found[case.name] = data.swap_dims(correlation_length="ratio")
     return found
+
+
+def lowering(data: xr.Dataset) -> xr.DataArray:
+    """By how much interaction lowers the onset, per cent of the local criterion."""
+    return 100.0 * (1.0 - data.first_instability / data.local)
+
+
+def slipping(data: xr.Dataset) -> xr.DataArray:
+    """Share of the nodes that slip at the first instability, per cent; of the kept samples."""
+    along = [name for name in ("x", "y") if name in data.slip.dims]
+    return 100.0 * (data.slip > 0.0).mean(along)
+
+
+def weakest_link(values: np.ndarray, copies: int = QUARTERS) -> float:
+    """Expected least of `copies` independent values: an average over all subsets of that size."""
+    ordered, n = np.sort(values), values.size
+    rank = np.arange(n)
+    others = np.ones(n)  # chance that the copies - 1 others all have a higher rank
+    for taken in range(copies - 1):
+        others *= (n - 1 - rank - taken) / (n - 1 - taken)
+    return float(copies / n * (others.clip(min=0.0) * ordered).sum())
+
+
+def rank_correlation(pairs: np.ndarray) -> float:
+    """Spearman's, of columns."""
+    return float(spearmanr(pairs[:, 0], pairs[:, 1]).statistic)
+
+
+def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> Estimate:
+    """A statistic of independent rows, with the standard error from resampling them."""
+    random = np.random.default_rng(0)
+    again = [statistic(rows[random.integers(len(rows), size=len(rows))]) for _ in range(resampled)]
+    return Estimate(statistic(rows), float(np.std(again, ddof=1)))
+
+
+def share(events: np.ndarray) -> tuple[Estimate, str]:
+    """Per cent, and as text; where none was seen, what 95 % confidence excludes."""
+    p, n = float(events.mean()), events.size
+    if p == 0.0:
+        return Estimate(0.0, 0.0), f"< {300.0 / n:.2g}"
+    found = Estimate(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / n))
+    return found, text(found)
+
+
+def text(estimate: Estimate) -> str:
+    """Value and standard error, with two digits of the error."""
+    if estimate.error == 0.0:
+        return f"{estimate.value:.3g}"
+    digits = max(0, 1 - int(np.floor(np.log10(estimate.error))))
+    return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
+
+
+def summarize(data: xr.Dataset) -> dict[str, list]:
+    """Estimates at each correlation length of one case."""
+    rows: dict[str, list] = {
+        name: []
+        for name in ("lowering", "spread", "patches", "slipping", "rank", "arrested", "rise")
+    }
+    for i in range(data.sizes["ratio"]):
+        at = data.isel(ratio=i)
+        lower = lowering(at).values
+        stopped = at.arrested_events.values > 0
+        rise = 100.0 * (at.critical_stress / at.first_instability - 1.0).values[stopped]
+        rows["lowering"].append(mean(lower))
+        rows["spread"].append(np.quantile(lower, [0.05, 0.95]))
+        rows["patches"].append(mean(at.slip_patches.values.astype(float)))
+        rows["slipping"].append(mean(slipping(at).values))
+        pairs = np.column_stack([at.local.values, at.first_instability.values])
+        rows["rank"].append(bootstrap(rank_correlation, pairs))
+        rows["arrested"].append(share(stopped))
+        rows["rise"].append(mean(rise) if rise.size > 1 else None)
+    return rows
+
+
+def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate]]:
+    """Mean fall of the onset, per cent, when the interface grows: seen, and of a weakest link."""
+    rows: dict[str, list[Estimate]] = {"exact": [], "local": [], "link": [], "local link": []}
+    for name, column in (("exact", "first_instability"), ("local", "local")):
+        for i in range(small.sizes["ratio"]):
+            before, after = (data[column].values[i] for data in (small, large))
+            reference = float(before.mean())
+            seen = mean(before) - mean(after)
+            rows[name].append(seen.scaled(100.0 / reference))
+            link = bootstrap(lambda v: v.mean() - weakest_link(v), before)
+            rows["link" if name == "exact" else "local link"].append(link.scaled(100.0 / reference))
+    return rows
+
+
+def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[Estimate]]:
+    """Change by half the spacing of nodes on the same samples, per cent of the onset."""
+    few = fine.sizes["sample"]
+    coarse = coarse.isel(sample=slice(few))
+    changes = {
+        "exact": 100.0 * (fine.first_instability / coarse.first_instability - 1.0),
+        "lowering": lowering(fine) - lowering(coarse),
+    }
+    return {name: [mean(row) for row in change.values] for name, change in changes.items()}
+
+
+def tables(found: dict[str, xr.Dataset]) -> str:
+    """Everything as tables in Markdown."""
+    cases = [case for case in CASES if "fine" not in case.name]
+    parts = {case.name: summarize(found[case.name]) for case in cases}
+    lines = ["| samples | " + " | ".join(parts) + " |", "|---" * (1 + len(parts)) + "|"]
+    counts = [str(found[name].sizes["sample"]) for name in parts]
+    kept = [str(found[name].sizes["kept_sample"]) for name in parts]
+    lines += ["| all | " + " | ".join(counts) + " |", "| slip kept | " + " | ".join(kept) + " |"]
+
+    def table(title: str, cell, columns: dict[str, dict]) -> None:
+        lines.extend(["", f"| {title} | " + " | ".join(columns) + " |"])
+        lines.append("|---" * (1 + len(columns)) + "|")
+        for i, ratio in enumerate(RATIOS):
+            lines.append(
+                f"| {ratio:g} | " + " | ".join(cell(c, i) for c in columns.values()) + " |"
+            )
+
+    table(
+        "lowering, % (5 to 95 %)",
+        lambda c, i: (
+            f"{text(c['lowering'][i])} ({c['spread'][i][0]:.2g} to {c['spread'][i][1]:.2g})"
+        ),
+        parts,
+    )
+    for name in ("patches", "slipping", "rank"):
+        table(name, lambda c, i, name=name: text(c[name][i]), parts)
+    table("arrested, %", lambda c, i: c["arrested"][i][1], parts)
+    table("rise, %", lambda c, i: text(c["rise"][i]) if c["rise"][i] else "", parts)
+    for kind in ("line", "plane"):
+        small, large = (found[f"{kind}, {size}"] for size in ("small", "large"))
+        effect = size_effect(small, large)
+        table(f"size effect, {kind}, %", lambda c, i: text(c[i]), effect)
+        error = grid_error(small, found[f"{kind}, small, fine"])
+        table(f"half the spacing, {kind}, %", lambda c, i: text(c[i]), error)
+    return "\n".join(lines)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Compute what is missing, print the tables, draw the figures."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("runs", type=Path, help="folder of the stored runs")
+    parser.add_argument("--samples", type=int, default=10**6, help="at most so many a point")
+    parser.add_argument("--figures", type=Path, default=Path("docs/images"))
+    given = parser.parse_args(arguments)
+    found = compute(given.runs, given.samples)
+    print(tables(found))
+    parts = {name: summarize(data) for name, data in found.items() if "fine" not in name}
+    effects = {
+        kind: size_effect(found[f"{kind}, small"], found[f"{kind}, large"])
+        for kind in ("line", "plane")
+    }
+    lowered = {name: lowering(found[name]) for name in parts}
+    draw(given.figures, RATIOS, lowered, parts, effects, samples_to_show(found))
+
+
+def samples_to_show(found: dict[str, xr.Dataset], ratio: float = 0.5) -> dict[str, tuple]:
+    """Strength, slip and sensitivity of the first large line and plane, lengths in h_n."""
+    shown = {}
+    for case in CASES:
+        if case.name in ("line, large", "plane, large"):
+            problem = case.problem
+            tau_p = strength(ratio).sample(problem.interface, samples=1, seed=case.seed)[0]
+            method = st.Equilibrium(slip=True, sensitivity=True)
+            onset = st.onset(problem, tau_p, method=method).isel(sample=0)
+            # The same sample as in the stored run.
+            stored = found[case.name].first_instability.sel(ratio=ratio).values[0]
+            assert abs(float(onset.first_instability) / stored - 1.0) < 1e-6
+            shown[case.name] = (case, tau_p, onset)
+    return shown
+
+
+if __name__ == "__main__":
+    main()

@@ -1,2 +1,182 @@
-def draw(*a):
-    pass
+"""The figures of docs/line-and-plane.md; `line_and_plane.py` computes what they show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from PIL import Image
+
+from stiction.report.style import ACCENT, PAGE, QUIET, color, new_figure, panel, paper_style
+
+LEAST = 1e-3
+"""Lowering in per cent below which it is drawn as this much: the grid costs more."""
+STYLES = {
+    "line, small": {
+        "color": color(1),
+        "marker": "s",
+        "markerfacecolor": "white",
+        "linestyle": "--",
+    },
+    "line, large": {"color": color(1), "marker": "s"},
+    "plane, small": {
+        "color": color(2),
+        "marker": "o",
+        "markerfacecolor": "white",
+        "linestyle": "--",
+    },
+    "plane, large": {"color": color(2), "marker": "o"},
+}
+NAMES = {
+    "line, small": r"line, 16 $h_n$",
+    "line, large": r"line, 64 $h_n$",
+    "plane, small": r"plane, 4 $h_n$ by 4 $h_n$",
+    "plane, large": r"plane, 8 $h_n$ by 8 $h_n$",
+}
+
+
+def draw(folder: Path, ratios: Any, lowered: dict, parts: dict, effects: dict, shown: dict) -> None:
+    """Write the three figures into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with paper_style():
+        save(interaction(ratios, lowered, parts), folder / "line_and_plane_interaction.png")
+        save(summary(ratios, parts, effects), folder / "line_and_plane_summary.png")
+        save(patches(shown), folder / "line_and_plane_patches.png")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """With a palette instead of true colour, to keep it small."""
+    figure.savefig(path, dpi=170)
+    Image.open(path).convert("RGB").quantize(200, dither=Image.Dither.NONE).save(
+        path, optimize=True
+    )
+
+
+def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
+    """Distributions of the lowering on the large line and plane; means of all cases."""
+    figure = new_figure(PAGE, 2.7)
+    panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.05))
+    edges = np.linspace(np.log10(LEAST), np.log10(20.0), 44)
+    for axes, name, letter in zip(panels, ("line, large", "plane, large"), "ab", strict=False):
+        for i, ratio in enumerate(ratios):
+            values = np.log10(lowered[name].isel(ratio=i).values.clip(min=LEAST))
+            counts = np.histogram(values, edges)[0] / values.size
+            label = rf"$\xi_0/h_n = {ratio:g}$"
+            axes.stairs(100 * counts, 10**edges, color=color(i), fill=True, alpha=0.2)
+            axes.stairs(100 * counts, 10**edges, color=color(i), linewidth=1.1, label=label)
+        axes.set(xscale="log", xlabel="onset lowered by interaction (%)", xlim=(LEAST, 20.0))
+        axes.set_title(NAMES[name], pad=10)
+        panel(axes, letter)
+    panels[0].set_ylabel("share of the samples (%)")
+    panels[0].legend(loc="upper right")
+    _against_ratio(panels[2], ratios, {name: part["lowering"] for name, part in parts.items()})
+    panels[2].set(yscale="log", ylabel="mean lowering (%)")
+    panels[2].legend(loc="lower left")
+    panel(panels[2], "c")
+    return figure
+
+
+def _against_ratio(axes: Axes, ratios: Any, series: dict[str, list]) -> None:
+    for name, estimates in series.items():
+        values, errors = ([getattr(e, key) for e in estimates] for key in ("value", "error"))
+        axes.errorbar(ratios, values, yerr=errors, label=NAMES[name], capsize=1.5, **STYLES[name])
+    axes.set(xscale="log", xlabel=r"correlation length $\xi_0/h_n$")
+    axes.set_xticks(ratios, [f"{ratio:g}" for ratio in ratios])
+    axes.minorticks_off()
+
+
+def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
+    """What slips, ranks, arrest and size effect against the correlation length."""
+    figure = new_figure(PAGE, 4.6)
+    panels = figure.subplots(2, 2)
+    for axes, key, label, letter in (
+        (panels[0, 0], "slipping", "slips at first instability (%)", "a"),
+        (panels[0, 1], "rank", "rank correlation, local with exact", "b"),
+        (panels[1, 0], "arrested", "with an arrested event (%)", "c"),
+    ):
+        series = {
+            name: [e[0] if isinstance(e, tuple) else e for e in part[key]]
+            for name, part in parts.items()
+        }
+        _against_ratio(axes, ratios, series)
+        axes.set_ylabel(label)
+        panel(axes, letter)
+    panels[0, 0].set_ylim(0, None)
+    panels[1, 0].set_ylim(0, None)
+    panels[0, 0].legend()
+    for kind, effect in effects.items():
+        name = f"{kind}, large"
+        _against_ratio(panels[1, 1], ratios, {name: effect["exact"]})
+        values = [e.value for e in effect["link"]]
+        panels[1, 1].plot(ratios, values, color=STYLES[name]["color"], linestyle=":")
+    panels[1, 1].set(ylabel="fall of the mean onset (%)", ylim=(0, None))
+    handles = [
+        Line2D(
+            [], [], color=STYLES[f"{kind}, large"]["color"], label=f"{kind}, four times as large"
+        )
+        for kind in effects
+    ]
+    handles.append(Line2D([], [], color=QUIET, linestyle=":", label="weakest of four"))
+    panels[1, 1].legend(handles=handles)
+    panel(panels[1, 1], "d")
+    return figure
+
+
+def patches(shown: dict) -> Figure:
+    """Strength of one plane and one line, and what slips at the first instability."""
+    figure = new_figure(PAGE, 3.9)
+    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.05))
+    _plane(left, *shown["plane, large"])
+    _line(right, *shown["line, large"])
+    return figure
+
+
+def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
+    axes = figure.subplots()
+    ends = (-0.5 / case.nodes, case.size - 0.5 / case.nodes)
+    image = axes.imshow(tau_p.T * 1e-6, origin="lower", extent=ends * 2, cmap="Greys_r", vmin=0.55)
+    figure.colorbar(image, ax=axes, location="bottom", label="strength (MPa)", shrink=0.8)
+    at = np.arange(case.size * case.nodes) / case.nodes
+    moves = (onset.slip.values > 0.0).astype(float)
+    share = onset.sensitivity.values
+    axes.contourf(at, at, moves.T, levels=[0.5, 2.0], colors=[color(1)], alpha=0.3)
+    axes.contour(at, at, moves.T, levels=[0.5], colors=[color(1)], linewidths=0.7)
+    axes.contour(at, at, share.T, levels=[0.1 * share.max()], colors=[ACCENT], linewidths=1.5)
+    axes.set(xlabel="$x/h_n$, direction of slip", ylabel="$y/h_n$")
+    axes.legend(handles=_handles(), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+
+
+def _handles() -> list[Any]:
+    return [
+        Patch(facecolor=color(1), alpha=0.5, label="slips"),
+        Line2D([], [], color=ACCENT, linewidth=1.5, label="critical patch"),
+    ]
+
+
+def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
+    at = np.arange(tau_p.size) / case.nodes
+    moves = onset.slip.values > 0.0
+    critical = onset.sensitivity.values > 0.1 * onset.sensitivity.values.max()
+    centre = float(onset.critical_position) / (float(onset.x[1]) * case.nodes)
+    windows = ((0.0, case.size), (centre - 4.0, centre + 4.0))
+    for axes, window in zip(figure.subplots(2, 1), windows, strict=True):
+        for shift in (-case.size, 0, case.size):  # the line is periodic
+            _profile(axes, at + shift, tau_p * 1e-6, moves, critical)
+        axes.axhline(float(onset.first_instability) * 1e-6, color=QUIET, linewidth=0.7)
+        axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(0.6, 1.68))
+
+
+def _profile(axes: Axes, at: np.ndarray, tau_p: np.ndarray, moves: Any, critical: Any) -> None:
+    low, high = 0.6, 1.68
+    axes.plot(at, tau_p, color="0.3", linewidth=0.7)
+    axes.fill_between(
+        at, low, high, where=moves, step="mid", color=color(1), alpha=0.4, linewidth=0
+    )
+    axes.fill_between(
+        at, low, high, where=critical, step="mid", color=ACCENT, alpha=0.5, linewidth=0
+    )
