@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
-from stiction.report.style import ACCENT, PAGE, QUIET, color, new_figure, panel, paper_style
+from stiction.equilibrium.plane_patches import critical_patch
+from stiction.report.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel, paper_style
 
 LEAST = 1e-3
 """Lowering in per cent below which it is drawn as this much: the grid costs more."""
@@ -59,7 +60,7 @@ def save(figure: Figure, path: Path) -> None:
 
 def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     """Distributions of the lowering on the large line and plane; means of all cases."""
-    figure = new_figure(PAGE, 2.7)
+    figure = new_figure(PAGE, 3.1)
     panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.05))
     edges = np.linspace(np.log10(LEAST), np.log10(20.0), 44)
     for axes, name, letter in zip(panels, ("line, large", "plane, large"), "ab", strict=False):
@@ -73,11 +74,17 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
         axes.set_title(NAMES[name], pad=10)
         panel(axes, letter)
     panels[0].set_ylabel("share of the samples (%)")
-    panels[0].legend(loc="upper right")
     _against_ratio(panels[2], ratios, {name: part["lowering"] for name, part in parts.items()})
     panels[2].set(yscale="log", ylabel="mean lowering (%)")
-    panels[2].legend(loc="lower left")
     panel(panels[2], "c")
+    for axes, place in ((panels[0], 0.3), (panels[2], 0.8)):
+        figure.legend(
+            *axes.get_legend_handles_labels(),
+            ncols=2,
+            loc="lower center",
+            bbox_to_anchor=(place, 0.0),
+        )
+    figure.get_layout_engine().set(rect=(0.0, 0.17, 1.0, 0.83))
     return figure
 
 
@@ -143,10 +150,10 @@ def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     figure.colorbar(image, ax=axes, location="bottom", label="strength (MPa)", shrink=0.8)
     at = np.arange(case.size * case.nodes) / case.nodes
     moves = (onset.slip.values > 0.0).astype(float)
-    share = onset.sensitivity.values
+    inside, _ = critical_patch(onset.sensitivity.values, (1.0, 1.0))
     axes.contourf(at, at, moves.T, levels=[0.5, 2.0], colors=[color(1)], alpha=0.3)
     axes.contour(at, at, moves.T, levels=[0.5], colors=[color(1)], linewidths=0.7)
-    axes.contour(at, at, share.T, levels=[0.1 * share.max()], colors=[ACCENT], linewidths=1.5)
+    axes.contour(at, at, inside.T.astype(float), levels=[0.5], colors=[ACCENT], linewidths=1.5)
     axes.set(xlabel="$x/h_n$, direction of slip", ylabel="$y/h_n$")
     axes.legend(handles=_handles(), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
 
@@ -159,24 +166,20 @@ def _handles() -> list[Any]:
 
 
 def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
-    at = np.arange(tau_p.size) / case.nodes
-    moves = onset.slip.values > 0.0
-    critical = onset.sensitivity.values > 0.1 * onset.sensitivity.values.max()
+    at = np.arange(-tau_p.size, 2 * tau_p.size) / case.nodes  # periodic
+    tau_p = np.tile(tau_p * 1e-6, 3)
+    moves = np.tile(onset.slip.values > 0.0, 3)
+    share = onset.sensitivity.values
+    critical = np.tile(share > 0.1 * share.max(), 3)
     centre = float(onset.critical_position) / (float(onset.x[1]) * case.nodes)
+    load = float(onset.first_instability) * 1e-6
+    low, high, bar = 0.6, 1.7, 1.63
     windows = ((0.0, case.size), (centre - 4.0, centre + 4.0))
     for axes, window in zip(figure.subplots(2, 1), windows, strict=True):
-        for shift in (-case.size, 0, case.size):  # the line is periodic
-            _profile(axes, at + shift, tau_p * 1e-6, moves, critical)
-        axes.axhline(float(onset.first_instability) * 1e-6, color=QUIET, linewidth=0.7)
-        axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(0.6, 1.68))
-
-
-def _profile(axes: Axes, at: np.ndarray, tau_p: np.ndarray, moves: Any, critical: Any) -> None:
-    low, high = 0.6, 1.68
-    axes.plot(at, tau_p, color="0.3", linewidth=0.7)
-    axes.fill_between(
-        at, low, high, where=moves, step="mid", color=color(1), alpha=0.4, linewidth=0
-    )
-    axes.fill_between(
-        at, low, high, where=critical, step="mid", color=ACCENT, alpha=0.5, linewidth=0
-    )
+        axes.plot(at, tau_p, color=INK, linewidth=0.6)
+        options = {"step": "mid", "linewidth": 0.0}
+        axes.fill_between(at, low, bar, where=moves, color=color(1), alpha=0.45, **options)
+        axes.fill_between(at, bar, high, where=critical, color=ACCENT, **options)
+        axes.axhline(load, color=QUIET, linewidth=0.7)
+        axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(low, high))
+    axes.text(window[1], load - 0.01, "stress ", ha="right", va="top", color=QUIET, fontsize=7.5)
