@@ -41,13 +41,23 @@ NAMES = {
 }
 
 
-def draw(folder: Path, ratios: Any, lowered: dict, parts: dict, effects: dict, shown: dict) -> None:
-    """Write the three figures into `folder`."""
+def draw(folder: Path, *shown: Any) -> None:
+    """Write the figures of `shown`, the arguments of `figures`, into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     with paper_style():
-        save(interaction(ratios, lowered, parts), folder / "line_and_plane_interaction.png")
-        save(summary(ratios, parts, effects), folder / "line_and_plane_summary.png")
-        save(patches(shown), folder / "line_and_plane_patches.png")
+        for name, figure in figures(*shown).items():
+            save(figure, folder / f"line_and_plane_{name}.png")
+
+
+def figures(
+    ratios: Any, lowered: dict, parts: dict, effects: dict, shown: dict
+) -> dict[str, Figure]:
+    """The three figures by name."""
+    return {
+        "interaction": interaction(ratios, lowered, parts),
+        "summary": summary(ratios, parts, effects),
+        "patches": patches(shown),
+    }
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -84,7 +94,7 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
             loc="lower center",
             bbox_to_anchor=(place, 0.0),
         )
-    figure.get_layout_engine().set(rect=(0.0, 0.17, 1.0, 0.83))
+    figure.set_layout_engine("constrained", rect=(0.0, 0.17, 1.0, 0.83))
     return figure
 
 

@@ -30,10 +30,12 @@ def test_in_small(study, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study, "CASES", tuple(coarse))
     monkeypatch.setattr(study, "RATIOS", (0.5,))
     arguments = [str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)]
+    drawing = importlib.import_module("line_and_plane_figures")
+    drawn = []  # laying out and writing the figures takes longer than all the rest
+    monkeypatch.setattr(study, "draw", lambda folder, *shown: drawn.append(shown))
     study.main(arguments)
-    first = capsys.readouterr().out
-    assert "| lowering, % (5 to 95 %) | line, small | line, large | plane, small |" in first
-    assert len(list(tmp_path.glob("line_and_plane_*.png"))) == 3
+    assert "| lowering, % (5 to 95 %) | line, small | line, large |" in capsys.readouterr().out
+    assert [len(figure.axes) for figure in drawing.figures(*drawn[0]).values()] == [3, 4, 4]
     found = study.compute(tmp_path / "runs", 6, progress=False)  # what is stored
     plane = found["plane, small"]
     # The local criterion is an upper bound of the discrete problem, up to the gap of 1e-6.
