@@ -64,7 +64,7 @@ CASES = (
     Case("line, small", 16, 32, 10_000, 1, 1000),
     Case("line, large", 64, 32, 10_000, 2, 1000),
     Case("plane, small", 4, 16, 1000, 3, 200),
-    Case("plane, large", 8, 16, 300, 4, 100),
+    Case("plane, large", 8, 16, 500, 4, 100),
     # Every second node is a node of the cases above: what the grid costs.
     Case("line, small, fine", 16, 64, 10_000, 1, 1000),
     Case("plane, small, fine", 4, 32, 100, 3, 10),
@@ -153,13 +153,15 @@ def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> Estima
     return Estimate(statistic(rows), float(np.std(again, ddof=1)))
 
 
-def share(events: np.ndarray) -> tuple[Estimate, str]:
-    """Per cent, and as text; where none was seen, what 95 % confidence excludes."""
-    p, n = float(events.mean()), events.size
-    if p == 0.0:
-        return Estimate(0.0, 0.0), f"< {300.0 / n:.2g}"
-    found = Estimate(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / n))
-    return found, text(found)
+def share(events: np.ndarray) -> Estimate:
+    """Per cent."""
+    p = float(events.mean())
+    return Estimate(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / events.size))
+
+
+def share_text(found: Estimate, samples: int) -> str:
+    """Where none was seen, what 95 % confidence excludes."""
+    return text(found) if found.value > 0.0 else f"< {300.0 / samples:.2g}"
 
 
 def text(estimate: Estimate) -> str:
@@ -174,7 +176,17 @@ def summarize(data: xr.Dataset) -> dict[str, list]:
     """Estimates at each correlation length of one case."""
     rows: dict[str, list] = {
         name: []
-        for name in ("lowering", "spread", "patches", "slipping", "rank", "arrested", "rise")
+        for name in (
+            "lowering",
+            "spread",
+            "patches",
+            "slipping",
+            "rank",
+            "disorder",
+            "arrested",
+            "arrested, text",
+            "rise",
+        )
     }
     for i in range(data.sizes["ratio"]):
         at = data.isel(ratio=i)
@@ -186,8 +198,11 @@ def summarize(data: xr.Dataset) -> dict[str, list]:
         rows["patches"].append(mean(at.slip_patches.values.astype(float)))
         rows["slipping"].append(mean(slipping(at).values))
         pairs = np.column_stack([at.local.values, at.first_instability.values])
-        rows["rank"].append(bootstrap(rank_correlation, pairs))
+        rank = bootstrap(rank_correlation, pairs)
+        rows["rank"].append(rank)
+        rows["disorder"].append(Estimate(1.0 - rank.value, rank.error))
         rows["arrested"].append(share(stopped))
+        rows["arrested, text"].append(share_text(rows["arrested"][-1], stopped.size))
         rows["rise"].append(mean(rise) if rise.size > 1 else None)
     return rows
 
@@ -241,7 +256,7 @@ def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
     )
     for name in ("patches", "slipping", "rank"):
         table(name, lambda c, i, name=name: text(c[name][i]), parts)
-    table("arrested, %", lambda c, i: c["arrested"][i][1], parts)
+    table("arrested, %", lambda c, i: c["arrested, text"][i], parts)
     table("rise, %", lambda c, i: text(c["rise"][i]) if c["rise"][i] else "", parts)
     for kind, effect in effects.items():
         table(f"size effect, {kind}, %", lambda c, i: text(c[i]), effect)

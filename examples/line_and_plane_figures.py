@@ -13,10 +13,20 @@ from matplotlib.patches import Patch
 from PIL import Image
 
 from stiction.equilibrium.plane_patches import critical_patch
-from stiction.report.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel, paper_style
+from stiction.report.style import (
+    ACCENT,
+    INK,
+    PAGE,
+    QUIET,
+    color,
+    new_figure,
+    panel,
+    paper_style,
+    series,
+)
 
 LEAST = 1e-3
-"""Lowering in per cent below which it is drawn as this much: the grid costs more."""
+"""Lowering in per cent from which on it is drawn: below, the grid of the line decides."""
 STYLES = {
     "line, small": {
         "color": color(1),
@@ -72,15 +82,12 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     """Distributions of the lowering on the large line and plane; means of all cases."""
     figure = new_figure(PAGE, 3.1)
     panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.05))
-    edges = np.linspace(np.log10(LEAST), np.log10(20.0), 44)
     for axes, name, letter in zip(panels, ("line, large", "plane, large"), "ab", strict=False):
         for i, ratio in enumerate(ratios):
-            values = np.log10(lowered[name].isel(ratio=i).values.clip(min=LEAST))
-            counts = np.histogram(values, edges)[0] / values.size
-            label = rf"$\xi_0/h_n = {ratio:g}$"
-            axes.stairs(100 * counts, 10**edges, color=color(i), fill=True, alpha=0.2)
-            axes.stairs(100 * counts, 10**edges, color=color(i), linewidth=1.1, label=label)
-        axes.set(xscale="log", xlabel="onset lowered by interaction (%)", xlim=(LEAST, 20.0))
+            values = np.sort(lowered[name].isel(ratio=i).values)
+            above = 100.0 * (1.0 - np.arange(values.size) / values.size)
+            axes.step(values, above, where="pre", label=rf"$\xi_0/h_n = {ratio:g}$", **series(i))
+        axes.set(xscale="log", xlabel="lowered by more than (%)", xlim=(LEAST, 10.0), ylim=(0, 102))
         axes.set_title(NAMES[name], pad=10)
         panel(axes, letter)
     panels[0].set_ylabel("share of the samples (%)")
@@ -98,8 +105,8 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     return figure
 
 
-def _against_ratio(axes: Axes, ratios: Any, series: dict[str, list]) -> None:
-    for name, estimates in series.items():
+def _against_ratio(axes: Axes, ratios: Any, cases: dict[str, list]) -> None:
+    for name, estimates in cases.items():
         values, errors = ([getattr(e, key) for e in estimates] for key in ("value", "error"))
         axes.errorbar(ratios, values, yerr=errors, label=NAMES[name], capsize=1.5, **STYLES[name])
     axes.set(xscale="log", xlabel=r"correlation length $\xi_0/h_n$")
@@ -113,19 +120,16 @@ def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
     panels = figure.subplots(2, 2)
     for axes, key, label, letter in (
         (panels[0, 0], "slipping", "slips at first instability (%)", "a"),
-        (panels[0, 1], "rank", "rank correlation, local with exact", "b"),
+        (panels[0, 1], "disorder", "1 - rank correlation", "b"),
         (panels[1, 0], "arrested", "with an arrested event (%)", "c"),
     ):
-        series = {
-            name: [e[0] if isinstance(e, tuple) else e for e in part[key]]
-            for name, part in parts.items()
-        }
-        _against_ratio(axes, ratios, series)
+        _against_ratio(axes, ratios, {name: part[key] for name, part in parts.items()})
         axes.set_ylabel(label)
         panel(axes, letter)
     panels[0, 0].set_ylim(0, None)
     panels[1, 0].set_ylim(0, None)
     panels[0, 0].legend()
+    panels[0, 1].set_yscale("log")
     for kind, effect in effects.items():
         name = f"{kind}, large"
         _against_ratio(panels[1, 1], ratios, {name: effect["exact"]})
@@ -150,6 +154,8 @@ def patches(shown: dict) -> Figure:
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.05))
     _plane(left, *shown["plane, large"])
     _line(right, *shown["line, large"])
+    for axes, letter in zip((left.axes[0], *right.axes), "abc", strict=True):
+        panel(axes, letter)
     return figure
 
 
@@ -165,7 +171,7 @@ def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     axes.contour(at, at, moves.T, levels=[0.5], colors=[color(1)], linewidths=0.7)
     axes.contour(at, at, inside.T.astype(float), levels=[0.5], colors=[ACCENT], linewidths=1.5)
     axes.set(xlabel="$x/h_n$, direction of slip", ylabel="$y/h_n$")
-    axes.legend(handles=_handles(), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    axes.legend(handles=_handles(), loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
 
 
 def _handles() -> list[Any]:
@@ -192,4 +198,6 @@ def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
         axes.fill_between(at, bar, high, where=critical, color=ACCENT, **options)
         axes.axhline(load, color=QUIET, linewidth=0.7)
         axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(low, high))
-    axes.text(window[1], load - 0.01, "stress ", ha="right", va="top", color=QUIET, fontsize=7.5)
+    axes.text(
+        window[1], load - 0.01, "stress at onset ", ha="right", va="top", color=QUIET, fontsize=7.5
+    )
