@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.stats import rankdata
 
 import stiction as st
 from stiction.ensemble.cost_estimate import probe_time
-from stiction.statistics.estimates import Estimate, mean
+from stiction.statistics.estimates import Estimate, mean, standard_deviation
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
@@ -29,6 +30,17 @@ NUCLEATION_LENGTH = st.Problem(
     SOLID, st.Interface(length=0.1, nodes=512), FRICTION
 ).nucleation_length
 RESAMPLED = 200
+HEADS = {
+    "line, small": "line, 16 h_n",
+    "line, large": "line, 64 h_n",
+    "plane, small": "plane, 4 h_n",
+    "plane, large": "plane, 8 h_n",
+    "link": "weakest of four",
+    "local": "local criterion",
+    "local link": "weakest of four, local",
+    "lowering": "lowering, points",
+}
+"""What cases and estimates are called in tables."""
 QUARTERS = 4
 """How often a small interface fits into the large one of the same kind."""
 
@@ -174,25 +186,15 @@ def text(estimate: Estimate) -> str:
 
 def summarize(data: xr.Dataset) -> dict[str, list]:
     """Estimates at each correlation length of one case."""
-    rows: dict[str, list] = {
-        name: []
-        for name in (
-            "lowering",
-            "spread",
-            "patches",
-            "slipping",
-            "rank",
-            "disorder",
-            "arrested",
-            "arrested, text",
-            "rise",
-        )
-    }
+    rows: dict[str, list] = defaultdict(list)
     for i in range(data.sizes["ratio"]):
         at = data.isel(ratio=i)
         lower = lowering(at).values
         stopped = at.arrested_events.values > 0
         rise = 100.0 * (at.critical_stress / at.first_instability - 1.0).values[stopped]
+        onset = at.first_instability.values * 1e-6
+        rows["onset"].append(mean(onset))
+        rows["scatter"].append(standard_deviation(onset).scaled(100.0 / onset.mean()))
         rows["lowering"].append(mean(lower))
         rows["spread"].append(np.quantile(lower, [0.05, 0.95]))
         rows["patches"].append(mean(at.slip_patches.values.astype(float)))
@@ -234,35 +236,46 @@ def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[Estimate]
 
 def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
     """Everything as tables in Markdown."""
-    lines = ["| samples | " + " | ".join(parts) + " |", "|---" * (1 + len(parts)) + "|"]
-    counts = [str(found[name].sizes["sample"]) for name in parts]
-    kept = [str(found[name].sizes["kept_sample"]) for name in parts]
-    lines += ["| all | " + " | ".join(counts) + " |", "| slip kept | " + " | ".join(kept) + " |"]
+    lines: list[str] = []
 
-    def table(title: str, cell, columns: dict[str, dict]) -> None:
-        lines.extend(["", f"| {title} | " + " | ".join(columns) + " |"])
+    def table(title: str, columns: dict, cell) -> None:
+        heads = [HEADS.get(name, name) for name in columns]
+        lines.extend([f"{title}:", "", "| xi_0/h_n | " + " | ".join(heads) + " |"])
         lines.append("|---" * (1 + len(columns)) + "|")
         for i, ratio in enumerate(RATIOS):
-            lines.append(
-                f"| {ratio:g} | " + " | ".join(cell(c, i) for c in columns.values()) + " |"
-            )
+            cells = [cell(column, i) for column in columns.values()]
+            lines.append(f"| {ratio:g} | " + " | ".join(cells) + " |")
+        lines.append("")
 
-    table(
-        "lowering, % (5 to 95 %)",
-        lambda c, i: (
-            f"{text(c['lowering'][i])} ({c['spread'][i][0]:.2g} to {c['spread'][i][1]:.2g})"
-        ),
-        parts,
-    )
-    for name in ("patches", "slipping", "rank"):
-        table(name, lambda c, i, name=name: text(c[name][i]), parts)
-    table("arrested, %", lambda c, i: c["arrested, text"][i], parts)
-    table("rise, %", lambda c, i: text(c["rise"][i]) if c["rise"][i] else "", parts)
+    def lowered(part: dict, i: int) -> str:
+        low, high = part["spread"][i]
+        return f"{text(part['lowering'][i])} ({low:.2g} to {high:.2g})"
+
+    def plain(key: str):
+        return lambda part, i: text(part[key][i]) if part[key][i] else ""
+
+    for name, data in found.items():
+        counts = data.sizes["sample"], data.sizes["kept_sample"]
+        lines.append("{}: {} samples a point, slip of {}".format(name, *counts))
+    lines.append("")
+    table("Onset lowered, % of the local criterion (5 to 95 % of the samples)", parts, lowered)
+    table("Mean onset, MPa", parts, plain("onset"))
+    table("Its standard deviation, % of the mean", parts, plain("scatter"))
+    table("Slipping patches at the first instability", parts, plain("patches"))
+    table("Slipping nodes, %", parts, plain("slipping"))
+    table("Rank correlation of local criterion and onset", parts, plain("rank"))
+    table("Samples with an arrested event, %", parts, lambda part, i: part["arrested, text"][i])
+    table("Of these, sliding load over first instability, %", parts, plain("rise"))
     for kind, effect in effects.items():
-        table(f"size effect, {kind}, %", lambda c, i: text(c[i]), effect)
+        table(f"Fall of the mean onset on a {kind} four times as large, %", effect, plain_estimate)
         error = grid_error(found[f"{kind}, small"], found[f"{kind}, small, fine"])
-        table(f"half the spacing, {kind}, %", lambda c, i: text(c[i]), error)
+        table(f"Change on a {kind} by half the spacing, %", error, plain_estimate)
     return "\n".join(lines)
+
+
+def plain_estimate(column: list[Estimate], i: int) -> str:
+    """A cell of a table."""
+    return text(column[i])
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -34,7 +34,10 @@ def test_in_small(study, tmp_path, monkeypatch, capsys):
     drawn = []  # laying out and writing the figures takes longer than all the rest
     monkeypatch.setattr(study, "draw", lambda folder, *shown: drawn.append(shown))
     study.main(arguments)
-    assert "| lowering, % (5 to 95 %) | line, small | line, large |" in capsys.readouterr().out
+    assert (
+        "| xi_0/h_n | line, 16 h_n | line, 64 h_n | plane, 4 h_n | plane, 8 h_n |"
+        in capsys.readouterr().out
+    )
     assert [len(figure.axes) for figure in drawing.figures(*drawn[0]).values()] == [3, 4, 4]
     found = study.compute(tmp_path / "runs", 6, progress=False)  # what is stored
     plane = found["plane, small"]
