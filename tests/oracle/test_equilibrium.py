@@ -22,7 +22,7 @@ from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.stable_path import UNSTABLE, advance
 from stiction.equilibrium.window_test import runs_away_frozen
-from stiction.equilibrium.workspace import make_room
+from stiction.equilibrium.workspace import make_workspace
 
 
 def by_linear_programme(problem, strength, rate=None):
@@ -129,7 +129,7 @@ def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
         state = at_rest(sample)
         load, status = advance(
             sample, setting.grid, state.load, np.inf, state.slip, state.stiff, state.direction,
-            make_room(256),
+            make_workspace(256),
         )  # fmt: skip
         assert status == UNSTABLE
         assert load == pytest.approx(loads[row], rel=1e-11)
@@ -252,7 +252,7 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
 
 
 def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
-    """With everything outside a window fixed, and without: the same fate, two samples of each."""
+    """With everything outside a window fixed, and without: the same outcome, twice each."""
     problem = st.Problem(solid, st.Interface(0.4, 4096), st.SlipWeakening(weakening_rate=0.5e12))
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=2.6e6),
@@ -262,7 +262,7 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
     )
     setting = Setting(problem)
     rows = problem.sample(strength.sample(problem.interface, samples=12, seed=4))
-    fates = []
+    outcomes = []
     for row in range(12):
         sample = sample_of(rows, row)
         found = setting.programme(sample.excess, sample.rate)
@@ -275,13 +275,13 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
         )
         whole = jump(
             sample, setting.grid, found.load, found.slip, found.stiff, escape, 4000,
-            make_room(4096),
+            make_workspace(4096),
         )  # fmt: skip
         # Only a lower bound: what slides in the window slides.
         assert not part or whole == SLIDING
-        fates.append((part, whole == SLIDING))
-    assert (True, True) in fates
-    assert (False, False) in fates
+        outcomes.append((part, whole == SLIDING))
+    assert (True, True) in outcomes
+    assert (False, False) in outcomes
 
 
 @pytest.mark.parametrize("law", ["weakening_rate", "critical_slip"])

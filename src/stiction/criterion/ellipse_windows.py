@@ -103,12 +103,12 @@ def ellipse_window(
     column = np.fft.irfft2(symbol, shape)
     least = 0.0
     for box in _boxes(shape):
-        room = [
+        workspace = [
             n * spacing * (0.5 if n == whole else 0.25) * stretch
             for n, whole, spacing, stretch in zip(box, shape, spacings, (1.0, aspect), strict=True)
         ]
         nodes = _nodes_of(box, shape)
-        found = _smallest_unstable(column[nodes], spacings, rate, aspect, least, min(room))
+        found = _smallest_unstable(column[nodes], spacings, rate, aspect, least, min(workspace))
         if found is not None:
             weight = np.zeros(shape)
             weight[nodes] = np.maximum(found.vector, 0.0)
@@ -117,7 +117,7 @@ def ellipse_window(
             extents = 2.0 * found.axis, 2.0 * found.axis / aspect
             spectrum = np.conj(np.fft.rfft2(weight))
             return EllipseWindow(aspect, extents, area, found.eigenvalue, weight, spectrum)
-        least = min(room) ** 2
+        least = min(workspace) ** 2
     return None
 
 

@@ -76,7 +76,7 @@ def solve_inside(
     held: Array,
     x: Array,
     residual: Array,
-    room: Array,
+    workspace: Array,
     tolerance: float,
     iterations: int,
 ) -> tuple[int, int]:
@@ -94,8 +94,8 @@ def solve_inside(
         Guess, then solution; zero outside.
     residual : (nx, ny) array, changed
         Of the guess on entry, as from `residual_of`; afterwards that of the solution, zero outside.
-    room : (3, nx, ny) array
-        Overwritten; ``room[1]`` is the direction of negative curvature, if one is met.
+    workspace : (3, nx, ny) array
+        Overwritten; ``workspace[1]`` is the direction of negative curvature, if one is met.
     tolerance : float
         Largest residual allowed at a node, Pa.
     iterations : int
@@ -105,7 +105,7 @@ def solve_inside(
     status, iterations : int
         SOLVED, NEGATIVE (curvature) or EXHAUSTED; and how many iterations it took.
     """
-    z, direction, image = room[0], room[1], room[2]
+    z, direction, image = workspace[0], workspace[1], workspace[2]
     cut(residual, inside)
     previous = 0.0
     for iteration in range(iterations):

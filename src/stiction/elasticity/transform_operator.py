@@ -54,7 +54,7 @@ def stiffness_symbol(
 
 
 class Operator(NamedTuple):
-    """K - W on a plane, with an approximate inverse and room for transforms; not for two threads.
+    """K - W on a plane, an approximate inverse and a workspace for transforms; not for two threads.
 
     Attributes
     ----------

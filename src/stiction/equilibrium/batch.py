@@ -13,14 +13,14 @@ from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.pieces import AT_CORNER, Pieces
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.window_bound import Windows, window_bound
-from stiction.equilibrium.workspace import Grid, Room, Sample, make_room, make_sample
+from stiction.equilibrium.workspace import Grid, Sample, Workspace, make_sample, make_workspace
 
-LOAD, GAP, PATCHES, POSITION, LENGTH, FATE = range(6)
+LOAD, GAP, PATCHES, POSITION, LENGTH, OUTCOME = range(6)
 COLUMNS = 6
 """Columns of the result of `solve_batch`."""
 
 CORNER_REACHED = 3
-"""Fate of a sample in which a corner of the law is reached before the first instability."""
+"""Outcome of a sample in which a corner of the law is reached before the first instability."""
 
 
 @jit
@@ -31,7 +31,7 @@ def certificate(
     stiff: Array,
     multiplier: Array,
     product: Array,
-    room: Room,
+    workspace: Workspace,
 ) -> float:
     """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
 
@@ -40,15 +40,17 @@ def certificate(
     n = slip.shape[0]
     lower = np.inf
     count = ZERO
-    values = room.vectors[1]
+    values = workspace.vectors[1]
     for i in range(n):
         balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
         if multiplier[i] > 0.0:
-            room.order[count] = i
+            workspace.order[count] = i
             values[count] = multiplier[i]
             count += 1
-    apply_stiffness(grid.strip, grid.column[0], room.order, count, values, room.halves, product)
+    apply_stiffness(
+        grid.strip, grid.column[0], workspace.order, count, values, workspace.halves, product
+    )
     above = 0.0
     below = 0.0
     excess = 0.0
@@ -126,13 +128,13 @@ def solve_batch(
         Factor on the length at which a rupture counts as unstoppable.
     results : (samples, COLUMNS) array, output
     slips, stiffs, multipliers : (samples, n) arrays, output
-        d, K d and y at the first instability; K d where the fate is left undecided, and d only
+        d, K d and y at the first instability; K d where the outcome is left undecided, and d only
         there unless `all_slips`.
     aheads : (samples, n) array, output
-        Where the fate is left undecided, a lower bound of the slip after the jump.
+        Where the outcome is left undecided, a lower bound of the slip after the jump.
     """
     samples, n = excess.shape
-    room = make_room(n)
+    workspace = make_workspace(n)
     slip = np.empty(n)
     stiff = np.empty(n)
     multiplier = np.empty(n)
@@ -142,7 +144,7 @@ def solve_batch(
         sample = make_sample(excess[row], floor[row], profile, rate[row], pieces)
         windows = usual
         for i in range(n):
-            room.diagonal[i] = grid.column[0] - sample.rate[i]
+            workspace.diagonal[i] = grid.column[0] - sample.rate[i]
             if rate[row, i] != usual_rate:
                 windows = others
         bound, start, choice = window_bound(excess[row], profile, sample.rate, windows, work)
@@ -150,12 +152,12 @@ def solve_batch(
         start_from_bound(start, width, windows.modes[max(choice, 0)], multiplier, profile)
         # If it does not succeed, the certificate says so.
         load, _ = solve_program(
-            excess[row], profile, grid, bound, np.inf, multiplier, slip, stiff, room
+            excess[row], profile, grid, bound, np.inf, multiplier, slip, stiff, workspace
         )
         line = results[row]
         line[LOAD] = load
         line[PATCHES] = count_patches(slip)
-        line[GAP] = certificate(sample, grid, slip, stiff, multiplier, product, room)
+        line[GAP] = certificate(sample, grid, slip, stiff, multiplier, product, workspace)
         _, length, centre = main_patch(multiplier)
         line[POSITION] = centre * spacing
         line[LENGTH] = length * spacing
@@ -163,15 +165,15 @@ def solve_batch(
             multipliers[row, i] = multiplier[i]
         if all_slips:
             slips[row] = slip
-        line[FATE] = UNDECIDED
+        line[OUTCOME] = UNDECIDED
         for i in range(n):
             corner = pieces.ends[0] * sample.critical[i]
             if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
-                line[FATE] = CORNER_REACHED
-        if line[FATE] == UNDECIDED:
+                line[OUTCOME] = CORNER_REACHED
+        if line[OUTCOME] == UNDECIDED:
             escape = caution * escape_run(sample, load, spacing, modulus)
             tried = slip.copy()
-            line[FATE] = runs_away(
+            line[OUTCOME] = runs_away(
                 sample,
                 wide_column,
                 load,
@@ -184,7 +186,7 @@ def solve_batch(
                 reach,
                 work,
             )
-            if line[FATE] == UNDECIDED:
+            if line[OUTCOME] == UNDECIDED:
                 slips[row] = slip
                 stiffs[row] = stiff
                 aheads[row] = tried

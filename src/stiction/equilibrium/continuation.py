@@ -20,7 +20,7 @@ from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.stable_path import CROWDED, REACHED, advance
 from stiction.equilibrium.window_test import runs_away_frozen
-from stiction.equilibrium.workspace import Sample, make_room
+from stiction.equilibrium.workspace import Sample, make_workspace
 from stiction.errors import warn_accuracy
 
 JUMP_STEPS = 4000
@@ -106,32 +106,32 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
     escape = setting.escape(sample, state.load)
     if state.ahead is None:
-        fate = runs_away(
+        outcome = runs_away(
             sample, setting.wide_column, state.load, state.slip, state.stiff, state.direction,
             setting.stiffness(state.direction), escape, setting.block, setting.reach,
             np.empty((6, n)),
         )  # fmt: skip
     else:
-        state.slip, state.ahead, fate = state.ahead, None, UNDECIDED
+        state.slip, state.ahead, outcome = state.ahead, None, UNDECIDED
     escape *= MARGIN
-    if fate == UNDECIDED and runs_away_frozen(
+    if outcome == UNDECIDED and runs_away_frozen(
         setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
     ):
-        fate = SLIDING
-    if fate == UNDECIDED:
-        fate = jump(
+        outcome = SLIDING
+    if outcome == UNDECIDED:
+        outcome = jump(
             sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
-            make_room(n),
+            make_workspace(n),
         )  # fmt: skip
-    if fate == ARRESTED and not np.any(
+    if outcome == ARRESTED and not np.any(
         present_pieces(sample, state.slip)[0] > present_pieces(sample, before)[0]
     ):
-        fate = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
-    if fate == UNDECIDED:
+        outcome = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
+    if outcome == UNDECIDED:
         warn_accuracy(
             "the jump of an unstable patch did not settle; it is counted as global sliding"
         )
-    if fate != ARRESTED:
+    if outcome != ARRESTED:
         state.sliding = True
         state.slip, state.stiff = before, stiff_before
         return
@@ -178,7 +178,7 @@ def follow(setting: Setting, sample: Sample, state: State, target: float = np.in
         if not (leaping and state.events):
             state.load, status = advance(
                 sample, setting.grid, state.load, target, state.slip, state.stiff,
-                state.direction, make_room(n),
+                state.direction, make_workspace(n),
             )  # fmt: skip
             if status == CROWDED:
                 warn_accuracy(

@@ -52,7 +52,7 @@ def equilibrate(
     inside: Mask,
     slip: Array,
     residual: Array,
-    room: Array,
+    workspace: Array,
     tolerance: float,
     iterations: int,
 ) -> tuple[int, int]:
@@ -71,7 +71,7 @@ def equilibrate(
         d, m: a guess, then the answer.
     residual : (nx, ny) array, output
         right - A d - spring phi <phi, d>: not above `tolerance` anywhere if solved.
-    room : (3, nx, ny) array
+    workspace : (3, nx, ny) array
         See `solve_inside`.
     tolerance : float
         Pa.
@@ -93,7 +93,7 @@ def equilibrate(
     while used < iterations:
         goal = max(LOOSE * largest_inside(residual, inside), tolerance)
         status, taken = solve_inside(
-            operator, inside, spring, held, slip, residual, room, goal, iterations - used
+            operator, inside, spring, held, slip, residual, workspace, goal, iterations - used
         )
         used += taken + 1
         if status == NEGATIVE:

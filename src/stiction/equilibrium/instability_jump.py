@@ -22,7 +22,7 @@ from stiction.equilibrium.linear_program import (
     stress_tolerance,
 )
 from stiction.equilibrium.pieces import AT_CORNER, piece_at, start_of
-from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample, make_room
+from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Sample, Workspace, make_workspace
 
 SLIDING = 0
 ARRESTED = 1
@@ -113,7 +113,7 @@ def relax(
     load: float,
     slip: Array,
     stiff: Array,
-    room: Room,
+    workspace: Workspace,
     size: int,
     tolerance: float,
 ) -> int:
@@ -121,44 +121,59 @@ def relax(
 
     Returns as `join` does.
     """
-    right = room.vectors[0]
-    solution = room.vectors[1]
-    drive = room.vectors[3]
+    right = workspace.vectors[0]
+    solution = workspace.vectors[1]
+    drive = workspace.vectors[3]
     for t in range(size):
-        i = room.members[t]
+        i = workspace.members[t]
         drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
-    extend_forward(room.factor, ZERO, size, room.members, drive, room.forward[0])
+    extend_forward(workspace.factor, ZERO, size, workspace.members, drive, workspace.forward[0])
     for t in range(size):
-        right[t] = room.forward[0, t]
-    back_substitute(room.factor, size, right, solution)
+        right[t] = workspace.forward[0, t]
+    back_substitute(workspace.factor, size, right, solution)
     for t in range(size):
-        i = room.members[t]
+        i = workspace.members[t]
         slip[i] = max(slip[i], solution[t])
         solution[t] = slip[i]
-    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
-    return join(sample, grid, load, stiff, room, size, tolerance)
+    apply_stiffness(
+        grid.strip, grid.column[0], workspace.members, size, solution, workspace.halves, stiff
+    )
+    return join(sample, grid, load, stiff, workspace, size, tolerance)
 
 
 @jit
 def join(
-    sample: Sample, grid: Grid, load: float, stiff: Array, room: Room, size: int, tolerance: float
+    sample: Sample,
+    grid: Grid,
+    load: float,
+    stiff: Array,
+    workspace: Workspace,
+    size: int,
+    tolerance: float,
 ) -> int:
     """Append the overstressed nodes to the elastic factor.
 
     Returns the members now, ALL if nothing remains at rest, CROWDED if there is no room for them.
     """
-    count = overstressed(load, sample.excess, sample.profile, stiff, room, tolerance)
+    count = overstressed(load, sample.excess, sample.profile, stiff, workspace, tolerance)
     if count == 0:
         return size
     if size + count > MOST_MEMBERS:
         return CROWDED
     now = append(
-        room.factor, size, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+        workspace.factor,
+        size,
+        workspace.members,
+        workspace.order,
+        count,
+        grid.column,
+        workspace.diagonal,
+        PIVOT,
     )
     if now < size + count:
         return ALL
     for t in range(size, now):
-        room.inside[room.members[t]] = True
+        workspace.inside[workspace.members[t]] = True
     return now
 
 
@@ -169,8 +184,8 @@ def settle(
     load: float,
     slip: Array,
     stiff: Array,
-    room: Room,
-    other: Room,
+    workspace: Workspace,
+    other: Workspace,
     size: int,
 ) -> int:
     """One step with the true states: along the unstable direction, or towards equilibrium.
@@ -180,7 +195,7 @@ def settle(
     """
     n = slip.shape[0]
     for t in range(size):
-        i = room.members[t]
+        i = workspace.members[t]
         other.order[t] = i
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         other.diagonal[i] = grid.column[0] - sample.pieces.slopes[piece] * sample.rate[i]
@@ -208,10 +223,12 @@ def settle(
     step = step_to_corner(sample, slip, direction, longest)
     if not np.isfinite(step):
         return SLIDING
-    solution = room.vectors[1]
+    solution = workspace.vectors[1]
     for t in range(size):
-        solution[t] = slip[room.members[t]]
-    apply_stiffness(grid.strip, grid.column[0], room.members, size, solution, room.halves, stiff)
+        solution[t] = slip[workspace.members[t]]
+    apply_stiffness(
+        grid.strip, grid.column[0], workspace.members, size, solution, workspace.halves, stiff
+    )
     return ARRESTED if step == 1.0 and longest == 1.0 else UNDECIDED
 
 
@@ -224,7 +241,7 @@ def jump(
     stiff: Array,
     escape: float,
     steps: int,
-    room: Room,
+    workspace: Workspace,
 ) -> int:
     """Follow an instability at a fixed load to the next least equilibrium, or to none.
 
@@ -240,7 +257,7 @@ def jump(
         Residual nodes in a row that count as global sliding.
     steps : int
         Elastic steps to try at most; UNDECIDED if they are not enough.
-    room : Room
+    workspace : Workspace
 
     Returns
     -------
@@ -249,26 +266,33 @@ def jump(
     """
     n = slip.shape[0]
     tolerance = stress_tolerance(sample.excess, sample.profile, load)
-    room.diagonal[:] = grid.column[0]
+    workspace.diagonal[:] = grid.column[0]
     count = ZERO
     for i in range(n):
-        room.inside[i] = slip[i] > 0.0
-        if room.inside[i]:
-            room.order[count] = i
+        workspace.inside[i] = slip[i] > 0.0
+        if workspace.inside[i]:
+            workspace.order[count] = i
             count += 1
     if count > MOST_MEMBERS:
         return UNDECIDED
     size = append(
-        room.factor, ZERO, room.members, room.order, count, grid.column, room.diagonal, PIVOT
+        workspace.factor,
+        ZERO,
+        workspace.members,
+        workspace.order,
+        count,
+        grid.column,
+        workspace.diagonal,
+        PIVOT,
     )
     if size < count:
         return SLIDING
-    other = make_room(n)
+    other = make_workspace(n)
     waited = 0
     passed = 0
     for _ in range(steps):
         before = size
-        size = relax(sample, grid, load, slip, stiff, room, size, tolerance)
+        size = relax(sample, grid, load, slip, stiff, workspace, size, tolerance)
         if size == CROWDED:
             return UNDECIDED
         if size == ALL or unsupported(sample, load, slip):
@@ -284,10 +308,10 @@ def jump(
         waited = 0
         passed = corners
         before = size
-        status = settle(sample, grid, load, slip, stiff, room, other, size)
+        status = settle(sample, grid, load, slip, stiff, workspace, other, size)
         if status == SLIDING:
             return SLIDING
-        size = join(sample, grid, load, stiff, room, size, tolerance)
+        size = join(sample, grid, load, stiff, workspace, size, tolerance)
         if size < 0:
             return UNDECIDED if size == CROWDED else SLIDING
         if status == ARRESTED and size == before:

@@ -107,17 +107,17 @@ def weakening_step(
     operator = operator._replace(rate=np.where(residual, 0.0, sample.rate))
     drive = load * sample.profile - np.where(residual, sample.floor, sample.excess)
     rest, new = np.empty_like(slip), slip.copy()
-    room = np.empty((3, *slip.shape))
+    workspace = np.empty((3, *slip.shape))
     none = np.zeros_like(slip)
     residual_of(operator, 0.0, none, drive, slip, rest)
     inside = (slip > 0.0) | (rest > 0.0)
     status, used = solve_inside(
-        operator, inside, 0.0, none, new, rest, room, tolerance, ITERATIONS
+        operator, inside, 0.0, none, new, rest, workspace, tolerance, ITERATIONS
     )  # fmt: skip
     direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
     longest = 1.0
     if status == NEGATIVE:
-        direction = np.abs(room[1])
+        direction = np.abs(workspace[1])
         largest = float(sample.rate.max())
         _, taken = lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
         used += taken

@@ -13,7 +13,7 @@ from stiction._jit import ZERO, jit
 from stiction._typing import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
-from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room
+from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Workspace
 
 SOLVED = 0
 STALLED = 1
@@ -43,47 +43,47 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 
 
 @jit
-def solve_forward(room: Room, size: int, load: float, solution: Array) -> None:
+def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
     """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
-    right = room.vectors[0]
+    right = workspace.vectors[0]
     for t in range(size):
-        right[t] = load * room.forward[0, t] - room.forward[1, t]
-    back_substitute(room.factor, size, right, solution)
+        right[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
+    back_substitute(workspace.factor, size, right, solution)
 
 
 @jit
-def singular_direction(room: Room, size: int, direction: Array) -> None:
+def singular_direction(workspace: Workspace, size: int, direction: Array) -> None:
     """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
 
     It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
     which slip runs away.
     """
-    right = room.vectors[0]
-    solution = room.vectors[1]
+    right = workspace.vectors[0]
+    solution = workspace.vectors[1]
     start = row_start(size)
     for t in range(size):
-        right[t] = -room.factor[start + t]
-    back_substitute(room.factor, size, right, solution)
+        right[t] = -workspace.factor[start + t]
+    back_substitute(workspace.factor, size, right, solution)
     direction[:] = 0.0
     for t in range(size):
-        direction[room.members[t]] = max(solution[t], 0.0)
-    direction[room.members[size]] = 1.0
+        direction[workspace.members[t]] = max(solution[t], 0.0)
+    direction[workspace.members[size]] = 1.0
 
 
 @jit
 def overstressed(
-    load: float, excess: Array, profile: Array, stiff: Array, room: Room, tolerance: float
+    load: float, excess: Array, profile: Array, stiff: Array, workspace: Workspace, tolerance: float
 ) -> int:
     """Nodes at rest above their strength, most overstressed first; returns how many."""
     count = ZERO
-    keys = room.vectors[2]
+    keys = workspace.vectors[2]
     for i in range(excess.shape[0]):
         margin = excess[i] - load * profile[i] + stiff[i]
-        if margin < -tolerance and not room.inside[i]:
+        if margin < -tolerance and not workspace.inside[i]:
             keys[count] = margin
-            room.order[count] = i
+            workspace.order[count] = i
             count += 1
-    sort_by(keys, room.order, count)
+    sort_by(keys, workspace.order, count)
     return count
 
 
@@ -102,7 +102,7 @@ def back_off(
     excess: Array,
     profile: Array,
     grid: Grid,
-    room: Room,
+    workspace: Workspace,
     size: int,
     solution: Array,
     stiff: Array,
@@ -112,20 +112,22 @@ def back_off(
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
     a node overstressed. One step along the tangent d d/d load mends it.
     """
-    right = room.vectors[0]
-    stiff_rate = room.vectors[2]
+    right = workspace.vectors[0]
+    stiff_rate = workspace.vectors[2]
     own = grid.column[0]
     for t in range(size):
-        right[t] = room.forward[0, t]
-    back_substitute(room.factor, size, right, solution)
-    apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff_rate)
+        right[t] = workspace.forward[0, t]
+    back_substitute(workspace.factor, size, right, solution)
+    apply_stiffness(
+        grid.strip, own, workspace.members, size, solution, workspace.halves, stiff_rate
+    )
     step = 0.0
     for i in range(excess.shape[0]):
         margin = excess[i] - load * profile[i] + stiff[i]
-        if margin < 0.0 and not room.inside[i]:
+        if margin < 0.0 and not workspace.inside[i]:
             step = max(step, margin / (stiff_rate[i] - profile[i]))
-    solve_forward(room, size, load - step, solution)
-    apply_stiffness(grid.strip, own, room.members, size, solution, room.halves, stiff)
+    solve_forward(workspace, size, load - step, solution)
+    apply_stiffness(grid.strip, own, workspace.members, size, solution, workspace.halves, stiff)
 
 
 @jit
@@ -138,7 +140,7 @@ def solve_program(
     multiplier: Array,
     slip: Array,
     stiff: Array,
-    room: Room,
+    workspace: Workspace,
 ) -> tuple[float, int]:
     """Critical load with slip and multiplier, from an upper bound and its multiplier.
 
@@ -156,26 +158,26 @@ def solve_program(
         y of the lowest upper bound, <p, y> = 1.
     slip, stiff : (n,) arrays, output
         d and K d.
-    room : Room
-        With room.diagonal set to the diagonal of A.
+    workspace : Workspace
+        With workspace.diagonal set to the diagonal of A.
 
     Returns
     -------
     load, status : float, int
-        SOLVED, STALLED after too many passes, or OVERFULL: more members than there is room for.
+        SOLVED, STALLED after too many passes, or OVERFULL: more members than the workspace holds.
     """
     load = min(bound, cap)
     tolerance = stress_tolerance(excess, profile, load)
-    members = room.members
-    inside = room.inside
-    solution = room.vectors[1]
+    members = workspace.members
+    inside = workspace.inside
+    solution = workspace.vectors[1]
     own = grid.column[0]
     inside[:] = False
     stiff[:] = 0.0
     size = ZERO
     status = STALLED
     for _ in range(PASSES):
-        count = overstressed(load, excess, profile, stiff, room, tolerance)
+        count = overstressed(load, excess, profile, stiff, workspace, tolerance)
         if count == 0:
             status = SOLVED
             break
@@ -184,17 +186,24 @@ def solve_program(
             break
         before = size
         size = append(
-            room.factor, size, members, room.order, count, grid.column, room.diagonal, PIVOT
+            workspace.factor,
+            size,
+            members,
+            workspace.order,
+            count,
+            grid.column,
+            workspace.diagonal,
+            PIVOT,
         )
-        extend_forward(room.factor, before, size, members, profile, room.forward[0])
-        extend_forward(room.factor, before, size, members, excess, room.forward[1])
+        extend_forward(workspace.factor, before, size, members, profile, workspace.forward[0])
+        extend_forward(workspace.factor, before, size, members, excess, workspace.forward[1])
         for t in range(before, size):
             inside[members[t]] = True
         failed = size < before + count
         settled = False
         if failed:
-            direction = room.vectors[3]
-            singular_direction(room, size, direction)
+            direction = workspace.vectors[3]
+            singular_direction(workspace, size, direction)
             above = 0.0
             below = 0.0
             for t in range(size + 1):
@@ -207,7 +216,7 @@ def solve_program(
                 for i in range(excess.shape[0]):
                     multiplier[i] = direction[i] / below
             load = min(load, bound)
-        solve_forward(room, size, load, solution)
+        solve_forward(workspace, size, load, solution)
         if failed:
             # Members that joined only because the load was too high would slip backwards now.
             kept = 0
@@ -219,14 +228,14 @@ def solve_program(
                     for t in range(kept, size):
                         inside[members[t]] = False
                     size = kept
-                    solve_forward(room, size, load, solution)
+                    solve_forward(workspace, size, load, solution)
                     kept = 0
                     if size == 0:
                         break
-        apply_stiffness(grid.strip, own, members, size, solution, room.halves, stiff)
+        apply_stiffness(grid.strip, own, members, size, solution, workspace.halves, stiff)
         if settled:  # a cut that lowers the load by round-off only: this is the optimum
             status = SOLVED
-            back_off(load, excess, profile, grid, room, size, solution, stiff)
+            back_off(load, excess, profile, grid, workspace, size, solution, stiff)
             break
     slip[:] = 0.0
     for t in range(size):

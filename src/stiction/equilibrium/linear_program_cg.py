@@ -23,7 +23,7 @@ from stiction.elasticity.inner_product import dot
 from stiction.equilibrium.linear_program import OVERSTRESS, PIVOT, SOLVED, STALLED, solve_program
 from stiction.equilibrium.segments import Segments
 from stiction.equilibrium.window_test import OUT_OF_REACH, circle_of, padded
-from stiction.equilibrium.workspace import Grid, make_room
+from stiction.equilibrium.workspace import Grid, make_workspace
 
 WINDOW = 1024
 """Nodes of the window that is solved first."""
@@ -60,15 +60,15 @@ def window_solution(
     n = excess.shape[0]
     nodes = (centre - WINDOW // 2 + np.arange(WINDOW)) % n
     small = circle_of(grid.column, WINDOW)
-    room = make_room(2 * WINDOW)
-    room.diagonal[:] = grid.column[0]
-    room.diagonal[:WINDOW] = diagonal[nodes]
+    workspace = make_workspace(2 * WINDOW)
+    workspace.diagonal[:] = grid.column[0]
+    workspace.diagonal[:WINDOW] = diagonal[nodes]
     strength = padded(excess[nodes], OUT_OF_REACH * float(np.abs(excess).max()))
     load_profile = padded(profile[nodes], 1e-9 * float(profile.mean()))
     local = np.zeros(2 * WINDOW)
     local[:WINDOW] = multiplier[nodes]
     slip, stiff = np.empty(2 * WINDOW), np.empty(2 * WINDOW)
-    solve_program(strength, load_profile, small, bound, np.inf, local, slip, stiff, room)
+    solve_program(strength, load_profile, small, bound, np.inf, local, slip, stiff, workspace)
     result = np.zeros(n)
     result[nodes] = local[:WINDOW]
     result /= dot(result, profile, n)

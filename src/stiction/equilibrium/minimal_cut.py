@@ -19,7 +19,7 @@ ROUNDS = 200
 
 
 class Cutter:
-    """Room for cuts of one programme.
+    """Workspace for cuts of one programme.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Cutter:
     def __init__(self, operator: Operator, accuracy: float) -> None:
         shape = operator.rate.shape
         self.operator, self.accuracy = operator, accuracy
-        self.room = np.empty((3, *shape))
+        self.workspace = np.empty((3, *shape))
         self.rest, self.none = np.empty(shape), np.zeros(shape)
 
     def solve(self, right: Array, inside: Mask, x: Array, tolerance: float) -> bool:
@@ -39,7 +39,15 @@ class Cutter:
         x[~inside] = 0.0
         residual_of(self.operator, 0.0, self.none, right, x, self.rest)
         status, _ = solve_inside(
-            self.operator, inside, 0.0, self.none, x, self.rest, self.room, tolerance, ITERATIONS
+            self.operator,
+            inside,
+            0.0,
+            self.none,
+            x,
+            self.rest,
+            self.workspace,
+            tolerance,
+            ITERATIONS,
         )
         return bool(status == SOLVED)
 

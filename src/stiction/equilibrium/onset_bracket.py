@@ -54,7 +54,7 @@ class Bracket:
 
     def __post_init__(self) -> None:
         shape = self.excess.shape
-        self.room = np.empty((3, *shape))
+        self.workspace = np.empty((3, *shape))
         self.residual = np.empty(shape)
         self.inside = np.zeros(shape, dtype=np.bool_)
         self.slip = np.zeros(shape)
@@ -139,7 +139,7 @@ def bisect(
         inside[:] = (slip > 0.0) | (excess < load * profile)
         status, taken = equilibrate(
             operator, load * profile - excess, 0.0, none, inside, slip, bracket.residual,
-            bracket.room, accuracy * bracket.scale, ITERATIONS,
+            bracket.workspace, accuracy * bracket.scale, ITERATIONS,
         )  # fmt: skip
         bracket.iterations += taken
         if status == SOLVED:
@@ -149,7 +149,7 @@ def bisect(
         high = load
         if status != NEGATIVE:
             continue
-        vector = np.abs(bracket.room[1])
+        vector = np.abs(bracket.workspace[1])
         value, taken = lowest_eigenvector(
             operator, inside, vector, 1e-4 * float(operator.rate.max()), 200
         )

@@ -41,7 +41,7 @@ def plane_equilibria(
     interface = problem.interface
     symbol = symbol_of(plane, interface.shape)
     stress = np.full(slip.shape, np.nan)
-    for number in range(loads.size):  # one at a time: transforms of all would take twice the room
+    for number in range(loads.size):  # one at a time: transforms of all would take twice the memory
         relief = interface.inverse_transform(symbol * interface.transform(slip[number]))
         stress[number] = rows.initial_stress[0] + loads[number] * rows.load_profile - relief
     jumps = np.array([event.load for event in follow_plane(plane, sample).events])

@@ -15,7 +15,7 @@ from stiction.equilibrium.linear_program_cg import LargeProgram, Solution
 from stiction.equilibrium.pieces import pieces_of, refused
 from stiction.equilibrium.single_patch_test import block_factor
 from stiction.equilibrium.window_bound import Windows, exact_window, window_bound, windows_between
-from stiction.equilibrium.workspace import Grid, Sample, make_room
+from stiction.equilibrium.workspace import Grid, Sample, make_workspace
 from stiction.errors import InputError
 from stiction.problem import Problem
 
@@ -102,9 +102,9 @@ class Setting:
         """K times a field, (n,) array."""
         result = np.empty(self.nodes)
         members = np.flatnonzero(field)
-        room = np.empty((2, self.nodes // 2))
+        workspace = np.empty((2, self.nodes // 2))
         apply_stiffness(
-            self.grid.strip, self.grid.column[0], members, members.size, field[members], room,
+            self.grid.strip, self.grid.column[0], members, members.size, field[members], workspace,
             result,
         )  # fmt: skip
         return result
@@ -150,15 +150,15 @@ class Setting:
             if found is not None:
                 return found
         # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
-        room = make_room(self.nodes)
-        room.diagonal[:] = self.grid.column[0] - rate
+        workspace = make_workspace(self.nodes)
+        workspace.diagonal[:] = self.grid.column[0] - rate
         slip, stiff, multiplier = (
             np.empty(self.nodes),
             np.empty(self.nodes),
             bound.multiplier.copy(),
         )
         load, status = solve_program(
-            excess, self.profile, self.grid, bound.load, cap, multiplier, slip, stiff, room
+            excess, self.profile, self.grid, bound.load, cap, multiplier, slip, stiff, workspace
         )
         if status == SOLVED:
             return Solution(load, slip, stiff, multiplier)
@@ -178,6 +178,6 @@ class Setting:
         return float(
             certificate(
                 sample, self.grid, solution.slip, solution.stiff, solution.multiplier,
-                stiff_multiplier, make_room(self.nodes),
+                stiff_multiplier, make_workspace(self.nodes),
             )
         )  # fmt: skip

@@ -112,7 +112,7 @@ class Segments:
         self.sizes = np.zeros(count, dtype=np.int64)
         self.inside = np.zeros(n, dtype=np.bool_)
         self._order = np.empty(width + 4, dtype=np.int64)
-        self._room = np.empty((3, width + 4))
+        self._workspace = np.empty((3, width + 4))
 
     def append(self, nodes: Array) -> int:
         """Append nodes in this order; the segment that fails, or -1."""
@@ -149,6 +149,6 @@ class Segments:
         result = np.empty_like(values)
         precondition(
             self.factors, self.members, self.sizes, values, result,
-            self._room[0], self._room[1], self._room[2],
+            self._workspace[0], self._workspace[1], self._workspace[2],
         )  # fmt: skip
         return result

@@ -108,7 +108,7 @@ class Solver:
         if nodes < LARGE_GRID:
             stiffs, aheads = np.empty((2, count, nodes))
             self._batch(rows, table, slips, stiffs, aheads, multipliers)
-            for row in map(int, np.flatnonzero(table[:, batch.FATE] == UNDECIDED)):
+            for row in map(int, np.flatnonzero(table[:, batch.OUTCOME] == UNDECIDED)):
                 known[row] = State(
                     float(table[row, batch.LOAD]), slips[row].copy(), stiffs[row],
                     multipliers[row].copy(), ahead=aheads[row],
@@ -120,11 +120,11 @@ class Solver:
                     known[row] = state
         load = table[:, batch.LOAD].copy()
         first = load.copy()
-        fate = table[:, batch.FATE].astype(np.int64)
+        outcome = table[:, batch.OUTCOME].astype(np.int64)
         events: dict[int, list[Event]] = {}
         residual = np.zeros(count, dtype=np.bool_)
         sliding_at = table[:, batch.POSITION].copy()
-        for row in map(int, np.flatnonzero(fate != SLIDING)):
+        for row in map(int, np.flatnonzero(outcome != SLIDING)):
             sample = sample_of(rows, row, self.setting.pieces)
             if row in known:
                 state = known[row]
@@ -138,13 +138,13 @@ class Solver:
             residual[row] = bool(residual_nodes(sample, state.slip).any())
             if state.direction.any():
                 sliding_at[row] = main_patch(state.direction)[2] * self.setting.spacing
-            if fate[row] == batch.CORNER_REACHED:
+            if outcome[row] == batch.CORNER_REACHED:
                 at_first = state.first or state  # it has none if it could not be followed so far
                 self._rewrite(sample, at_first, table[row], multipliers[row])
                 first[row] = at_first.load
                 if self.slip:
                     slips[row] = at_first.slip
-        known_gaps = ~(steepens(self.setting.pieces) & (fate == batch.CORNER_REACHED))
+        known_gaps = ~(steepens(self.setting.pieces) & (outcome == batch.CORNER_REACHED))
         self._check(table[known_gaps, batch.GAP], first[known_gaps])
         mean_profile = rows.load_profile.mean()
         values: dict[str, NDArray[Any]] = {
@@ -202,7 +202,7 @@ class Solver:
             line[:] = 0.0
             line[batch.GAP] = np.nan
             multipliers[row] = 0.0
-            line[batch.FATE] = batch.CORNER_REACHED
+            line[batch.OUTCOME] = batch.CORNER_REACHED
             return None
         multipliers[row] = solution.multiplier
         if self.slip:
@@ -215,16 +215,16 @@ class Solver:
         line[batch.POSITION] = centre * setting.spacing
         line[batch.LENGTH] = length * setting.spacing
         if exceeds(sample, solution.slip):
-            line[batch.FATE] = batch.CORNER_REACHED
+            line[batch.OUTCOME] = batch.CORNER_REACHED
             return None
         ahead = solution.slip.copy()
-        line[batch.FATE] = runs_away(
+        line[batch.OUTCOME] = runs_away(
             sample, setting.wide_column, solution.load, ahead, solution.stiff,
             solution.multiplier, stiff_multiplier,
             setting.escape(sample, solution.load), setting.block, setting.reach,
             np.empty((6, setting.nodes)),
         )  # fmt: skip
-        if line[batch.FATE] == SLIDING:
+        if line[batch.OUTCOME] == SLIDING:
             return None
         return State(solution.load, solution.slip, solution.stiff, solution.multiplier, ahead=ahead)
 

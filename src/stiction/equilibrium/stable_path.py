@@ -18,7 +18,7 @@ from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
 from stiction.equilibrium.linear_program import PIVOT, singular_direction, solve_forward
 from stiction.equilibrium.pieces import piece_at, start_of
-from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Room, Sample
+from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Sample, Workspace
 
 REACHED = 0
 UNSTABLE = 1
@@ -30,18 +30,23 @@ REFRESH = 16
 
 @jit
 def build(
-    sample: Sample, grid: Grid, slip: Array, piece: NDArray[np.int64], strength: Array, room: Room
+    sample: Sample,
+    grid: Grid,
+    slip: Array,
+    piece: NDArray[np.int64],
+    strength: Array,
+    workspace: Workspace,
 ) -> int:
     """Strength and diagonal of A for the present pieces; returns how many nodes slip."""
     count = ZERO
     pieces = sample.pieces
     for i in range(slip.shape[0]):
-        room.inside[i] = slip[i] > 0.0
+        workspace.inside[i] = slip[i] > 0.0
         piece[i] = piece_at(pieces, sample.critical[i], slip[i])
         strength[i] = start_of(pieces, sample.excess[i], sample.floor[i], piece[i])
-        room.diagonal[i] = grid.column[0] - pieces.slopes[piece[i]] * sample.rate[i]
-        if room.inside[i]:
-            room.order[count] = i
+        workspace.diagonal[i] = grid.column[0] - pieces.slopes[piece[i]] * sample.rate[i]
+        if workspace.inside[i]:
+            workspace.order[count] = i
             count += 1
     return count
 
@@ -55,7 +60,7 @@ def advance(
     slip: Array,
     stiff: Array,
     direction: Array,
-    room: Room,
+    workspace: Workspace,
 ) -> tuple[float, int]:
     """Follow the stable path from one load towards another.
 
@@ -70,49 +75,49 @@ def advance(
         d and K d.
     direction : (n,) array, output
         If the path ends: in which it is unstable, z >= 0 and A z <= 0.
-    room : Room
+    workspace : Workspace
 
     Returns
     -------
     load, status : float, int
-        REACHED, UNSTABLE, or CROWDED: more members than there is room for.
+        REACHED, UNSTABLE, or CROWDED: more members than the workspace holds.
     """
     n = slip.shape[0]
-    right = room.vectors[0]
-    solution = room.vectors[1]
-    stiff_rate = room.vectors[2]
-    rate = room.vectors[3]
+    right = workspace.vectors[0]
+    solution = workspace.vectors[1]
+    stiff_rate = workspace.vectors[2]
+    rate = workspace.vectors[3]
     pieces = sample.pieces
     last = pieces.ends.shape[0]
     piece = np.zeros(n, np.int64)
     strength = np.empty(n)
     own = grid.column[0]
-    members, order, diagonal = room.members, room.order, room.diagonal
-    count = build(sample, grid, slip, piece, strength, room)
+    members, order, diagonal = workspace.members, workspace.order, workspace.diagonal
+    count = build(sample, grid, slip, piece, strength, workspace)
     if count > MOST_MEMBERS:
         return load, CROWDED
-    size = append(room.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
+    size = append(workspace.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
     if size < count:
         # Stability was lost exactly as the floor was reached.
-        singular_direction(room, size, direction)
+        singular_direction(workspace, size, direction)
         return load, UNSTABLE
-    extend_forward(room.factor, ZERO, size, members, sample.profile, room.forward[0])
-    extend_forward(room.factor, ZERO, size, members, strength, room.forward[1])
+    extend_forward(workspace.factor, ZERO, size, members, sample.profile, workspace.forward[0])
+    extend_forward(workspace.factor, ZERO, size, members, strength, workspace.forward[1])
     for event in range((1 + last) * n + 1):  # a node begins to slip, and passes each corner, once
         for t in range(size):
-            right[t] = room.forward[0, t]
-        back_substitute(room.factor, size, right, rate)
-        apply_stiffness(grid.strip, own, members, size, rate, room.halves, stiff_rate)
+            right[t] = workspace.forward[0, t]
+        back_substitute(workspace.factor, size, right, rate)
+        apply_stiffness(grid.strip, own, members, size, rate, workspace.halves, stiff_rate)
         if event % REFRESH == 0:
-            solve_forward(room, size, load, solution)
-            apply_stiffness(grid.strip, own, members, size, solution, room.halves, stiff)
+            solve_forward(workspace, size, load, solution)
+            apply_stiffness(grid.strip, own, members, size, solution, workspace.halves, stiff)
             for t in range(size):
                 slip[members[t]] = max(solution[t], 0.0)
         step = target - load
         starts = -1
         ends = -1
         for i in range(n):
-            if not room.inside[i]:
+            if not workspace.inside[i]:
                 margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
                 closing = sample.profile[i] - stiff_rate[i]
                 if closing > 0.0 and margin < step * closing:
@@ -140,28 +145,39 @@ def advance(
             after = pieces.slopes[piece[i]] * sample.rate[i]
             diagonal[i] = own - after
             if after <= before:
-                raise_diagonal(room.factor, size, ends, before - after, room.vectors)
+                raise_diagonal(workspace.factor, size, ends, before - after, workspace.vectors)
             else:  # it weakens more steeply: the factor is made anew from there on
                 order[: size - ends] = members[ends:size]
                 now = append(
-                    room.factor, ends, members, order, size - ends, grid.column, diagonal, PIVOT
+                    workspace.factor,
+                    ends,
+                    members,
+                    order,
+                    size - ends,
+                    grid.column,
+                    diagonal,
+                    PIVOT,
                 )
                 if now < size:
-                    singular_direction(room, now, direction)
+                    singular_direction(workspace, now, direction)
                     return load, UNSTABLE
-            extend_forward(room.factor, ends, size, members, sample.profile, room.forward[0])
-            extend_forward(room.factor, ends, size, members, strength, room.forward[1])
+            extend_forward(
+                workspace.factor, ends, size, members, sample.profile, workspace.forward[0]
+            )
+            extend_forward(workspace.factor, ends, size, members, strength, workspace.forward[1])
         elif starts >= 0:
             if size == MOST_MEMBERS:
                 return load, CROWDED
             order[0] = starts
-            now = append(room.factor, size, members, order, 1, grid.column, diagonal, PIVOT)
+            now = append(workspace.factor, size, members, order, 1, grid.column, diagonal, PIVOT)
             if now == size:
-                singular_direction(room, size, direction)
+                singular_direction(workspace, size, direction)
                 return load, UNSTABLE
-            extend_forward(room.factor, size, now, members, sample.profile, room.forward[0])
-            extend_forward(room.factor, size, now, members, strength, room.forward[1])
-            room.inside[starts] = True
+            extend_forward(
+                workspace.factor, size, now, members, sample.profile, workspace.forward[0]
+            )
+            extend_forward(workspace.factor, size, now, members, strength, workspace.forward[1])
+            workspace.inside[starts] = True
             size = now
         else:
             return load, REACHED

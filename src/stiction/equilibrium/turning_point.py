@@ -56,8 +56,8 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     accuracy : float
         Largest residual stress as a share of the mean strength.
     """
-    operator, excess, profile, room = (
-        bracket.operator, bracket.excess, bracket.profile, bracket.room,
+    operator, excess, profile, workspace = (
+        bracket.operator, bracket.excess, bracket.profile, bracket.workspace,
     )  # fmt: skip
     load, amplitude = guess.load, guess.amplitude
     spring = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
@@ -66,7 +66,7 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     inside[:] = (slip > 0.0) | (excess < load * profile)
     right = load * profile - excess + (spring * amplitude) * held
     status, taken = equilibrate(
-        operator, right, spring, held, inside, slip, bracket.residual, room,
+        operator, right, spring, held, inside, slip, bracket.residual, workspace,
         accuracy * bracket.scale, ITERATIONS,
     )  # fmt: skip
     bracket.iterations += taken
@@ -82,7 +82,7 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     cost = float(np.abs(excess - load * profile).sum())
     tolerance = accuracy * spring * bracket.scale * inner(profile, slope) / cost
     status, taken = solve_inside(
-        operator, inside, spring, held, slope, bracket.residual, room, tolerance, ITERATIONS
+        operator, inside, spring, held, slope, bracket.residual, workspace, tolerance, ITERATIONS
     )
     bracket.iterations += taken
     if status != SOLVED:
@@ -97,7 +97,7 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
 
 def other_patch(bracket: Bracket) -> Array | None:
     """The patch that became unstable beside the one that was held, unit norm; None if none did."""
-    vector = np.where(bracket.inside, np.abs(bracket.room[1]), 0.0)
+    vector = np.where(bracket.inside, np.abs(bracket.workspace[1]), 0.0)
     if not vector.any():
         return None
     value, taken = lowest_eigenvector(

@@ -14,7 +14,7 @@ from stiction._typing import Array
 from stiction.elasticity.line_stiffness import coupling_strip
 from stiction.equilibrium.instability_jump import SLIDING, jump
 from stiction.equilibrium.patches import main_patch
-from stiction.equilibrium.workspace import Grid, Sample, make_room
+from stiction.equilibrium.workspace import Grid, Sample, make_workspace
 
 WINDOW = 1024
 """Nodes of the window."""
@@ -85,9 +85,9 @@ def runs_away_frozen(
         padded(sample.critical[nodes], np.inf),
         sample.pieces,
     )
-    fate = jump(part, small, load, local, stiff, escape, steps, make_room(2 * WINDOW))
+    outcome = jump(part, small, load, local, stiff, escape, steps, make_workspace(2 * WINDOW))
     slip[nodes] = np.maximum(slip[nodes], local[:WINDOW])
-    return bool(fate == SLIDING)
+    return bool(outcome == SLIDING)
 
 
 def _product(column: Array, field: Array) -> Array:

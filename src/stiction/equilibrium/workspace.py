@@ -1,4 +1,4 @@
-"""What the kernels pass around: one sample, the grid, and room to work in."""
+"""What the kernels pass around: one sample, the grid, and a workspace."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Grid(NamedTuple):
     strip: Array
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Work space for one sample at a time.
 
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
@@ -79,14 +79,14 @@ class Room(NamedTuple):
 
 
 MOST_MEMBERS = 8192
-"""Slipping nodes for which a dense factor has room (268 MB if all of it is used)."""
+"""Slipping nodes for which a dense factor has space (268 MB if all of it is used)."""
 
 
 @jit
-def make_room(n: int) -> Room:
-    """Room for samples of n nodes. Pages of the factor that are never used cost no memory."""
+def make_workspace(n: int) -> Workspace:
+    """Workspace for samples of n nodes. Pages of the factor that are never used cost no memory."""
     capacity = min(n, MOST_MEMBERS)
-    return Room(
+    return Workspace(
         np.empty(row_start(capacity + 4)),
         np.empty(n + 4, np.int64),
         np.empty(n, np.int64),
