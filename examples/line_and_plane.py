@@ -151,9 +151,9 @@ def slipping(data: xr.Dataset) -> xr.DataArray:
 
 
 def neighbourhood_onset(case: Case, ratio: float, data: xr.Dataset) -> np.ndarray:
-    """First instability, Pa, of `NEIGHBOURS` samples if only nodes near the critical patch can slip.
+    """First instability, Pa, if only nodes near the critical patch can slip.
 
-    Near is within `REACH` h_n of its centre. What slips farther away is then missing, while the
+    Of the first `NEIGHBOURS` samples. Near is within `REACH` h_n of its centre. What slips farther away is then missing, while the
     patch keeps its own shape, which on a plane is no ellipse of the local criterion.
     """
     problem = case.problem
@@ -302,7 +302,7 @@ def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
     lines.append("")
     table("Onset lowered, % of the local criterion (5 to 95 % of the samples)", parts, lowered)
     for where in ("near", "far"):
-        table(f"Of this by what is {where}, {REACH} h_n", parts, plain(where))
+        table(f"Of this by what is {where}", parts, plain(where))
     table("Mean onset, MPa", parts, plain("onset"))
     table("Its standard deviation, % of the mean", parts, plain("scatter"))
     table("Slipping patches at the first instability", parts, plain("patches"))
