@@ -153,8 +153,8 @@ def slipping(data: xr.Dataset) -> xr.DataArray:
 def neighbourhood_onset(case: Case, ratio: float, data: xr.Dataset) -> np.ndarray:
     """First instability, Pa, if only nodes near the critical patch can slip.
 
-    Of the first `NEIGHBOURS` samples. Near is within `REACH` h_n of its centre. What slips farther away is then missing, while the
-    patch keeps its own shape, which on a plane is no ellipse of the local criterion.
+    Of the first `NEIGHBOURS` samples; near is within `REACH` h_n of the centre. What slips
+    farther away is missing, while the patch keeps its own shape, which on a plane is no ellipse.
     """
     problem = case.problem
     count = min(NEIGHBOURS, data.sizes["sample"])

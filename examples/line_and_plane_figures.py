@@ -94,9 +94,7 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     _against_ratio(panels[2], ratios, {name: part["lowering"] for name, part in parts.items()})
     for name in ("line, large", "plane, large"):
         far = [estimate.value for estimate in parts[name]["far"]]
-        panels[2].plot(
-            ratios, far, color=STYLES[name]["color"], linestyle=":", label="far slip only"
-        )
+        panels[2].plot(ratios, far, color=STYLES[name]["color"], linestyle=":")
     panels[2].set(yscale="log", ylabel="mean lowering (%)", ylim=(1e-4, 6.0))
     panel(panels[2], "c")
     for axes, place in ((panels[0], 0.3), (panels[2], 0.8)):
