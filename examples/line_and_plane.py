@@ -34,7 +34,7 @@ NUCLEATION_LENGTH = st.Problem(
 RESAMPLED = 200
 NEIGHBOURS = 100
 REACH = 1.25
-"""Of the neighbourhood of a critical patch, which is 1.5 h_n wide at most, in h_n."""
+"""Radius of the neighbourhood of a critical patch, in h_n: most of them fit into it."""
 OUT_OF_REACH = 5e6
 """Strength, Pa, that nothing reaches."""
 HEADS = {
