@@ -20,6 +20,8 @@ from scipy.stats import rankdata
 
 import stiction as st
 from stiction.ensemble.cost_estimate import probe_time
+from stiction.equilibrium.plane_solver import first_instability, plane_of, sample_of
+from stiction.equilibrium.solver import Solver
 from stiction.statistics.estimates import Estimate, mean, standard_deviation
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -30,6 +32,11 @@ NUCLEATION_LENGTH = st.Problem(
     SOLID, st.Interface(length=0.1, nodes=512), FRICTION
 ).nucleation_length
 RESAMPLED = 200
+NEIGHBOURS = 100
+REACH = 1.25
+"""Radius of the neighbourhood of a critical patch, in h_n: most of them fit into it."""
+OUT_OF_REACH = 5e6
+"""Strength, Pa, that nothing reaches."""
 HEADS = {
     "line, small": "line, 16 h_n",
     "line, large": "line, 64 h_n",
@@ -141,6 +148,41 @@ def slipping(data: xr.Dataset) -> xr.DataArray:
     """Share of the nodes that slip at the first instability, per cent; of the kept samples."""
     along = [name for name in ("x", "y") if name in data.slip.dims]
     return 100.0 * (data.slip > 0.0).mean(along)
+
+
+def neighbourhood_onset(case: Case, ratio: float, data: xr.Dataset) -> np.ndarray:
+    """First instability, Pa, if only nodes near the critical patch can slip.
+
+    Of the first `NEIGHBOURS` samples; near is within `REACH` h_n of the centre. What slips
+    farther away is missing, while the patch keeps its own shape, which on a plane is no ellipse.
+    """
+    problem = case.problem
+    count = min(NEIGHBOURS, data.sizes["sample"])
+    tau_p = strength(ratio).sample(problem.interface, samples=count, seed=case.seed)
+    centres = data.critical_position.sel(ratio=ratio).values.reshape(-1, 2 if case.plane else 1)
+    n, length = case.size * case.nodes, case.size * NUCLEATION_LENGTH
+    x = np.arange(n) * length / n
+    for row, centre in zip(tau_p, centres, strict=False):
+        away = [(x - c + 0.5 * length) % length - 0.5 * length for c in centre]
+        square = away[0] ** 2 if not case.plane else np.add.outer(away[0] ** 2, away[1] ** 2)
+        row[square > (REACH * NUCLEATION_LENGTH) ** 2] = OUT_OF_REACH
+    sample = problem.sample({"strength": tau_p})
+    if not case.plane:
+        return Solver(problem)(sample)["first_instability"]
+    plane = plane_of(problem)
+    return np.array([first_instability(plane, sample_of(sample, i), 1e-6) for i in range(count)])
+
+
+def split(case: Case, data: xr.Dataset) -> dict[str, list[Estimate]]:
+    """Lowering by what is near and by what is far, per cent of the local criterion."""
+    rows: dict[str, list[Estimate]] = {"near": [], "far": []}
+    for ratio in RATIOS:
+        at = data.sel(ratio=ratio)
+        near = neighbourhood_onset(case, ratio, data)
+        local, exact = (v.values[: near.size] for v in (at.local, at.first_instability))
+        rows["near"].append(mean(100.0 * (1.0 - near / local)))
+        rows["far"].append(mean(100.0 * (near - exact) / local))
+    return rows
 
 
 def weakest_link(values: np.ndarray, copies: int = QUARTERS) -> float:
@@ -259,6 +301,8 @@ def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
         lines.append("{}: {} samples a point, slip of {}".format(name, *counts))
     lines.append("")
     table("Onset lowered, % of the local criterion (5 to 95 % of the samples)", parts, lowered)
+    for where in ("near", "far"):
+        table(f"Of this by what is {where}", parts, plain(where))
     table("Mean onset, MPa", parts, plain("onset"))
     table("Its standard deviation, % of the mean", parts, plain("scatter"))
     table("Slipping patches at the first instability", parts, plain("patches"))
@@ -291,6 +335,9 @@ def main(arguments: list[str] | None = None) -> None:
         kind: size_effect(found[f"{kind}, small"], found[f"{kind}, large"])
         for kind in ("line", "plane")
     }
+    for case in CASES:
+        if case.name in parts:
+            parts[case.name] |= split(case, found[case.name])
     print(tables(found, parts, effects))
     lowered = {name: lowering(found[name]) for name in parts}
     draw(given.figures, RATIOS, lowered, parts, effects, samples_to_show(found))

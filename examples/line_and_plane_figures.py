@@ -92,7 +92,10 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
         panel(axes, letter)
     panels[0].set_ylabel("share of the samples (%)")
     _against_ratio(panels[2], ratios, {name: part["lowering"] for name, part in parts.items()})
-    panels[2].set(yscale="log", ylabel="mean lowering (%)")
+    for name in ("line, large", "plane, large"):
+        far = [estimate.value for estimate in parts[name]["far"]]
+        panels[2].plot(ratios, far, color=STYLES[name]["color"], linestyle=":")
+    panels[2].set(yscale="log", ylabel="mean lowering (%)", ylim=(1e-4, 6.0))
     panel(panels[2], "c")
     for axes, place in ((panels[0], 0.3), (panels[2], 0.8)):
         figure.legend(

@@ -29,6 +29,7 @@ def test_in_small(study, tmp_path, monkeypatch, capsys):
     ]
     monkeypatch.setattr(study, "CASES", tuple(coarse))
     monkeypatch.setattr(study, "RATIOS", (0.5,))
+    monkeypatch.setattr(study, "NEIGHBOURS", 2)
     arguments = [str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)]
     drawing = importlib.import_module("line_and_plane_figures")
     drawn = []  # laying out and writing the figures takes longer than all the rest
@@ -47,6 +48,9 @@ def test_in_small(study, tmp_path, monkeypatch, capsys):
     # Finer nodes carry the same samples: 8 in h_n cost a per cent at most.
     fine = found["plane, small, fine"]
     np.testing.assert_allclose(fine.first_instability, plane.first_instability, rtol=0.01)
+    # Slip that is held back near the critical patch can only raise the onset.
+    (far,) = study.split(study.CASES[2], plane)["far"]
+    assert far.value > 0.0
     line, wide = (study.lowering(found[f"{kind}, small"]).mean() for kind in ("line", "plane"))
     assert wide > line
 
