@@ -75,7 +75,7 @@ def check_progress(value: Any) -> None:
         raise InputError(f"progress: must be True, False or a function, got {describe(value)}")
 
 
-def check_memory(name: str, needed: float) -> None:
+def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:
     """Refuse what this machine has no memory for, before it begins to swap."""
     try:
         there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
@@ -83,8 +83,8 @@ def check_memory(name: str, needed: float) -> None:
         return
     if needed > there:
         raise InputError(
-            f"{name}: the results take {needed / 2**30:,.1f} GiB of memory, more than the"
-            f" {there / 2**30:,.1f} GiB of this machine; ask for fewer"
+            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
+            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
         )
 
 

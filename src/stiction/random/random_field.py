@@ -11,7 +11,7 @@ import numpy as np
 import pydantic
 from pydantic import model_validator
 
-from stiction._checks import check_choice, too_many_samples
+from stiction._checks import check_choice, check_memory, too_many_samples
 from stiction._model import Flag, Positive, describe, model, real_array, whole
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
@@ -116,7 +116,9 @@ class RandomField:
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
         counts = check_counts(samples=samples, seed=seed, first=first, stream=stream)
-        ranks = self.modes(interface).ranks
+        modes = self.modes(interface)
+        check_memory("samples", 8.0 * counts["samples"] * (modes.dimension + interface.size))
+        ranks = modes.ranks
         block = block_of(len(interface.shape))
         return standard_normal(**counts, ranks=ranks, mean_mode=self.mean_mode, block=block)
 

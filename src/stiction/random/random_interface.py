@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, model_validator
 
+from stiction._checks import check_memory
 from stiction._model import describe, model
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
@@ -253,6 +254,8 @@ class RandomInterface:
         """
         counts = check_counts(samples=samples, seed=seed, first=first)
         layout = self.layout(interface)
+        each = layout.dimension + len(layout.names) * interface.size
+        check_memory("samples", 8.0 * counts["samples"] * each)
         options = {"first": counts["first"], "block": block_of(len(interface.shape))}
         parts = [
             standard_normal(

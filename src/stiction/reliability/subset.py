@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction._checks import check_memory
 from stiction._progress import TimeUp
 from stiction._typing import Array
 from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
@@ -27,6 +28,8 @@ FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEEP = 3
 """How many of the last populations keep their draws."""
+COPIES = KEEP + 2  # the states of the chains and their noise
+ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
 
 
 @dataclass(frozen=True)
@@ -248,6 +251,7 @@ def descend(
     """
     count = max(2, round(samples * level_probability))
     samples = count * max(2, round(samples / count))
+    check_memory("algorithm 'subset'", COPIES * 8.0 * samples * dimension, ADVICE)
     draws = rng.standard_normal((samples, dimension))
     cut = False
     try:
