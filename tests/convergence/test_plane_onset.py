@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from stiction.equilibrium.plane_onset import Plane, plane_onset
 
@@ -21,6 +22,7 @@ def smooth_onset(nodes, wavenumbers):
     return found.upper
 
 
+@pytest.mark.slow
 def test_lattice_converges_at_second_order_to_the_spectral_onset():
     reference = smooth_onset(256, "spectral")
     errors = [abs(smooth_onset(nodes, "lattice") / reference - 1.0) for nodes in (48, 96, 192)]

@@ -95,6 +95,7 @@ def test_first_instability_is_where_slip_jumps(short, law):
     np.testing.assert_allclose(path.slip[2], above, atol=1e-5 * above.max())
 
 
+@pytest.mark.slow
 def test_exponential_rupture_is_the_limit_of_polygons(problem, make_strength):
     law = st.ExponentialWeakening(weakening_rate=0.5e12)
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
