@@ -92,7 +92,8 @@ def load_history(load: Any, end_time: float | None) -> History:
         if end_time is None:
             raise InputError("end_time: needed where load is a callable, got None")
         return _sampled(load, end_time)
-    if not isinstance(load, Sequence | np.ndarray) or len(load) != 2:
+    pair = isinstance(load, Sequence) or (isinstance(load, np.ndarray) and load.ndim > 0)
+    if not pair or len(load) != 2:
         raise InputError(
             f"load: must be a callable tau_0(t) or a pair (times, values), got {describe(load)}"
         )

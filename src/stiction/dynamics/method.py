@@ -263,7 +263,7 @@ def make_run(
     half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
     weakens = finite & (critical > 0.0)
     loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
-    weakest = min(max(round(half / medium.spacing), 1), loads.size)
+    weakest = round(min(max(half / medium.spacing, 1.0), loads.size))
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
     return Run(medium, friction, table, constants, history, control, steepest, least)
 
