@@ -116,6 +116,11 @@ def check_pace(run: Run, time: float) -> None:
             "and energies are not affected"
         )
     scale = run.scale_at(float(load_at(*run.history, time)))
+    if not scale > 0.0:
+        raise InputError(
+            "initial_stress: is so far from the strength that no scale of stress is left between"
+            " them; check the units of both"
+        )
     rise = run.slope(time) * run.medium.step / scale
     if rise > _COARSE:
         step = run.medium.step

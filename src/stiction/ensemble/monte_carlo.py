@@ -111,7 +111,7 @@ def _check_keep(
         problems += error.problems
     known = keep_samples is None or (
         isinstance(keep_samples, list | tuple | range | np.ndarray)
-        and np.ndim(keep_samples) == 1
+        and getattr(keep_samples, "ndim", 1) == 1
         and all(is_whole(sample, 0) for sample in keep_samples)
     )
     if not known:

@@ -482,6 +482,8 @@ def _completed(given: dict[str, Any], axes: Any) -> dict[str, Any]:
     """The same with the first value of every swept key that has none of its own."""
     result = given
     for axis in axes:
+        if not axis.steps:
+            raise InputError(f"sweep: {', '.join(axis.keys) or 'an axis'}: has no values")
         for key, value in zip(axis.keys, axis.steps[0], strict=True):
             result = _with_default(result, key.split("."), value)
     return result
