@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._checks import check_instance, refusals
 from stiction._model import describe, to_plain
 from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
@@ -117,19 +118,6 @@ def check_method(method: Any) -> None:
 def accepted(method: Method) -> tuple[str, ...]:
     """What `Problem.sample` may let through for a method, besides what every method can do."""
     return getattr(method, "accepts", ())
-
-
-def check_problem(problem: Any) -> None:
-    """Refuse what is not a `Problem`, such as arguments that changed places."""
-    if not isinstance(problem, Problem):
-        raise InputError(f"problem: must be a Problem, got {describe(problem)}")
-
-
-def check_support(problem: Problem, method: Method) -> None:
-    """Refuse a problem that the method cannot take, with its reasons."""
-    reasons = method.supports(problem)
-    if reasons:
-        raise InputError([f"method: the {method.label} cannot take this: {r}" for r in reasons])
 
 
 def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
@@ -247,8 +235,9 @@ def onset(
     True
     """
     check_method(method)
-    check_problem(problem)
-    check_support(problem, method)
+    check_instance("problem", problem, Problem)
+    if refused := refusals(problem, method):
+        raise InputError(refused)
     check_gaps(gaps)
     attributes = study_attributes(problem, method)
     measured = None

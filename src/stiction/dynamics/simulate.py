@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import as_path, is_finite, is_whole
+from stiction._checks import as_path, is_finite, is_whole, refusals
 from stiction._model import describe, real_array, to_plain
 from stiction._progress import Meter
 from stiction.dynamics import monitor
@@ -263,8 +263,8 @@ def simulate_rupture(
     """
     _check(dict(locals()))
     check_variables(variables)
-    if reasons := method.supports(problem):
-        raise InputError([f"method: the {method.label} cannot take this: {r}" for r in reasons])
+    if refused := refusals(problem, method):
+        raise InputError(refused)
     given, measured = gather(problem, named_profiles(profiles), "refuse")
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:

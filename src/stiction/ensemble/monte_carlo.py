@@ -12,7 +12,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import check_count, check_progress, is_real, is_whole, too_many_samples
+from stiction._checks import (
+    check_count,
+    check_progress,
+    is_real,
+    is_whole,
+    refusals,
+    too_many_samples,
+)
 from stiction._model import describe, names_to_keep, to_plain, whole
 from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.assemble import Gathered, GridAxis
@@ -55,8 +62,7 @@ def make_plan(
     if number is None or number < 0:
         problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
     if isinstance(problem, Problem):
-        for reason in method.supports(problem):
-            problems.append(f"method: the {method.label} cannot take this: {reason}")
+        problems += refusals(problem, method)
     if isinstance(problem, Problem) and interface is not None:
         for name, field in interface.properties.items():
             try:

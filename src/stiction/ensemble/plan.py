@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,7 +16,7 @@ from stiction.problem import Problem
 from stiction.random.draws import block_of
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, along
-from stiction.sample import PROFILES
+from stiction.sample import PROFILES, Sample
 
 SLOW = 32
 MOST_NODES = 1 << 20
@@ -84,11 +84,16 @@ def _solver(problem: Problem, method: Method) -> Any:
     return method.prepare(problem)
 
 
+def sample_of(problem: Problem, method: Method, profiles: Mapping[str, Array]) -> Sample:
+    """Random profiles as a method takes them."""
+    # `check_residual` has warned of nodes of constant strength.
+    return problem.sample(profiles, accept=(*accepted(method), "constant"))
+
+
 def compute(plan: Plan, first: int, samples: int) -> Values:
     """Results of samples first .. first + samples - 1; a plain function, for any executor."""
     profiles = plan.profiles(first, samples)
-    accept = (*accepted(plan.method), "constant")  # of which `check_residual` has warned
-    sample = plan.problem.sample(profiles, accept=accept)
+    sample = sample_of(plan.problem, plan.method, profiles)
     values = solve(_solver(plan.problem, plan.method), sample)
     return values | {name: profiles[name] for name in plan.keep if name in profiles}
 

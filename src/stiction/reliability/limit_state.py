@@ -17,9 +17,9 @@ from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
 from stiction.criterion.plane import windows_of
 from stiction.ensemble.monte_carlo import make_plan
+from stiction.ensemble.plan import sample_of
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
-from stiction.evaluation import accepted
 from stiction.friction.law import SCALES
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
@@ -88,8 +88,7 @@ class LimitState:
 
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
-        accept = (*accepted(self.method), "constant")  # of which `check_residual` has warned
-        return dict(self._solver(self.problem.sample(profiles, accept=accept)))
+        return dict(self._solver(sample_of(self.problem, self.method, profiles)))
 
     def _stress(self, draws: Array) -> Array:
         # Rounding may leave a stress a hair below the bound.
