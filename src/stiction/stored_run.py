@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -22,19 +21,12 @@ from stiction._netcdf import DamagedError, read_dataset
 from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
-from stiction.ensemble.files import HeldError, Lock
+from stiction.ensemble.manifest import MANIFEST, refuse_another
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
-from stiction.ensemble.same import refuse_another
-from stiction.ensemble.store import (
-    LOCK,
-    MANIFEST,
-    Store,
-    empty,
-    prepare_folder,
-    writing,
-)
+from stiction.ensemble.store import LOCK, Store, is_active
+from stiction.ensemble.store_writer import empty, prepare_folder, writing
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError, StoreError
@@ -56,7 +48,7 @@ class Status:
     done_by_point : (points,) array
     failures : tuple of Failure
     damaged : tuple of str
-        What is wrong with which chunk; running the study again computes it again.
+        What is wrong with which chunk; running the study again mends it.
     verified : bool
         Whether everything was read and compared with its checksum, or chunks looked at only.
     chunks, bytes : int
@@ -147,6 +139,7 @@ class StoredRun:
             )
         store = self._store
         bad = store.verify(whole=verify)
+        wrong = [f"{file} {text}" for file, text in sorted(bad.items())] + store.unlisted()
         intact = [chunk for chunk in store.chunks if chunk.file not in bad]
         done = stored_samples(intact, points, ensemble.samples, ensemble.first).sum(axis=1)
         return Status(
@@ -154,12 +147,12 @@ class StoredRun:
             int(done.sum()),
             done,
             self.failures,
-            (*store.damage, *(f"{file} {text}" for file, text in sorted(bad.items()))),
+            (*store.damage, *wrong),
             verify,
             len(intact),
             sum(chunk.bytes for chunk in intact),
             sum(chunk.seconds for chunk in intact),
-            _is_active(store.path),
+            is_active(store.path),
         )
 
     @property
@@ -216,18 +209,6 @@ class StoredRun:
         target = as_path("path", path)
         check_suffix(target)
         export(self.dataset(), target)
-
-
-def _is_active(folder: Path) -> bool:
-    if not os.access(folder / LOCK, os.W_OK):
-        return False
-    try:
-        with Lock(folder / LOCK, announce=False):
-            return False
-    except HeldError:
-        return True
-    except StoreError:  # no locks here: nobody knows
-        return False
 
 
 def folder_beside(file: Path) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.ensemble.files import Arrays, decode, digest, encode
-from stiction.ensemble.same import identity
+from stiction.ensemble.manifest import identity
 from stiction.ensemble.scheduler import Span
 from stiction.ensemble.work import Outcome
 from stiction.results import Variable

@@ -11,7 +11,7 @@ from stiction.ensemble.monte_carlo import method_name
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.scheduler import share_out, usable_cores
-from stiction.ensemble.store import Store
+from stiction.ensemble.store_writer import StoreWriter
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
 
@@ -21,7 +21,7 @@ HOPELESS = 16
 
 
 def run_stored(
-    store: Store,
+    store: StoreWriter,
     plans: Sequence[Plan],
     samples: int,
     *,
