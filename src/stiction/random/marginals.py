@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -48,7 +48,13 @@ class Beta:
     @property
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
+        return _frozen_beta(self.alpha, self.beta, self.low, self.high)
+
+
+@lru_cache(maxsize=64)
+def _frozen_beta(alpha: float, beta: float, low: float, high: float) -> Any:
+    """Kept, because to freeze a distribution takes scipy a millisecond, and a sweep has many."""
+    return scipy.stats.beta(alpha, beta, low, high - low)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from stiction._model import (
     to_plain,
     whole,
 )
-from stiction._progress import Show
+from stiction._progress import Meter, Show
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
@@ -166,6 +166,16 @@ class Study:
         if (info.context or {}).get("trusted"):
             return self
         self._check_points()
+        ensemble = self.ensemble
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
+        if problems:
+            raise InputError([f"ensemble.{text}" for text in problems])
+        if ensemble.keep:
+            self._check_kept()
+        return self
+
+    def _check_kept(self) -> None:
+        ensemble = self.ensemble
         some = differing_in(self.plans, "method", "problem.load", "problem.interface", "random")
         nodes = {plan.problem.interface.shape for plan in some}
         if len(nodes) > 1 and any(plan.wide for plan in some):
@@ -173,26 +183,23 @@ class Study:
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
-        ensemble = self.ensemble
-        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
-        if problems:
-            raise InputError([f"ensemble.{text}" for text in problems])
         size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
         try:
             check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
-        return self
 
     def _check_points(self) -> None:
         """Make every plan once; what is wrong is said once, with the points where it is."""
         problems: dict[str, list[int]] = {}
-        for number in range(len(self.plans)):
-            try:
-                self.plans[number]
-            except InputError as error:
-                for text in error.problems:
-                    problems.setdefault(text, []).append(number)
+        with Meter("checking the sweep", len(self.plans), unit="points") as meter:
+            for number in range(len(self.plans)):
+                try:
+                    self.plans[number]
+                except InputError as error:
+                    for text in error.problems:
+                        problems.setdefault(text, []).append(number)
+                meter.advance()
         if problems and not self.sweep:
             raise InputError(problems)
         if problems:
