@@ -46,7 +46,9 @@ class Method(Protocol):
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
     package that names it under the entry points "stiction.methods" offers it in study files too;
     its `type` is then a ``Literal`` with a default.
-    It may have `accepts` as well, of "barriers" and "overstress": see `Problem.sample`.
+    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
+    `Problem.sample`), and `first_stage`, the type of a cheaper method whose onsets lie close to
+    its own, by which rare failures are found first.
     """
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from numpy.typing import NDArray
 from pydantic import Field
@@ -104,6 +104,7 @@ class Equilibrium:
     gap: Gap = 1e-6
     wavenumbers: Literal["spectral", "lattice"] = "spectral"
     type: Literal["equilibrium"] = "equilibrium"
+    first_stage: ClassVar[str] = "local_criterion"
 
     @property
     def chunk_size(self) -> int:

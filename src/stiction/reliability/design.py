@@ -12,7 +12,6 @@ import numpy as np
 from stiction._checks import is_real
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
-from stiction.criterion.method import LocalCriterion
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -27,13 +26,12 @@ from stiction.reliability.algorithms import (
     ran_out,
     short_of,
 )
+from stiction.reliability.effort import budget_of, first_stage, no_first_stage, refused_chains
 from stiction.reliability.estimate import (
     ALIKE,
     FREQUENT,
-    budget_of,
     check_algorithm,
     check_target,
-    usable_first_stage,
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state
 from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
@@ -189,7 +187,7 @@ def subset_tail(request: TailRequest) -> Tail[Descent]:
 
 def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
     state = request.state
-    cheap = state.by(LocalCriterion())
+    cheap = state.by(first_stage(state))
 
     def make(samples: int, number: int, left: int) -> Bridge:
         return bridge(
@@ -208,13 +206,14 @@ def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
 
 def _chosen(state: LimitState, probability: float, seed: int, budget: int) -> tuple[str, str, int]:
     """Algorithm, reason, and the evaluations it took to choose."""
-    if probability >= FREQUENT or usable_first_stage(state) is not None:
+    if probability >= FREQUENT or no_first_stage(state) is not None:
         return "subset", "the method itself goes down the tail", 0
     draws = state.draws(seed, 0, min(PILOT, budget // 5))
-    share = agreement(state.by(LocalCriterion())(draws), state(draws))
-    seen = f"of {draws.shape[0]} plain samples the local criterion picks {share:.0%} of the weakest"
+    share = agreement(state.by(first_stage(state))(draws), state(draws))
+    label = first_stage(state).label
+    seen = f"of {draws.shape[0]} plain samples the {label} picks {share:.0%} of the weakest"
     if share >= ALIKE:
-        return "two_level", f"{seen}, at a tenth of the cost of equilibrium", draws.shape[0]
+        return "two_level", f"{seen}, at a tenth of the cost", draws.shape[0]
     return "subset", f"{seen} only", draws.shape[0]
 
 
@@ -347,8 +346,8 @@ def design_stress(
         meter=meter,
         problems=problems,
         check=lambda state: (
-            check_sampling(state)
-            or check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
+            refused_chains(state, max_evaluations)
+            or check_algorithm(state, algorithm, ("auto", "subset", "two_level"), max_evaluations)
         ),
     )
     request = TailRequest(
@@ -389,13 +388,3 @@ def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignS
             cut_short=True,
             warnings=say([text]),
         )
-
-
-def check_sampling(state: LimitState) -> list[str]:
-    """Refuse a method too slow for thousands of samples."""
-    if state.method.type != "rupture":
-        return []
-    return [
-        "method: rupture simulations take too long for subset simulation; use st.Equilibrium(), or"
-        " st.monte_carlo(...) and the quantiles of its critical_stress"
-    ]

@@ -10,7 +10,6 @@ from stiction._checks import is_finite, is_real, is_whole
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction._typing import Array
-from stiction.criterion.method import LocalCriterion
 from stiction.errors import unknown_name
 from stiction.evaluation import Method
 from stiction.problem import Problem
@@ -25,6 +24,7 @@ from stiction.reliability.algorithms import (
     counted,
     unknown,
 )
+from stiction.reliability.effort import budget_of, first_stage, no_first_stage, too_slow
 from stiction.reliability.limit_state import (
     Event,
     LimitState,
@@ -37,9 +37,8 @@ from stiction.reliability.two_level import agreement
 Algorithm = Literal["auto", "plain", "subset", "importance", "two_level"]
 ALGORITHMS = ("auto", "plain", "subset", "importance", "two_level")
 
-BUDGET = {"local_criterion": 2_000_000, "equilibrium": 200_000, "rupture": 1_000}
-"""Most evaluations if the user does not say: up to a minute, for rupture a few."""
-PILOT = {"rupture": 100}
+PILOT = 1_000
+"""Plain samples that tell which algorithm to take."""
 ALIKE = 0.9
 """Share of the weakest plain samples that the local criterion must pick to lead to the rarest."""
 FREQUENT = 0.01
@@ -73,35 +72,24 @@ def check_stress(name: str, value: Any) -> list[str]:
     return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
 
 
-def usable_first_stage(state: LimitState) -> str | None:
-    """Why two levels are not possible, or None if they are."""
-    if state.method.type != "equilibrium":
-        return f"two levels join the local criterion to equilibrium, not to {state.method.type!r}"
-    reason = state.no_single_length()
-    return None if reason is None else f"the local criterion does not hold: {reason}"
-
-
-def check_algorithm(state: LimitState, algorithm: str, valid: tuple[str, ...]) -> list[str]:
+def check_algorithm(
+    state: LimitState, algorithm: str, valid: tuple[str, ...], max_evaluations: int | None
+) -> list[str]:
     """Why an algorithm cannot be used here; no texts if it can."""
     if not isinstance(algorithm, str):
         return [f"algorithm: must be one of {', '.join(valid)}, got {describe(algorithm)}"]
     if algorithm not in valid:
         return [unknown_name("algorithm", algorithm, valid)]
-    if state.method.type == "rupture" and algorithm not in ("auto", "plain"):
-        return [f"algorithm: {algorithm!r} would take days by rupture; use 'plain' or 'auto'"]
-    reason = None
+    if algorithm in ("auto", "plain"):
+        return []
+    reason = too_slow(state, max_evaluations)
+    if reason is not None:
+        return [f"algorithm: {reason}"]
     if algorithm == "two_level":
-        reason = usable_first_stage(state)
+        reason = no_first_stage(state)
     elif algorithm == "importance":
         reason = state.not_alike_everywhere()
     return [] if reason is None else [f"algorithm: {algorithm!r} is not possible: {reason}"]
-
-
-def budget_of(state: LimitState, max_evaluations: int | None) -> int:
-    """Evaluations allowed."""
-    if max_evaluations is not None:
-        return int(max_evaluations)
-    return BUDGET.get(state.method.type, 200_000)
 
 
 def _exact(request: Request, probability: float, reason: str) -> FailureProbability:
@@ -129,14 +117,14 @@ def _chosen(request: Request, draws: Array, values: Array) -> tuple[str, str]:
     seen = f"{pilot.failures} failure{plural} among {pilot.samples} plain samples"
     if pilot.probability >= FREQUENT:
         return "plain", f"{seen}: frequent enough to count"
-    if usable_first_stage(state) is None:
-        share = agreement(state.by(LocalCriterion())(draws), values)
+    if no_first_stage(state) is None:
+        share = agreement(state.by(first_stage(state))(draws), values)
         if share >= ALIKE:
             text = (
-                f"{seen}: rare; the local criterion resembles equilibrium, at a tenth of its cost"
+                f"{seen}: rare; the {first_stage(state).label} resembles it, at a tenth of its cost"
             )
             return "two_level", text
-        seen += f"; the local criterion picks only {share:.0%} of the weakest of them"
+        seen += f"; the {first_stage(state).label} picks only {share:.0%} of the weakest of them"
     return "subset", f"{seen}: rare, and subset simulation does not need to know where"
 
 
@@ -228,10 +216,10 @@ def failure_probability(
         workers,
         meter=meter,
         problems=problems,
-        check=lambda state: check_algorithm(state, algorithm, ALGORITHMS),
+        check=lambda state: check_algorithm(state, algorithm, ALGORITHMS, max_evaluations),
     )
     budget = budget_of(state, max_evaluations)
-    pilot = min(PILOT.get(state.method.type, 1_000), max(budget // 5, 50))
+    pilot = min(PILOT, max(budget // 5, 50))
     request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
     if stress <= low:
@@ -242,14 +230,14 @@ def failure_probability(
         return _exact(request, 1.0, text)
     with meter:
         meter.expect(budget, at_most=True)
-        return _sampled(request, algorithm)
+        return _sampled(request, algorithm, too_slow(state, max_evaluations))
 
 
-def _sampled(request: Request, algorithm: str) -> FailureProbability:
+def _sampled(request: Request, algorithm: str, slow: str | None) -> FailureProbability:
     """The answer by an algorithm, as far as there is time."""
     state, reason = request.state, "as asked"
-    if algorithm == "auto" and state.method.type == "rupture":
-        algorithm, reason = "plain", "a rupture simulation takes too long for long chains"
+    if algorithm == "auto" and slow is not None:
+        algorithm, reason = "plain", slow
     if algorithm == "auto":
         draws, values = state.draws(request.seed, 0, request.pilot), np.empty(0)
         try:
@@ -268,7 +256,7 @@ def _sampled(request: Request, algorithm: str) -> FailureProbability:
         if algorithm == "importance":
             return by_importance(request, reason)
         if algorithm == "two_level":
-            return by_two_levels(request, state.by(LocalCriterion()), reason)
+            return by_two_levels(request, state.by(first_stage(state)), reason)
         return by_subset(request, reason)
     except TimeUp as up:
         return unknown(request, reason, request.spent + up.spent)
