@@ -179,11 +179,14 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        for field, interface in pairs:
-            warn_if_inaccurate(field, interface)
-        for problem, random in dict.fromkeys((plan.problem, plan.random) for plan in plans):
-            warn_of_units(problem, random.strength.mean)
-            check_residual(problem, random.properties)
+        with Meter("checking the fields", len(pairs) + len(plans), unit="fields") as meter:
+            for field, interface in pairs:
+                warn_if_inaccurate(field, interface)
+                meter.advance()
+            for plan in plans:
+                warn_of_units(plan.problem, plan.random.strength.mean)
+                check_residual(plan.problem, plan.random.properties)
+                meter.advance()
     found_warnings = list(dict.fromkeys((str(w.message), w.category) for w in caught))
     for text, category in found_warnings[:FEW]:
         warn_user(text, category)
