@@ -48,6 +48,7 @@ _HOMES = {
     "Study": "study.study",
     "Cluster": "ensemble.distributed",
     "open_run": "stored_run",
+    "merge_parts": "merge",
     "StoredRun": "stored_run",
     "RunError": "errors",
     "StoreError": "errors",

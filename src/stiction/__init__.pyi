@@ -32,6 +32,9 @@ from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.interface import Interface as Interface
 from stiction.load import Load as Load
+from stiction.merge import (
+    merge_parts as merge_parts,
+)
 from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile

@@ -21,8 +21,10 @@ from stiction._netcdf import DamagedError, read_dataset
 from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
+from stiction.ensemble.files import cannot_write
 from stiction.ensemble.manifest import MANIFEST, refuse_another
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
+from stiction.ensemble.part import Part
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
 from stiction.ensemble.store import LOCK, Store, is_active
@@ -155,6 +157,14 @@ class StoredRun:
             is_active(store.path),
         )
 
+    def missing(self, part: Part | None = None) -> int:
+        """How many samples are neither stored nor have failed, of a part or of all."""
+        if self._store is None:
+            return 0
+        ensemble, points = self.study.ensemble, len(self.study.plans)
+        spans = self._store.missing(points, ensemble.samples, ensemble.first, part=part)
+        return sum(span.samples for span in spans)
+
     @property
     def versions(self) -> list[str]:
         """Versions of the package that computed it."""
@@ -188,11 +198,9 @@ class StoredRun:
         attributes = study.attributes
         if self.failures:
             attributes[FAILED] = [list(failure) for failure in self.failures]
-        ensemble = study.ensemble
-        spans = self._store.missing(len(study.plans), ensemble.samples, ensemble.first)
-        missing = sum(span.samples for span in spans)
+        missing = self.missing()
         if missing:
-            total = len(study.plans) * ensemble.samples
+            total = len(study.plans) * study.ensemble.samples
             attributes["cut_short"] = f"{total - missing} of {total} samples are done"
         return gathered.dataset(attributes, study.axes)
 
@@ -214,6 +222,27 @@ class StoredRun:
 def folder_beside(file: Path) -> Path:
     """Where the chunks of ``result.nc`` are until it is complete."""
     return file.parent / f"{file.name}.run"
+
+
+def parts_folder(path: Path) -> Path:
+    """Where the parts of a run are until they are merged."""
+    return path.parent / f"{path.name}.parts"
+
+
+def make_part_folder(path: Path, part: Part) -> Path:
+    """The folder of a part, made if need be.
+
+    Raises
+    ------
+    StoreError
+        If the place cannot take it.
+    """
+    folder = parts_folder(path)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    return folder / part.name
 
 
 def _read_result(path: Path) -> xr.Dataset:
@@ -276,6 +305,7 @@ def run_into(
     retry: bool = False,
     time_limit: float | None = None,
     lock: bool = True,
+    part: Part | None = None,
 ) -> StoredRun:
     """Run a study, or what is missing of it, into a folder or a file; see `Study.run`.
 
@@ -287,6 +317,8 @@ def run_into(
         If samples are missing in the end that have not failed.
     """
     path = as_path("out", out)
+    if part is not None:
+        path = make_part_folder(path, part)
     ensemble, plans = study.ensemble, study.plans
     check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
@@ -314,34 +346,31 @@ def run_into(
             progress=progress,
             retry=retry,
             time_limit=time_limit,
+            part=part,
         )
         stored = StoredRun(folder)
-        state = stored.status()
-        if time_limit is not None and _missing(state) and not state.damaged:
+        state, missing = stored.status(), stored.missing(part)
+        if time_limit is not None and missing and not state.damaged:
             return StoredRun(path)
-        _refuse_incomplete(folder, state)
+        if state.damaged or missing:
+            raise StoreError(
+                f"{folder}: {state.done} of {state.samples} samples are stored: others were damaged"
+                f" or removed while the run went on ({'; '.join(state.damaged[:3]) or 'gone'}); the"
+                " same command computes them again"
+            )
         if to_file:
-            stored.export(path)
-            if not store.failures:
-                empty(folder)
-    if to_file and not (folder / MANIFEST).exists():
-        with suppress(OSError):  # somebody else's files are in it
-            (folder / LOCK).unlink(missing_ok=True)
-            folder.rmdir()
+            write_result(stored, store, path)
     return StoredRun(path)
 
 
-def _missing(state: Status) -> int:
-    return state.samples - state.done - len(state.failures)
-
-
-def _refuse_incomplete(folder: Path, state: Status) -> None:
-    if state.damaged or _missing(state):
-        raise StoreError(
-            f"{folder}: {state.done} of {state.samples} samples are stored: others were damaged or"
-            f" removed while the run went on ({'; '.join(state.damaged[:3]) or 'gone'}); the same"
-            " command computes them again"
-        )
+def write_result(stored: StoredRun, store: Store, path: Path) -> None:
+    """Make the file of a complete run, and take away its folder unless samples have failed."""
+    stored.export(path)
+    if not store.failures:
+        empty(store.path)
+        with suppress(OSError):  # somebody else's files are in it
+            (store.path / LOCK).unlink(missing_ok=True)
+            store.path.rmdir()
 
 
 INNER = ("sample", "kept_sample", "x", "y", DIRECTION)

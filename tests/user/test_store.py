@@ -14,6 +14,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
+from small_study import lengths, small_study
 
 import stiction as st
 from stiction import stored_run
@@ -22,25 +23,10 @@ from stiction.ensemble.files import Lock
 from stiction.errors import StoreError, WorkerError
 from stiction.stored_run import StoredRun, folder_beside, run_into
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 128},
-        "friction": {"weakening_rate": 0.25e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
-    "sweep": [
-        {"random.strength.spectrum.correlation_length": [4e-3, 6e-3]},
-        {"problem.solid.poisson_ratio": [0.25, 0.33]},
-    ],
-}
+STUDY = small_study(
+    ensemble={"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
+    sweep=[*lengths(4e-3, 6e-3), {"problem.solid.poisson_ratio": [0.25, 0.33]}],
+)
 
 
 def make_study(samples=900, **changes):

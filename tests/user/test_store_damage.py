@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_study import lengths, small_study
 
 from stiction.ensemble import files, resume, scheduler, store_writer, work
 from stiction.ensemble.files import Lock
@@ -23,22 +24,10 @@ from stiction.errors import StoreError
 from stiction.stored_run import StoredRun, folder_beside, run_into
 from stiction.study.study import Study
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 128},
-        "friction": {"weakening_rate": 0.25e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
-    "sweep": [{"random.strength.spectrum.correlation_length": [4e-3, 6e-3]}],
-}
+STUDY = small_study(
+    ensemble={"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
+    sweep=lengths(4e-3, 6e-3),
+)
 
 
 def make_study(**changes):

@@ -19,7 +19,7 @@ from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
 from stiction.cli.runs import export, plot, report, status
 from stiction.cli.rupture import rupture
-from stiction.cli.studies import check, run, schema
+from stiction.cli.studies import check, merge, run, schema
 from stiction.errors import InputError, RunError
 
 app = typer.Typer(
@@ -64,6 +64,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
 for command in (
     paper,
     run,
+    merge,
     onset,
     rupture,
     reliability,

@@ -29,6 +29,7 @@ from stiction.ensemble.chunk import (
 )
 from stiction.ensemble.files import HeldError, Lock, digest, read_whole
 from stiction.ensemble.manifest import read_manifest
+from stiction.ensemble.part import Part
 from stiction.ensemble.scheduler import Span
 from stiction.ensemble.work import Failure
 from stiction.errors import StoreError
@@ -111,10 +112,18 @@ class Store:
         return stored_samples(self.chunks, points, samples, first)
 
     def missing(
-        self, points: int, samples: int, first: int = 0, *, retry: bool = False
+        self,
+        points: int,
+        samples: int,
+        first: int = 0,
+        *,
+        retry: bool = False,
+        part: Part | None = None,
     ) -> list[Span]:
-        """What is to be computed; failed samples only if they are to be retried."""
+        """What is to be computed, of a part or of all; failed samples only to be retried."""
         found = self.done(points, samples, first)
+        if part is not None:
+            found |= ~part.mask(points, samples)
         if not retry:
             for point, sample in self.failures:
                 if 0 <= sample - first < samples:

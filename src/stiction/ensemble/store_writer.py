@@ -10,6 +10,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stiction._files import PART
 from stiction.ensemble.chunk import Chunk, DamagedChunk, Table, joined, mark_of, tables_of
 from stiction.ensemble.files import Lock, NoLock, cannot_write, printable, read_whole, write_whole
@@ -125,6 +128,52 @@ class StoreWriter(Store):
         if entries:
             self._append(entries)
             self._join_small()
+
+    def take_over(self, other: Store, points: int, samples: int, first: int) -> None:
+        """Store what another store of the same study holds and this one does not.
+
+        Raises
+        ------
+        StoreError
+            If a sample is in both and not the same.
+        """
+        here = self.done(points, samples, first)
+
+        def known(point: NDArray[Any], sample: NDArray[Any]) -> NDArray[Any]:
+            found: NDArray[Any] = here[point, sample - first]
+            return found
+
+        entries: list[dict[str, Any]] = []
+        for table in other.tables():
+            repeated = table.at(known)
+            if repeated.values["point"].size:
+                self._compare(repeated, other.path)
+                table = table.at(lambda point, sample: ~known(point, sample))
+            if table.values["point"].size:
+                entries.append(self._write(table, 0).entry())
+        here = here | other.done(points, samples, first)
+        failed = [list(f) for f in other.failures.values() if not here[f.point, f.sample - first]]
+        entries += [{"failed": failed}] if failed else []
+        if entries:
+            self._append(entries)
+            self._join_small()
+
+    def _compare(self, table: Table, path: Path) -> None:
+        """Refuse samples that are stored already and were another result."""
+        wanted = {key: row for row, key in enumerate(table.keys)}
+        for stored in self.tables():
+            rows = [(row, wanted[key]) for row, key in enumerate(stored.keys) if key in wanted]
+            if not rows:
+                continue
+            there, here = np.array(rows).T
+            for name, value in table.narrow.items():
+                if not np.array_equal(stored.values[name][there], value[here], equal_nan=True):
+                    points = ", ".join(str(key) for key in table.keys[:3])
+                    raise StoreError(
+                        f"{path}: holds samples that are stored already with another {name}"
+                        f" (point and sample: {points}...); one of both was computed by another"
+                        " version or was changed"
+                    )
 
     def _write(self, table: Table, level: int) -> Chunk:
         data = table.encode(FORMAT, self._mark, level)

@@ -39,6 +39,7 @@ from stiction._progress import Meter, Show
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
+from stiction.ensemble.part import as_part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.errors import InputError, unknown_name
@@ -259,6 +260,7 @@ class Study:
         retry: bool = False,
         time_limit: float | None = None,
         lock: bool = True,
+        part: tuple[int, int] | str | None = None,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -276,6 +278,10 @@ class Study:
         lock : bool
             Keep other runs out of the folder while this one writes; False for file systems that
             have no locks.
+        part : (int, int) or str, optional
+            Compute one part of so many only, such as (3, 100) or "3/100", into a folder of its own
+            beside `out`, for jobs that know nothing of each other; `stiction.merge_parts` joins
+            them to the same numbers as one run.
 
         Returns
         -------
@@ -292,6 +298,8 @@ class Study:
         """
         check_flag("retry", retry)
         check_progress(progress)
+        if part is not None and out is None:
+            raise InputError("part: a part is stored; say where with out=")
         if out is not None:
             from stiction.stored_run import run_into
 
@@ -304,6 +312,7 @@ class Study:
                 retry=retry,
                 time_limit=time_limit,
                 lock=lock,
+                part=None if part is None else as_part(part),
             )
             return stored.dataset()
         return run_plans(
