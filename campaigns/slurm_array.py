@@ -1,9 +1,9 @@
 """Job arrays end to end on a real SLURM: parts, one lost, merged, and the same bits as one run.
 
-    python campaigns/slurm_array.py                # on a cluster; the folder must be seen by its nodes
-    python campaigns/slurm_array.py --start        # starts a private SLURM of one node first
+    python campaigns/slurm_array.py            # on a cluster; the folder must be seen by its nodes
+    python campaigns/slurm_array.py --start    # starts a private SLURM of one node first
 
-Nothing is installed. `--start` needs munged, slurmctld and slurmd on the PATH and the rights of root;
+Nothing is installed. `--start` needs munged, slurmctld and slurmd on the PATH and root;
 all that it makes lies in a temporary folder, and its daemons end with this script.
 """
 
