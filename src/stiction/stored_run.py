@@ -323,7 +323,6 @@ def run_into(
     check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
     check_target(path)
-    warn_of_fields(plans)
     to_file = path.suffix == ".nc"
     folder = folder_beside(path) if to_file else path
     before = None
@@ -336,6 +335,8 @@ def run_into(
     with writing(folder, plain, versions(), lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
             store.add(_outcomes_of(before, len(plans)), variables_in(plans))
+        if store.missing(len(plans), ensemble.samples, ensemble.first, retry=retry, part=part):
+            warn_of_fields(plans)
         run_stored(
             store,
             plans,
