@@ -17,6 +17,7 @@ from stiction.errors import InputError
 from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood
 from stiction.inference.peaks import Peaks
+from stiction.inference.posterior_figure import posterior_figure
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
@@ -198,8 +199,6 @@ class Posterior:
         -------
         matplotlib.figure.Figure
         """
-        from stiction.inference.posterior_figure import posterior_figure
-
         figure = posterior_figure(self)
         if path is not None:
             figure.savefig(path, dpi=200)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from stiction._typing import Array
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from stiction.inference.posterior import Posterior
 
 INK, QUIET, PALE, ACCENT = "#14213d", "#7a7a7a", "#d9d9d9", "#b5322a"
@@ -29,6 +30,8 @@ def shown(name: str, values: Array) -> tuple[float, str]:
 
 def posterior_figure(posterior: Posterior) -> Figure:
     """Marginals on the diagonal, pairs below, peaks in the upper corner."""
+    from matplotlib.figure import Figure
+
     names = posterior.names
     count = len(names)
     size = max(2.0 * count, 4.0)
