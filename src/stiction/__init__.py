@@ -49,6 +49,7 @@ _HOMES = {
     "read_peaks": "inference.peaks",
     "infer": "inference.infer",
     "Posterior": "inference.posterior",
+    "design_of_tests": "inference.design",
     "Ensemble": "study.study",
     "Study": "study.study",
     "Cluster": "ensemble.distributed",

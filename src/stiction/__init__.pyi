@@ -30,6 +30,7 @@ from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
+from stiction.inference.design import design_of_tests as design_of_tests
 from stiction.inference.infer import infer as infer
 from stiction.inference.peaks import read_peaks as read_peaks
 from stiction.inference.posterior import Posterior as Posterior

@@ -262,7 +262,11 @@ def varies(problem: Problem) -> bool:
 
 
 def make_likelihood(
-    model: Model, peaks: Sequence[Array], positions: Sequence[Array | None]
+    model: Model,
+    peaks: Sequence[Array],
+    positions: Sequence[Array | None],
+    *,
+    quiet: bool = False,
 ) -> Likelihood:
     """Join data to a model; positions that say nothing are left out, with a warning.
 
@@ -282,7 +286,7 @@ def make_likelihood(
             raise InputError("positions: can be used on a line only; leave them out on a plane")
         length = specimen.length or prior.problem.interface.extent
         tables.append(position_table(specimen.table, length, own, seen, model.error))
-    if alike and any(seen is not None for seen in positions):
+    if alike and not quiet and any(seen is not None for seen in positions):
         warn_accuracy(
             "positions: say nothing here, and are not used: load and friction are the same"
             " everywhere, so slip begins anywhere with the same probability whatever the parameters"

@@ -15,7 +15,7 @@ from stiction._model import describe
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.inference.density import to_v
-from stiction.inference.likelihood import BATCHES, Likelihood
+from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.peaks import Peaks
 from stiction.inference.posterior_figure import posterior_figure
 from stiction.problem import Problem
@@ -146,7 +146,8 @@ class Posterior:
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
         """Peaks that more tests would show, a draw each, for every kind of specimen."""
-        return predicted(self.likelihood, self.u.reshape(-1, self.u.shape[-1]), self.seed)
+        model, u = self.likelihood.model, self.u.reshape(-1, self.u.shape[-1])
+        return tuple(predicted(model, i, u, self.seed)[0] for i in range(len(model.specimens)))
 
     def to_arviz(self) -> Any:
         """An `arviz.InferenceData` with posterior, prior, log-likelihood, prediction and data.
@@ -218,32 +219,29 @@ class Posterior:
         return "\n".join(lines)
 
 
-def predicted(likelihood: Likelihood, u: Array, seed: int) -> tuple[Array, ...]:
-    """One peak of each specimen at each of some points u (points, parameters)."""
-    model = likelihood.model
+def predicted(model: Model, number: int, u: Array, seed: int) -> tuple[Array, Array]:
+    """A peak and a position of specimen `number` at each of some points u (points, parameters)."""
     rng = np.random.default_rng([seed, 1])
     theta = model.prior.theta(u)
     shift, stretch = model.affine.of(theta)
     rows = np.arange(u.shape[0])
-    found = []
-    for specimen in model.specimens:
-        table, known = specimen.table, specimen.densities
-        index, weight = table.corners(theta)
-        cell = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
-        node = index[rows, np.minimum(cell, index.shape[1] - 1)]
-        sample = rng.integers(table.peaks.shape[1], size=u.shape[0])
-        v = to_v(table.peaks, known.bound)[node, sample]
-        z = (v - known.mean[node]) / known.spread[node]
+    table, known = model.specimens[number].table, model.specimens[number].densities
+    index, weight = table.corners(theta)
+    cell = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
+    node = index[rows, np.minimum(cell, index.shape[1] - 1)]
+    sample = rng.integers(table.peaks.shape[1], size=u.shape[0])
+    v = to_v(table.peaks, known.bound)[node, sample]
+    z = (v - known.mean[node]) / known.spread[node]
 
-        def at(values: Array, index: Any = index, weight: Array = weight) -> Array:
-            between: Array = np.einsum("pc,pc->p", weight, values[index])
-            return between
+    def between(values: Array) -> Array:
+        found: Array = np.einsum("pc,pc->p", weight, values[index])
+        return found
 
-        onset = at(known.mean) + at(known.spread) * z
-        if np.isfinite(known.bound).all():
-            onset = at(known.bound) + np.exp(onset)
-        found.append(shift + stretch * onset + model.error * rng.standard_normal(u.shape[0]))
-    return tuple(found)
+    onset = between(known.mean) + between(known.spread) * z
+    if np.isfinite(known.bound).all():
+        onset = between(known.bound) + np.exp(onset)
+    peaks = shift + stretch * onset + model.error * rng.standard_normal(u.shape[0])
+    return peaks, table.places[node, sample]
 
 
 def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
