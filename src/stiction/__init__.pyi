@@ -30,6 +30,11 @@ from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
+from stiction.inference.design import design_of_tests as design_of_tests
+from stiction.inference.infer import infer as infer
+from stiction.inference.peaks import read_peaks as read_peaks
+from stiction.inference.posterior import Posterior as Posterior
+from stiction.inference.simulator import simulator as simulator
 from stiction.interface import Interface as Interface
 from stiction.load import Load as Load
 from stiction.merge import (
@@ -61,6 +66,7 @@ from stiction.reliability.design import (
     design_stress as design_stress,
 )
 from stiction.reliability.estimate import failure_probability as failure_probability
+from stiction.reliability.limit_state import limit_state as limit_state
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
 from stiction.statistics.densities import density as density

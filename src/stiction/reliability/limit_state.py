@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._checks import is_whole
+from stiction._checks import is_whole, numbers
 from stiction._model import describe
 from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
@@ -35,7 +35,7 @@ PIECE = 16
 
 @dataclass(frozen=True)
 class LimitState:
-    """Stress at onset as a function of standard normal draws.
+    """Stress at onset as a function of standard normal draws; see `stiction.limit_state`.
 
     Attributes
     ----------
@@ -97,13 +97,26 @@ class LimitState:
         return result
 
     def __call__(self, draws: Array) -> Array:
-        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,).
+        """Stress at onset, Pa.
+
+        Parameters
+        ----------
+        draws : (samples, dimension) or (dimension,) array
+
+        Returns
+        -------
+        (samples,) array, or a number
 
         Raises
         ------
+        InputError
+            If the draws are not finite numbers of this shape.
         TimeUp
             With the stresses of the first draws, if the time allowed is over before the last.
         """
+        draws = self._checked(draws)
+        if draws.ndim == 1:
+            return self(draws[None, :])[0]
         found = np.empty(draws.shape[0])
         for rows in self._portions(draws.shape[0]):
             if self.meter.over:
@@ -111,6 +124,16 @@ class LimitState:
             found[rows] = self._shared_out(draws[rows])
             self.meter.advance(rows.stop - rows.start)
         return found
+
+    def _checked(self, draws: Any) -> Array:
+        given = numbers("draws", draws)
+        if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
+            raise InputError(
+                f"draws: must have shape (samples, {self.dimension}), got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            raise InputError("draws: must be finite")
+        return given
 
     def _shared_out(self, draws: Array) -> Array:
         fewest = 1 if self._portions.slow else PIECE
@@ -181,6 +204,59 @@ class LimitState:
             if value is not None and np.ptp(value) > 0.0:
                 return f"{name} varies along the interface"
         return self.no_single_length()
+
+
+def limit_state(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    method: Any,
+    *,
+    event: Event = "critical_stress",
+    workers: int | None = None,
+) -> LimitState:
+    """Stress at onset as a function of standard normal draws, for other reliability codes.
+
+    Failure below a stress s is ``limit_state(draws) < s``.
+
+    Parameters
+    ----------
+    problem : Problem
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
+    method : LocalCriterion, Equilibrium or Rupture
+    event : {"critical_stress", "first_instability"}
+        Which stress.
+    workers : int, optional
+        Threads; all cores by default.
+
+    Returns
+    -------
+    LimitState
+        Call it with independent standard normal draws of shape (samples, `dimension`) for the
+        stresses, Pa, of shape (samples,). Its `draws(seed, first, samples)` are those of the
+        samples of `monte_carlo`, and `profiles(draws)` the profiles.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> stress = st.limit_state(problem, strength, st.LocalCriterion())
+    >>> draws = stress.draws(seed=0, first=0, samples=3)
+    >>> draws.shape == (3, stress.dimension)
+    True
+    >>> ensemble = st.monte_carlo(
+    ...     problem, strength, method=st.LocalCriterion(), samples=3, seed=0
+    ... )
+    >>> bool((stress(draws) == ensemble.critical_stress.values).all())
+    True
+    """
+    return make_limit_state(problem, random, method, 0, event, workers)
 
 
 def make_limit_state(

@@ -36,6 +36,7 @@ from stiction._model import (
     whole,
 )
 from stiction._progress import Meter, Show
+from stiction.dotted_keys import part_with_values
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
@@ -52,7 +53,6 @@ from stiction.study.sweep import (
     Sweep,
     grid_axes,
     name_point,
-    part_with_values,
     points_of,
     unknown_keys,
 )
