@@ -1,0 +1,1 @@
+"""From measurements to parameters, and to how far they may be trusted."""
