@@ -14,7 +14,7 @@ from stiction.inference.marginal_fit import Family, distance
 from stiction.inference.records import Record
 from stiction.inference.spectral_model import Grid
 from stiction.inference.spectrum_fit import SpectrumFamily, coarse, fit_spectrum
-from stiction.inference.whittle import Model, Observed, floor_of, hermite_shares, weights_of
+from stiction.inference.whittle import Model, Observed, hermite_shares, make_observed
 from stiction.inference.window import Window, make_window, without_trend
 from stiction.random.quantile_table import from_normal
 from stiction.random.random_field import RandomField
@@ -94,12 +94,10 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
     """Periodograms of measured values, by geometry."""
     found: list[Observed] = []
     for window in dict.fromkeys(windows):
-        grid = Grid(window.shape, window.spacings)
         powers = [
             window.periodogram(row) for row, w in zip(rows, windows, strict=True) if w is window
         ]
-        stack = np.stack(powers)
-        found.append(Observed(window, grid, stack, weights_of(window), floor_of(stack)))
+        found.append(make_observed(window, np.stack(powers)))
     return found
 
 

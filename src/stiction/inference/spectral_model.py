@@ -11,6 +11,9 @@ from scipy import fft
 
 from stiction._typing import Array
 
+EDGE = 0.2
+"""Share of the truncation over which a spectrum is faded out: a sharper end would be taken for a
+precise measure of the correlation length, which it is in simulations only."""
 FOLDS = 6
 """Multiples of the sampling wavenumber that are folded back one by one."""
 ROOM = {1: 4, 2: 2}
@@ -41,7 +44,7 @@ class Grid:
     def power(self, spectrum: Any, anisotropy: float = 1.0) -> Array:
         """Variance of z in each mode of a real transform of the grid; it sums to 1 over all.
 
-        The spectrum is cut at its truncation, smoothly within a mode; what lies above the sampling
+        The spectrum fades out at its truncation; what lies above the sampling
         wavenumber is folded back, and what lies above `FOLDS` times that, which is flat by then,
         evenly.
         """
@@ -61,9 +64,7 @@ class Grid:
             last = axis == len(self.shape) - 1
             number = np.arange(n // 2 + 1) if last else fft.fftfreq(n, 1.0 / n)
             axes.append(stretch[axis] * step * number)
-        total = self._folded(spectrum, axes, ranges, sampling, stretch, end, max(
-            a * s for a, s in zip(stretch, steps, strict=True)
-        ))  # fmt: skip
+        total = self._folded(spectrum, axes, ranges, sampling, stretch, end)
         within = spectrum.plane_power_within if plane else spectrum.power_within
         missed = 1.0 - within(end) / within(cutoff) if end < cutoff else 0.0
         weight = self._doubled(total.shape)
@@ -73,12 +74,12 @@ class Grid:
 
     def _folded(
         self, spectrum: Any, axes: list[Array], ranges: list[int],
-        sampling: list[float], stretch: tuple[float, ...], end: float, width: float,
+        sampling: list[float], stretch: tuple[float, ...], end: float,
     ) -> Array:  # fmt: skip
         """The density at all wavenumbers that look alike on the grid, added up."""
 
         def kept(k: Array) -> Array:
-            return np.clip((end - k) / width + 0.5, 0.0, 1.0)
+            return np.clip((end - k) / (EDGE * end) + 0.5, 0.0, 1.0)
 
         if len(axes) == 1:
             folds = np.arange(-ranges[0], ranges[0] + 1)[:, None] * sampling[0]
@@ -90,7 +91,7 @@ class Grid:
             for q in range(-ranges[1], ranges[1] + 1):
                 kx = axes[0] + p * stretch[0] * sampling[0]
                 ky = axes[1] + q * stretch[1] * sampling[1]
-                if np.abs(kx).min() > end + width or np.abs(ky).min() > end + width:
+                if min(np.abs(kx).min(), np.abs(ky).min()) > (1.0 + EDGE) * end:
                     continue
                 k = np.hypot(kx[:, None], ky[None, :])
                 found += spectrum.plane_density(k) * kept(k)

@@ -35,9 +35,10 @@ VARIANCES = (1e-200, 1e200)
 ANISOTROPIES = (0.05, 20.0)
 STEPS = 40
 DIFFERENCE = 1e-4
-SETTLED = 1e-5
-"""Gain of log likelihood below which scoring ends."""
-SMALLEST = 1e-5
+SETTLED = 1e-3
+"""Gain of log likelihood below which scoring ends; a standard error is worth a half."""
+LONGEST = 1.5
+"""Step, on the scale on which parameters are searched for."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ def coarse(family: SpectrumFamily, shares: Array, observed: Sequence[Observed]) 
     best, least = np.zeros(0), math.inf
     for entry in itertools.product(*[axes[name] for name in family.free]):
         at = np.array([_forth(n, v) for n, v in zip(family.free, entry, strict=True)])
-        expected = _expected(family, at, shares, observed)
+        expected = _expected(family.model(at, shares), observed)
         scale = power / sum(
             float(np.sum(one.weights * e)) for one, e in zip(observed, expected, strict=True)
         )
@@ -194,10 +195,7 @@ def coarse(family: SpectrumFamily, shares: Array, observed: Sequence[Observed]) 
     return best
 
 
-def _expected(
-    family: SpectrumFamily, at: Array, shares: Array, observed: Sequence[Observed]
-) -> list[Array]:
-    model = family.model(at, shares)
+def _expected(model: Model, observed: Sequence[Observed]) -> list[Array]:
     return [model.expectation(one) for one in observed]
 
 
@@ -209,53 +207,81 @@ def fit_spectrum(
     Fisher scoring with the damping of Levenberg and Marquardt: with d = d log E/d theta the score
     is sum w d (I/E - 1) and the information sum w d d^T.
     """
+
+    def signals(at: Array) -> list[Array]:
+        model = family.model(at, shares)
+        return [model.signal(one) for one in observed]
+
+    def loss_of(at: Array, signal: Sequence[Array]) -> float:
+        model = family.model(at, shares)
+        mixed = [model.with_noise(s, one) for s, one in zip(signal, observed, strict=True)]
+        return loss(mixed, observed)
+
     limits = family.limits
     at = np.clip(start, limits[:, 0], limits[:, 1])
-    expected = _expected(family, at, shares, observed)
-    value = loss(expected, observed)
+    signal = signals(at)
+    value = loss_of(at, signal)
     damping = 1e-3
     for _ in range(STEPS):
-        score, information = _score(family, at, shares, observed, expected)
-        diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information))
+        score, information = np.zeros(at.size), np.zeros((at.size, at.size))
+        slopes = _slopes(family, at, shares, observed, signal)
+        for one, (expected, slope) in zip(observed, slopes, strict=True):
+            weight = len(one.periodograms) * one.weights.ravel()
+            d = slope / (expected + one.floor).ravel()
+            score += d @ (weight * ((one.average - expected) / (expected + one.floor)).ravel())
+            information += (d * weight) @ d.T
+        # What pushes against its limit is held there, or the others could not move.
+        held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
+        free = np.flatnonzero(~held)
+        information, score = information[np.ix_(free, free)], score[free]
+        diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information) + 1e-300)
         while damping < 1e6:
-            step = np.linalg.solve(information + damping * diagonal, score)
-            step *= min(1.0, 1.5 / max(np.abs(step).max(), 1e-300))
+            step = np.zeros(at.size)
+            step[free] = np.linalg.solve(information + damping * diagonal, score)
+            step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
             new = np.clip(at + step, limits[:, 0], limits[:, 1])
-            expected_new = _expected(family, new, shares, observed)
-            value_new = loss(expected_new, observed)
-            if value_new <= value:
+            new_signal = signals(new)
+            new_value = loss_of(new, new_signal)
+            if new_value <= value:
                 break
             damping *= 10.0
         else:
             break
-        gain, size = value - value_new, float(np.abs(new - at).max())
-        at, expected, value = new, expected_new, value_new
+        gain = value - new_value
+        at, signal, value = new, new_signal, new_value
         damping = max(0.1 * damping, 1e-9)
-        if gain < SETTLED or size < SMALLEST:
+        if gain < SETTLED:
             break
     return at
 
 
-def _score(
+def _slopes(
     family: SpectrumFamily,
     at: Array,
     shares: Array,
     observed: Sequence[Observed],
-    expected: Sequence[Array],
-) -> tuple[Array, Array]:
-    limits = family.limits
-    slopes: list[list[Array]] = [[] for _ in observed]
-    for i in range(at.size):
+    signal: Sequence[Array],
+) -> list[tuple[Array, Array]]:
+    """Expectations, and their derivatives by the parameters, (parameters, ordinates)."""
+    model, limits = family.model(at, shares), family.limits
+    variance, share = model.variance, model.noise_share
+    columns: list[list[Array]] = [[] for _ in observed]
+    for i, name in enumerate(family.free):
         aside = at.copy()
         aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
-        moved = _expected(family, aside, shares, observed)
-        for number, one in enumerate(observed):
-            change = (moved[number] - expected[number]) / (expected[number] + one.floor)
-            slopes[number].append(change.ravel() / (aside[i] - at[i]))
-    score, information = np.zeros(at.size), np.zeros((at.size, at.size))
-    for slope, one, e in zip(slopes, observed, expected, strict=True):
-        weight = len(one.periodograms) * one.weights.ravel()
-        d = np.array(slope)
-        score += d @ (weight * ((one.average - e) / (e + one.floor)).ravel())
-        information += (d * weight) @ d.T
-    return score, information
+        moved = family.model(aside, shares)
+        for column, one, s in zip(columns, observed, signal, strict=True):
+            if name == "variance" and family.noise is None:
+                slope = model.with_noise(s, one)
+            elif name == "variance":  # the noise stays what it is
+                slope = variance * s
+            elif name == "noise_share":
+                slope = variance * share * (1.0 - share) * (one.white - s)
+            else:
+                change = (moved.signal(one) - s) / (aside[i] - at[i])
+                slope = variance * (1.0 - share) * change
+            column.append(slope.ravel())
+    return [
+        (model.with_noise(s, one), np.array(column))
+        for column, one, s in zip(columns, observed, signal, strict=True)
+    ]

@@ -69,6 +69,8 @@ class Observed:
         for the mean.
     floor : float
         Added to periodograms and expectations.
+    white : (*half) array
+        Expectation of a periodogram of white noise of unit variance.
     """
 
     window: Window
@@ -76,6 +78,7 @@ class Observed:
     periodograms: Array
     weights: Array
     floor: float
+    white: Array
 
     @property
     def average(self) -> Array:
@@ -84,11 +87,19 @@ class Observed:
         return mean
 
 
-def floor_of(periodograms: Array) -> float:
-    """See `Observed.floor`."""
-    average = periodograms.mean(axis=0)
-    smooth = uniform_filter(average, NEIGHBOURS, mode="nearest")
-    return FLOOR * float(smooth.max())
+def make_observed(window: Window, periodograms: Array) -> Observed:
+    """What is needed of periodograms (records, *half) in a window."""
+    smooth = uniform_filter(periodograms.mean(axis=0), NEIGHBOURS, mode="nearest")
+    unit = np.zeros(window.padded)
+    unit[(0,) * unit.ndim] = 1.0
+    return Observed(
+        window=window,
+        grid=Grid(window.shape, window.spacings),
+        periodograms=periodograms,
+        weights=weights_of(window),
+        floor=FLOOR * float(smooth.max()),
+        white=window.expectation(unit),
+    )
 
 
 def weights_of(window: Window) -> Array:
@@ -129,13 +140,21 @@ class Model:
         """Standard deviation of the measurement noise."""
         return math.sqrt(self.noise_share * self.variance)
 
-    def expectation(self, observed: Observed) -> Array:
-        """Of periodograms, (*half)."""
+    def signal(self, observed: Observed) -> Array:
+        """Expectation of periodograms of values of unit variance without noise, (*half)."""
         grid = observed.grid
         rho = grid.correlation(grid.power(self.spectrum, self.anisotropy))
-        covariance = (1.0 - self.noise_share) * np.polynomial.polynomial.polyval(rho, self.shares)
-        covariance[(0,) * covariance.ndim] += self.noise_share
-        return self.variance * observed.window.expectation(covariance)
+        return observed.window.expectation(np.polynomial.polynomial.polyval(rho, self.shares))
+
+    def expectation(self, observed: Observed) -> Array:
+        """Of periodograms, (*half)."""
+        return self.with_noise(self.signal(observed), observed)
+
+    def with_noise(self, signal: Array, observed: Observed) -> Array:
+        """The expectation of periodograms from that without noise."""
+        share = self.noise_share
+        result: Array = self.variance * ((1.0 - share) * signal + share * observed.white)
+        return result
 
 
 def loss(expected: Sequence[Array], observed: Sequence[Observed]) -> float:
