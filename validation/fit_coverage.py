@@ -21,7 +21,7 @@ import numpy as np
 import stiction as st
 
 LENGTH = 2e-3  # m; every field's correlation length
-POINTS = 16  # in a correlation length
+POINTS = 10  # in a correlation length
 
 
 class Case(NamedTuple):

@@ -227,7 +227,7 @@ def failure_probability(
         problems.append("stress: give either stress (Pa) or friction_coefficient")
     elif stress is not None:
         problems += check_stress("stress", stress)
-    elif not (is_finite(friction_coefficient) and friction_coefficient > 0.0):
+    elif not (is_finite(friction_coefficient) and float(friction_coefficient or 0.0) > 0.0):
         given = describe(friction_coefficient)
         problems.append(f"friction_coefficient: must be a positive number, got {given}")
     meter = Meter("failure_probability", show=progress, time_limit=time_limit)
