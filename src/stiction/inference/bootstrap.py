@@ -99,13 +99,25 @@ def interval_of(
     repeated: Sequence[Mapping[str, float]],
     confidence: float,
 ) -> tuple[float, float]:
-    """The basic bootstrap interval of a parameter, on its own scale."""
+    """The basic bootstrap interval of a parameter, on its own scale.
+
+    That of a place, such as the mean, is studentised: its error is as wide as the field's standard
+    deviation and the root of its correlation length, both of which the repetition finds anew.
+    """
+    place = name in PLACES
     at = _scaled(name, np.array(estimated[name]))
     around = _scaled(name, np.array([one[name] for one in repeated]))
+    widths = np.array([_width(one) if place else 1.0 for one in repeated])
     tail = 0.5 * (1.0 - confidence)
-    low, high = np.quantile(around, [tail, 1.0 - tail])
-    ends = _unscaled(name, 2.0 * at - np.array([high, low]))
-    return float(ends[0]), float(ends[1])
+    low, high = np.quantile((around - at) / widths, [tail, 1.0 - tail])
+    ends = at - (_width(estimated) if place else 1.0) * np.array([high, low])
+    first, last = _unscaled(name, ends)
+    return float(first), float(last)
+
+
+def _width(values: Mapping[str, float]) -> float:
+    """What the error of a mean is proportional to."""
+    return values["standard_deviation"] * math.sqrt(values["efolding_length"])
 
 
 def _scaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from stiction.inference.fit import Details, FieldFit
 
-INK, DATA, MODEL, BAND, ALARM = "#1a1a1a", "#7a7a7a", "#2a6f97", "#c9dbe6", "#c8553d"
+INK, DATA, MODEL, ALARM = "#1a1a1a", "#7a7a7a", "#2a6f97", "#c8553d"
 SHOWN = 100
 """Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
 LAGS = 2.5
@@ -171,4 +171,4 @@ def _columns(one: Observed, power: Array) -> tuple[Array, Array]:
 
 def _band(axes: Any, at: Array, rows: Array) -> None:
     low, high = np.nanquantile(rows, [0.05, 0.95], axis=0)
-    axes.fill_between(at, low, high, color=BAND, linewidth=0.0)
+    axes.fill_between(at, low, high, color=MODEL, alpha=0.25, linewidth=0.0)
