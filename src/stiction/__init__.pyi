@@ -31,6 +31,12 @@ from stiction.friction.exponential import ExponentialWeakening as ExponentialWea
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.inference.design import design_of_tests as design_of_tests
+from stiction.inference.fit import (
+    FieldFit as FieldFit,
+)
+from stiction.inference.fit import (
+    fit_field as fit_field,
+)
 from stiction.inference.infer import infer as infer
 from stiction.inference.peaks import read_peaks as read_peaks
 from stiction.inference.posterior import Posterior as Posterior
@@ -43,6 +49,18 @@ from stiction.merge import (
 from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
+from stiction.random.families import (
+    Gamma as Gamma,
+)
+from stiction.random.families import (
+    Lognormal as Lognormal,
+)
+from stiction.random.families import (
+    TruncatedNormal as TruncatedNormal,
+)
+from stiction.random.families import (
+    Weibull as Weibull,
+)
 from stiction.random.marginals import Beta as Beta
 from stiction.random.random_field import RandomField as RandomField
 from stiction.random.random_interface import RandomInterface as RandomInterface

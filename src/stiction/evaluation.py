@@ -17,7 +17,7 @@ from stiction._checks import check_instance, refusals
 from stiction._model import describe, to_plain
 from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
-from stiction.gaps import gather, with_gaps
+from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profile_nodes import Gaps, check_gaps
@@ -200,9 +200,9 @@ def onset(
         see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
-    gaps : {"refuse", "fill"}
-        Whether missing values (NaN) are an error or are filled with straight lines between their
-        ends.
+    gaps : {"refuse", "fill", "skip"}
+        Whether missing values (NaN) are an error, are filled with straight lines between their
+        ends, or make that the samples that have any are left out; the others keep their numbers.
     progress : bool or callable
         True shows how far it is, on standard error, once it takes more than two seconds; a
         callable gets (done, total).
@@ -245,8 +245,13 @@ def onset(
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
+    numbers = None
+    if gaps == "skip" and measured is not None:
+        profiles, numbers = without_gaps(profiles, measured)
+        measured = None
     sample = problem.sample(profiles, accept=accepted(method))
     warn_of_units(problem, sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
-    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    numbers = np.arange(sample.samples) if numbers is None else numbers
+    result = label(problem, method, values, numbers, attributes)
     return result if measured is None else with_gaps(problem, result, measured)

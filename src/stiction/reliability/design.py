@@ -35,11 +35,13 @@ from stiction.reliability.estimate import (
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state
 from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
-from stiction.reliability.result import above_bound, say
+from stiction.reliability.result import above_bound, as_coefficient, say
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
 
+TYPICAL = 200
+"""Plain samples whose median is the typical stress: to 2 % where it scatters by 20 %."""
 PILOT = 500
 """Plain samples by which 'auto' judges the first stage."""
 DEEPER = 0.3
@@ -72,6 +74,10 @@ class DesignStress:
         Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the result is not to be trusted; empty if it is.
+    typical_stress : float
+        Median stress at onset of 200 plain samples, Pa: what every second joint holds.
+    normal_pressure : float
+        Mean over the interface, Pa; NaN if the problem has none.
     """
 
     stress: float
@@ -87,6 +93,18 @@ class DesignStress:
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
+    typical_stress: float = math.nan
+    normal_pressure: float = math.nan
+
+    @property
+    def safety_factor(self) -> float:
+        """`typical_stress` over `stress`: by how much a joint that holds on average is reduced."""
+        return self.typical_stress / self.stress
+
+    @property
+    def friction_coefficient(self) -> float:
+        """`stress` over the mean normal pressure; NaN without one."""
+        return self.stress / self.normal_pressure
 
     @property
     def stress_above_bound(self) -> float:
@@ -97,8 +115,9 @@ class DesignStress:
         low, high = self.interval
         return (
             f"{self.stress / 1e6:.7g} MPa ({100 * self.confidence:g} %: {low / 1e6:.7g} to"
-            f" {high / 1e6:.7g}){above_bound(self.stress, self.lower_bound)}, at"
-            f" P = {self.probability:g}; {self.algorithm}, {self.evaluations} evaluations"
+            f" {high / 1e6:.7g}){as_coefficient(self.friction_coefficient)}"
+            f"{above_bound(self.stress, self.lower_bound)}, at P = {self.probability:g};"
+            f" {self.algorithm}, {self.evaluations} evaluations"
             f"{', cut short' if self.cut_short else ''}"
         )
 
@@ -355,7 +374,12 @@ def design_stress(
     )
     with meter:
         meter.expect(request.budget, at_most=True)
-        return _sampled(request, algorithm, confidence)
+        found = _sampled(request, algorithm, confidence)
+        try:
+            typical = float(np.median(state(state.draws(int(seed), 0, TYPICAL))))
+        except TimeUp:
+            typical = math.nan
+    return replace(found, typical_stress=typical, normal_pressure=state.pressure)
 
 
 def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignStress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -131,9 +132,10 @@ def _chosen(request: Request, draws: Array, values: Array) -> tuple[str, str]:
 def failure_probability(
     problem: Problem,
     random: RandomInterface | RandomField,
-    stress: float,
+    stress: float | None = None,
     *,
     method: Method,
+    friction_coefficient: float | None = None,
     algorithm: Algorithm = "auto",
     target_cov: float = 0.1,
     seed: int = 0,
@@ -151,10 +153,13 @@ def failure_probability(
     problem : Problem
     random : RandomInterface or RandomField
         What is random; a field alone is the peak strength, Pa.
-    stress : float
+    stress : float, optional
         Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
         How the onset is found. `Rupture` goes with plain Monte Carlo only.
+    friction_coefficient : float, optional
+        Instead of `stress`: mean shear stress over mean normal pressure that it must hold. Where
+        the pressure is random, each sample's own pressure counts.
     algorithm : {"auto", "plain", "subset", "importance", "two_level"}
         Plain Monte Carlo; subset simulation; importance sampling around the most likely weak spot
         at a random place (where the interface is alike everywhere); subset simulation by the local
@@ -205,7 +210,14 @@ def failure_probability(
     2 + 1/target_cov^2 failures, which leaves its estimate unbiased (Haldane, 1945).
     """
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_stress("stress", stress) + check_time_limit(time_limit)
+    problems += check_time_limit(time_limit)
+    if (stress is None) == (friction_coefficient is None):
+        problems.append("stress: give either stress (Pa) or friction_coefficient")
+    elif stress is not None:
+        problems += check_stress("stress", stress)
+    elif not (is_finite(friction_coefficient) and float(friction_coefficient or 0.0) > 0.0):
+        given = describe(friction_coefficient)
+        problems.append(f"friction_coefficient: must be a positive number, got {given}")
     meter = Meter("failure_probability", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
@@ -215,22 +227,25 @@ def failure_probability(
         event,
         workers,
         meter=meter,
+        per_pressure=friction_coefficient is not None,
         problems=problems,
         check=lambda state: check_algorithm(state, algorithm, ALGORITHMS, max_evaluations),
     )
     budget = budget_of(state, max_evaluations)
     pilot = min(PILOT, max(budget // 5, 50))
-    request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
+    limit = float(stress if stress is not None else (friction_coefficient or 0.0) * state.pressure)
+    request = Request(state, limit, float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
-    if stress <= low:
+    if limit <= low:
         text = f"no interface slides at or below {low:g} Pa, where nothing slips"
-        return _exact(request, 0.0, text)
-    if stress >= high:
+        return replace(_exact(request, 0.0, text), normal_pressure=state.pressure)
+    if limit >= high:
         text = f"no interface holds more than the greatest strength, {high:g} Pa"
-        return _exact(request, 1.0, text)
+        return replace(_exact(request, 1.0, text), normal_pressure=state.pressure)
     with meter:
         meter.expect(budget, at_most=True)
-        return _sampled(request, algorithm, too_slow(state, max_evaluations))
+        found = _sampled(request, algorithm, too_slow(state, max_evaluations))
+        return replace(found, normal_pressure=state.pressure)
 
 
 def _sampled(request: Request, algorithm: str, slow: str | None) -> FailureProbability:
