@@ -1,4 +1,4 @@
-"""What all runs of one problem share: stiffness, kernel, tables of the explicit step."""
+"""What all runs of one problem share: stiffness, memory kernel, explicit time step."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.dynamics.arrays import Grid
 from stiction.dynamics.courant_limit import courant_limit
-from stiction.dynamics.memory_layout import step_table
-from stiction.elasticity.exponential_sum import ExponentialSum
+from stiction.dynamics.memory_layout import places
+from stiction.elasticity.compiled_transform import make_transform
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.errors import InputError
 from stiction.friction.kernels import registered
+from stiction.interface import Interface
 from stiction.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -28,38 +30,28 @@ class Medium:
 
     Attributes
     ----------
-    nodes : int
-    spacing : float
-        dx, m.
-    impedance : float
-        Z = G/(2 c_s), Pa s/m.
+    interface : Interface
+    grid : Grid
+        Stiffness, impedance and memory kernel, as kernels take them.
     step : float
         Explicit time step, s.
     largest_step : float
         Limit of stability of the explicit step, s.
-    pace : (nodes//2,) array
-        k c_s, rad/s, of the modes j = 1..nodes//2.
-    stiffness : (2, nodes//2) array
-        G*|k|/2 and G|k|/2, Pa/m.
-    table, gain, fresh : arrays
-        Of the explicit step, see `layout.step_table`.
     shear_modulus, effective_modulus : float
         G and G*, Pa.
     """
 
-    nodes: int
-    spacing: float
-    impedance: float
+    interface: Interface
+    grid: Grid
     step: float
     largest_step: float
-    kernel: ExponentialSum
-    pace: Floats
-    stiffness: Floats
-    table: Floats
-    gain: Floats
-    fresh: Floats
     shear_modulus: float
     effective_modulus: float
+
+    @property
+    def impedance(self) -> float:
+        """Z = G/(2 c_s), Pa s/m."""
+        return self.grid.impedance
 
 
 def refused_laws(problem: Problem) -> list[str]:
@@ -114,24 +106,27 @@ def prepare_medium(
             f"and solid (c_s dt/dx = {limit * speed / interface.spacing:.3f}); use at most "
             f"{0.9 * limit:.6g} s"
         )
-    wavenumbers = interface.wavenumbers[1:]
-    pace = wavenumbers * speed
-    table, gain, fresh = step_table(kernel, pace, step)
-    stiffness = 0.5 * np.stack(
-        [problem.effective_modulus * wavenumbers, solid.shear_modulus * wavenumbers]
+    slot, place, copies = places((interface.wavenumbers.size,))
+    k = interface.wavenumbers
+    grid = Grid(
+        transform=make_transform(interface.shape),
+        impedance=solid.shear_modulus / (2.0 * speed),
+        cell=interface.cell,
+        stiffness=0.5 * np.stack([problem.effective_modulus * k, solid.shear_modulus * k]),
+        slot=slot,
+        place=place,
+        copies=copies,
+        pace=k[1:] * speed,
+        share=np.ones(k.size - 1),
+        poles=kernel.poles,
+        weights=kernel.weights,
+        split=kernel.poles.size,
     )
     return Medium(
-        nodes=interface.size,
-        spacing=interface.spacing,
-        impedance=solid.shear_modulus / (2.0 * speed),
+        interface=interface,
+        grid=grid,
         step=step,
         largest_step=limit,
-        kernel=kernel,
-        pace=pace,
-        stiffness=stiffness,
-        table=table,
-        gain=gain,
-        fresh=fresh,
         shear_modulus=solid.shear_modulus,
         effective_modulus=problem.effective_modulus,
     )

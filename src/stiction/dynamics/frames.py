@@ -80,14 +80,14 @@ class Frames:
 
     def add(self, state: State) -> None:
         """Keep a frame of the state as it is now."""
-        run, rows = self.run, self.run.rows
+        run, nodes = self.run, self.run.setting.nodes
         medium, watch = run.medium, state.watch
-        spacing = medium.spacing
-        dissipated = fracture_energy(run.friction, state.slip, rows)
-        fracture = float(dissipated.sum()) * spacing
+        cell = medium.interface.cell
+        dissipated = fracture_energy(run.friction, state.slip, nodes)
+        fracture = float(dissipated.sum()) * cell
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
-            strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
-        friction = fracture + float((rows[1] * state.slip).sum()) * spacing
+            strain = strain_energy(state.slip_hat, medium.grid)
+        friction = fracture + float((nodes.residual * state.slip).sum()) * cell
         work = float(watch[monitor.WORK])
         frame: dict[str, Any] = {
             "time": state.time,
@@ -95,8 +95,8 @@ class Frames:
             "mean_stress": state.mean_stress,
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
-            "weakened_fraction": float(watch[monitor.SLID]) / medium.nodes,
-            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * spacing,
+            "weakened_fraction": float(watch[monitor.SLID]) / state.slip.size,
+            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
             "work": work,
             "strain_energy": strain,
             "fracture_energy": fracture,
@@ -120,7 +120,7 @@ class Frames:
             for name in ("time", *SCALARS, *self.variables)
         }
         if not self._frames:
-            n = self.run.medium.nodes
+            n = self.run.medium.interface.size
             values |= {name: np.empty((0, n)) for name in self.variables}
         if self.keep_steps:
             record = np.concatenate([np.empty((0, monitor.COLUMNS)), *self._records])

@@ -31,12 +31,11 @@ from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
     first_slip,
-    front_speed,
     make_run,
     set_stop,
-    summary,
 )
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
+from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
 from stiction.plausible import warn_of_units
@@ -159,7 +158,7 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
         check_pace(run, time)
         warn_if_reversed_before(run, time)
         return run.start(time)
-    nodes = run.medium.nodes
+    nodes = run.medium.interface.size
     try:
         start = real_array(slip)
     except TypeError:
@@ -394,7 +393,7 @@ def _complete(
     """Add what belongs to the run as a whole."""
     speed = front_speed(problem, run, state, 0.5)
     along: dict[str, NDArray[Any]] = {
-        "peak_strength": run.rows[0],
+        "peak_strength": run.setting.nodes.strength,
         "arrival_time": state.arrival,
         "front_speed": speed,
     }
