@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,33 +57,37 @@ def radiated_energy(friction: FrictionLaw, nodes: Nodes, grid: Grid, fields: Fie
     return work - float(spent.sum()) * grid.cell - strain_energy(fields.slip_hat, grid)
 
 
-def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
+def rupture_speed(arrival: Floats, spacings: Sequence[float], windows: Sequence[float]) -> Floats:
     """Apparent speed of the rupture front at each node, m/s; nan where no front passed.
 
     Parameters
     ----------
-    arrival : (nodes,) array
-        When the front arrived (periodic in the node), s; nan where it never did.
-    spacing : float
-        dx, m.
-    window : float
-        Length over which the speed is taken, m.
+    arrival : (nodes,) or (nx, ny) array
+        When the front arrived (periodic in the nodes), s; nan where it never did.
+    spacings, windows : sequences of float
+        Along each direction: distance of nodes, and length over which the speed is taken, m.
 
     Returns
     -------
-    (nodes,) array
-        window/|difference in arrival| where arrival is strictly monotone over the window around
-        the node, so that the birth of patches and the meeting of fronts do not count as motion.
-        Patches that grow ahead of the front still raise the apparent speed.
+    array of the same shape
+        1/|gradient of arrival|, each component as a difference over its window around the node,
+        where arrival is strictly monotone over the window in some direction, so that the birth of
+        patches and the meeting of fronts do not count as motion. Patches that grow ahead of the
+        front still raise the apparent speed.
     """
-    half = max(1, round(0.5 * window / spacing))
-    n = arrival.size
-    if 2 * half >= n:
-        return np.full(n, np.nan)
-    wrapped = np.concatenate([arrival[-half:], arrival, arrival[:half]])
-    difference = np.diff(wrapped)
-    count = np.lib.stride_tricks.sliding_window_view(difference, 2 * half)
-    monotone = np.all(count > 0.0, axis=1) | np.all(count < 0.0, axis=1)
+    slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
+    for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):
+        half = max(1, round(0.5 * window / spacing))
+        n = arrival.shape[axis]
+        if 2 * half >= n:
+            return np.full(arrival.shape, np.nan)
+        along = np.moveaxis(arrival, axis, -1)
+        wrapped = np.concatenate([along[..., -half:], along, along[..., :half]], axis=-1)
+        difference = np.diff(wrapped, axis=-1)
+        steps = np.lib.stride_tricks.sliding_window_view(difference, 2 * half, axis=-1)
+        monotone = np.all(steps > 0.0, axis=-1) | np.all(steps < 0.0, axis=-1)
+        change = np.abs(wrapped[..., 2 * half :] - wrapped[..., : -2 * half])
+        slowness += np.moveaxis((change / (2 * half * spacing)) ** 2, -1, axis)
+        moves |= np.moveaxis(monotone, -1, axis)
     with np.errstate(divide="ignore", invalid="ignore"):
-        speed = 2 * half * spacing / np.abs(wrapped[2 * half :] - wrapped[: -2 * half])
-    return np.where(monotone, speed, np.nan)
+        return np.where(moves, 1.0 / np.sqrt(slowness), np.nan)

@@ -24,7 +24,7 @@ from stiction.dynamics.discretization import Medium, prepare_medium, refused_law
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import History, first_reach, turns, uniform_rate
 from stiction.dynamics.scale import stress_scale
-from stiction.dynamics.summary import SCALARS, summary
+from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.law import FrictionLaw
 from stiction.problem import SMALLEST_EIGENVALUE, Problem
@@ -141,18 +141,19 @@ class Rupture:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """About how long a sample takes on one core, s."""
-        return 0.1 * (problem.interface.size / 1024) ** 2
+        shape = problem.interface.shape
+        if len(shape) == 1:
+            return 0.1 * (shape[0] / 1024) ** 2
+        # Steps as the longer side has nodes, each as dear as the plane has nodes.
+        return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        reasons = refused_laws(problem)
-        if problem.interface.is_plane:
-            reasons.append("it does not take interfaces of two dimensions")
-        return reasons
+        return refused_laws(problem)
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        return onset_variables(problem.interface) | SCALARS
+        return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
         """Kernel and tables for a problem."""
@@ -246,10 +247,12 @@ def make_run(
     control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
-    half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
+    # Half a nucleation length: of a line, or on a plane along x times along y.
+    moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
+    half = np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli])
     weakens = finite & (critical > 0.0)
     loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
-    weakest = round(min(max(half / interface.spacing, 1.0), loads.size))
+    weakest = round(min(max(half / interface.cell, 1.0), loads.size))
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
     setting = Setting(
         law=friction.parameters,
