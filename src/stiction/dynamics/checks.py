@@ -18,7 +18,10 @@ _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the str
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the nucleation length is not resolved, with the error to expect."""
-    resolution = problem.nucleation_length_of(rows.steepest_rate) / problem.interface.spacing
+    unit = problem.nucleation_length_of(rows.steepest_rate) / problem.effective_modulus
+    moduli = (problem.effective_modulus, problem.solid.shear_modulus)  # mode II, across it III
+    spacings = problem.interface.spacings
+    resolution = min(unit * g / h for g, h in zip(moduli, spacings, strict=False))
     if resolution < 15.0:
         # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
         # at 8, 16 and 32 nodes.
@@ -41,7 +44,9 @@ def _where_steepest(rows: Sample) -> str:
 def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
     """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
     rates, interface = run.setting.nodes.weakening, problem.interface
-    longest = problem.nucleation_length_of(1.0) / (FEWEST_NODES * interface.spacing)
+    modulus = problem.solid.shear_modulus if interface.is_plane else problem.effective_modulus
+    shortest = problem.nucleation_length_of(1.0) * modulus / problem.effective_modulus
+    longest = shortest / (FEWEST_NODES * interface.spacing)
     steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
     if steep.size:
         warn_accuracy(

@@ -201,7 +201,7 @@ class Rupture:
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
         if self.stop == "onset":
-            found |= dict.fromkeys(_LATER, np.nan)
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
         return found
 
 
