@@ -132,8 +132,9 @@ class Run:
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Static stress of a slip at a load, Pa: what an interface at rest carries."""
         grid, nodes = self.medium.grid, self.setting.nodes
-        stress_hat = (-grid.stiffness[0] * slip_hat).reshape(grid.transform.half)
-        shared: Floats = self.medium.interface.inverse_transform(stress_hat).ravel()
+        interface = self.medium.interface
+        stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
+        shared: Floats = interface.inverse_transform(stress_hat).ravel()
         return shared + load * nodes.profile + nodes.initial
 
     def scale_at(self, load: float) -> float:

@@ -17,16 +17,16 @@ class Transform(NamedTuple):
 
     Attributes
     ----------
-    shape : tuple of int
-        Of a profile.
-    half : tuple of int
+    shape : (int, int)
+        Of a profile; (1, nodes) on a line, so that one compiled kernel serves both.
+    half : (int, int)
         Of its real transform.
     every, first, last : int arrays
-        All axes, all but the last, the last.
+        All axes that are transformed, all but the last of them, the last.
     """
 
-    shape: tuple[int, ...]
-    half: tuple[int, ...]
+    shape: tuple[int, int]
+    half: tuple[int, int]
     every: NDArray[np.int64]
     first: NDArray[np.int64]
     last: NDArray[np.int64]
@@ -34,8 +34,9 @@ class Transform(NamedTuple):
 
 def make_transform(shape: tuple[int, ...]) -> Transform:
     """The transform of profiles of this shape."""
-    axes = np.arange(len(shape))
-    return Transform(shape, (*shape[:-1], shape[-1] // 2 + 1), axes, axes[:-1], axes[-1:])
+    rows, columns = shape if len(shape) == 2 else (1, *shape)
+    axes = np.arange(2)[2 - len(shape) :]
+    return Transform((rows, columns), (rows, columns // 2 + 1), axes, axes[:-1], axes[-1:])
 
 
 @jit
