@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FFMpegWriter
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
-from PIL import Image
 
 from stiction.errors import InputError
 from stiction.problem import Problem
+from stiction.report.film import check_film_name, write_film
+from stiction.report.plane_rupture_figures import (
+    plane_front_figure,
+    plane_rupture_figure,
+    plane_rupture_film,
+)
 from stiction.report.style import (
     ACCENT,
     COLUMN,
@@ -109,7 +111,8 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
     -------
     matplotlib.figure.Figure
         (a) peak strength with the nucleation length; (b) slip rate around the onset; (c) over the
-        whole run, with (d) the mean stress beside it.
+        whole run, with (d) the mean stress beside it. Of a plane: (a) peak strength with the front
+        at equal intervals of time, (b) the mean stress, and below the slip rate at six moments.
 
     Raises
     ------
@@ -117,6 +120,8 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         If a variable was not kept.
     """
     _need(run, "slip_rate", "step_time", "peak_strength")
+    if problem.interface.is_plane:
+        return plane_rupture_figure(run, problem)
     x, times = run["x"].values, run["time"].values
     rate = run["slip_rate"].values
     onset = float(run["onset_time"])
@@ -188,9 +193,12 @@ def front_figure(run: xr.Dataset, problem: Problem) -> Figure:
     -------
     matplotlib.figure.Figure
         (a) time at which each node had half of its critical slip; (b) apparent speed of the
-        front. Patches that grow ahead of it can make it look faster than c_d.
+        front. Patches that grow ahead of it can make it look faster than c_d. Of a plane: both
+        along x and along y through the critical position.
     """
     _need(run, "arrival_time", "front_speed", "onset_time")
+    if problem.interface.is_plane:
+        return plane_front_figure(run, problem)
     x = run["x"].values * _MILLI
     arrival = (run["arrival_time"].values - float(run["onset_time"])) * _MICRO
     speed = run["front_speed"].values
@@ -220,56 +228,6 @@ def front_figure(run: xr.Dataset, problem: Problem) -> Figure:
     return figure
 
 
-def _pictures(times: Floats, count: int) -> NDArray[np.intp]:
-    """Frames spread evenly over what was kept: steps are short where things happen fast."""
-    return np.unique(np.linspace(0, times.size - 1, min(count, times.size)).round().astype(int))
-
-
-def _write_gif(
-    path: Path, figure: Figure, moving: list[Any], show: Any, shown: Any, rate: int
-) -> None:
-    """Draw the pictures one by one; only the moving parts are drawn again."""
-    canvas = FigureCanvasAgg(figure)
-    for part in moving:
-        part.set_animated(True)
-    canvas.draw()
-    background = canvas.copy_from_bbox(figure.bbox)
-
-    def pictures() -> Iterator[Image.Image]:
-        for i in shown:
-            show(i)
-            canvas.restore_region(background)
-            for part in moving:
-                figure.draw_artist(part)
-            yield Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
-
-    # One palette for all pictures keeps the still parts still.
-    images = [picture.quantize(64, dither=Image.Dither.NONE) for picture in pictures()]
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0
-    )
-
-
-def _write_mp4(path: Path, figure: Figure, show: Any, shown: Any, rate: int) -> None:
-    writer = FFMpegWriter(fps=rate)
-    with writer.saving(figure, str(path), figure.dpi):
-        for i in shown:
-            show(i)
-            writer.grab_frame()
-
-
-def can_write_mp4() -> bool:
-    """Whether the program ffmpeg is there (or where matplotlib's `animation.ffmpeg_path` says)."""
-    return bool(FFMpegWriter.isAvailable())
-
-
-def _check_name(path: Path) -> None:
-    if path.suffix not in (".gif", ".mp4"):
-        raise InputError(f"film: the name must end in .gif or .mp4, got {path.name!r}")
-    if path.suffix == ".mp4" and not can_write_mp4():
-        raise InputError(f"film: {path.name!r} needs the program ffmpeg; use a .gif instead")
-
-
 def rupture_film(
     run: xr.Dataset,
     problem: Problem,
@@ -278,7 +236,7 @@ def rupture_film(
     pictures: int = 160,
     rate: int = 20,
 ) -> Path:
-    """Write a film of a rupture: stress and strength above, slip rate below.
+    """Write a film of a rupture: stress and slip rate, of a line above each other with strength.
 
     Parameters
     ----------
@@ -304,7 +262,9 @@ def rupture_film(
     """
     _need(run, "slip_rate", "shear_stress", "peak_strength")
     target = Path(path)
-    _check_name(target)
+    check_film_name(target)
+    if problem.interface.is_plane:
+        return plane_rupture_film(run, problem, target, pictures=pictures, rate=rate)
     x = run["x"].values * _MILLI
     times, onset = run["time"].values, float(run["onset_time"])
     stress = run["shear_stress"].values / _MEGA
@@ -336,11 +296,6 @@ def rupture_film(
                 rf"$\langle\tau\rangle$ = {mean[i]:.3f} MPa"
             )
 
-        figure.canvas.draw()
-        figure.set_layout_engine("none")  # the panels must not move between pictures
-        shown = _pictures(times, pictures)
-        if target.suffix == ".gif":
-            _write_gif(target, figure, [line, moving, clock], show, shown, rate)
-        else:
-            _write_mp4(target, figure, show, shown, rate)
-    return target
+        return write_film(
+            target, figure, [line, moving, clock], show, times.size, pictures=pictures, rate=rate
+        )
