@@ -1,6 +1,8 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction.criterion.griffith import energy_release_rate as energy_release_rate
+from stiction.criterion.griffith import griffith_length as griffith_length
 from stiction.criterion.method import LocalCriterion as LocalCriterion
 from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
 from stiction.dynamics.method import Rupture as Rupture
@@ -31,6 +33,8 @@ from stiction.friction.exponential import ExponentialWeakening as ExponentialWea
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.interface import Interface as Interface
+from stiction.load import EdgeLoad as EdgeLoad
+from stiction.load import GradientLoad as GradientLoad
 from stiction.load import Load as Load
 from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
@@ -67,6 +71,7 @@ from stiction.statistics.moments import (
 from stiction.statistics.moments import (
     nucleation_statistics as nucleation_statistics,
 )
+from stiction.statistics.quantiles import quantile_distance as quantile_distance
 from stiction.statistics.quantiles import quantiles as quantiles
 from stiction.statistics.rice import rice_distribution as rice_distribution
 from stiction.stored_run import (

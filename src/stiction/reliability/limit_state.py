@@ -132,7 +132,7 @@ class LimitState:
         fields = self.random.properties
         low, high = (float(end) for end in fields["strength"].marginal.distribution.support())
         load = self.problem.load
-        profile = np.asarray(load.profile, dtype=np.float64)
+        profile = np.asarray(self.problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(load.initial_stress, dtype=np.float64)
         most: Any = least
         if "initial_stress" in fields:
@@ -171,7 +171,7 @@ class LimitState:
             return "more than the strength is random"
         load, friction = self.problem.load, self.problem.friction
         parts = {
-            "the load profile": load.profile,
+            "the load profile": self.problem.load_profile,
             "the initial stress": load.initial_stress,
             "the residual strength": friction.residual_strength,
             "the residual ratio": friction.residual_ratio,

@@ -35,7 +35,7 @@ def widened(setting: Setting, factor: float) -> Beta:
     return Beta(alpha=1.5, beta=3.0, low=low, high=low + factor * setting.mean)
 
 
-def _noise(setting: Setting, ratio: float, deviation: float, centre: float) -> RandomField:
+def noise(setting: Setting, ratio: float, deviation: float, centre: float) -> RandomField:
     """A symmetric field between bounds sqrt(5) standard deviations apart from its centre."""
     half = np.sqrt(5.0) * deviation
     return setting.field(
@@ -58,13 +58,14 @@ def _cases(context: Context) -> dict[str, RandomInterface]:
             strength=setting.field(ratio, marginal=widened(setting, 4.0))
         ),
         "random load": RandomInterface(
-            strength=own, initial_stress=_noise(setting, ratio, 0.05 * unit, 0.0)
+            strength=own, initial_stress=noise(setting, ratio, 0.05 * unit, 0.0)
         ),
     }
     if spread > 0.0:
         for label, factor in (("random stress drop", 1.0), ("more random stress drop", 2.0)):
-            noise = _noise(setting, 4.0 * ratio, factor * spread, residual + 2.3 * factor * spread)
-            cases[label] = RandomInterface(strength=own, residual_strength=noise)
+            deviation = factor * spread
+            level = noise(setting, 4.0 * ratio, deviation, residual + 2.3 * deviation)
+            cases[label] = RandomInterface(strength=own, residual_strength=level)
     return cases
 
 
