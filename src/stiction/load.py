@@ -33,7 +33,7 @@ class LoadShape:
 
     def plain(self) -> dict[str, Any]:
         """What TOML and JSON hold."""
-        return dataclasses.asdict(self)  # type: ignore[call-overload, no-any-return]  # of models
+        return dataclasses.asdict(self)  # type: ignore[call-overload]  # of models
 
     def on(self, interface: Interface) -> Array:
         """Values at the nodes, (*shape); on a plane they vary along x."""

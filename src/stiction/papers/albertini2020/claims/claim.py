@@ -119,7 +119,7 @@ class Claim:
         found = self.measure(data)
         numbers = _numbers(found.judged)
         verdict = self.rule(numbers)
-        by_reading = ()
+        by_reading: tuple[Verdict, ...] = ()
         if isinstance(self.rule, EachReading):
             by_reading = tuple(self.rule.of_each(numbers))
         computed = tuple(dict.fromkeys((*_flat(found.judged), *found.beside)))

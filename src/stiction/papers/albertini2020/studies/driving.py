@@ -76,10 +76,10 @@ def compute(context: Context) -> xr.Dataset:
         length, stress = found["event_length"].values, found["event_stress"].values
         griffith = np.full_like(length, np.nan)
         for at in np.argwhere(np.isfinite(length)):
-            i = tuple(at)
-            griffith[i] = griffith_length(
+            event = tuple(at)
+            griffith[event] = griffith_length(
                 problem,
-                float(stress[i]),
+                float(stress[event]),
                 energy,
                 centre=0.5 * problem.interface.extent,
                 arrest=True,

@@ -45,7 +45,9 @@ def dips(setting: Setting, *places: tuple[float, float]) -> Array:
     """
     interface, length = setting.problem.interface, setting.problem.nucleation_length
     x = (interface.x - 0.5 * interface.extent) / length
-    shape = sum(depth * np.exp(-2.0 * ((x - centre) / 0.8) ** 2) for centre, depth in places)
+    shape = np.zeros_like(x)
+    for centre, depth in places:
+        shape += depth * np.exp(-2.0 * ((x - centre) / 0.8) ** 2)
     result: Array = setting.mean * (1.0 - shape)
     return result
 

@@ -39,7 +39,7 @@ def compute(context: Context) -> xr.Dataset:
         profiles = field.sample(interface, samples=MOST, seed=context.seed)
         more = setting.field(ratio, power_kept=POWER_KEPT)
         usual = nucleation_stress(problem, profiles).min(axis=1)
-        kept = 2.0 * setting.truncation * 2.0 * np.pi / field.spectrum.correlation_length
+        kept = 2.0 * setting.spectrum(ratio).cutoff
         numbers = {}
         for key, other in (
             ("untruncated", more.sample(interface, samples=MOST, seed=context.seed)),

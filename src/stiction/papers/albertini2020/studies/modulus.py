@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -28,13 +28,13 @@ READINGS = {
 """The text says plane stress and prints G/(1 - nu), the modulus of plane strain."""
 
 
-def _plane(problem: Problem, plane: str) -> Problem:
+def _plane(problem: Problem, plane: Literal["stress", "strain"]) -> Problem:
     return dataclasses.replace(problem, solid=dataclasses.replace(problem.solid, plane=plane))
 
 
 def cases(setting: Setting) -> dict[str, tuple[Problem, Problem, float]]:
     """Of each reading: what is simulated, what predicts it, and the h_n that xi_0 is told in."""
-    stress, strain = (_plane(setting.problem, plane) for plane in ("stress", "strain"))
+    stress, strain = _plane(setting.problem, "stress"), _plane(setting.problem, "strain")
     true, printed = stress.nucleation_length, strain.nucleation_length
     return {
         "a": (stress, stress, true),
@@ -103,7 +103,7 @@ def compute(context: Context) -> xr.Dataset:
         "patches": ("1", "slipping patches at the onset, mean"),
     }
     dims = ("reading", "correlation_ratio")
-    numbers = {}
+    numbers: dict[str, Any] = {}
     for key, table in rows.items():
         unit_text, text = texts[key]
         attributes = {"units": unit_text, "long_name": text}

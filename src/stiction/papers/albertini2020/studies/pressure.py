@@ -77,7 +77,7 @@ def _stronger(setting: Setting, factor: float) -> object:
     """The strength times the factor."""
     own = setting.marginal
     if hasattr(own, "low") and hasattr(own, "high"):
-        return dataclasses.replace(own, low=own.low * factor, high=own.high * factor)  # type: ignore[type-var]  # a Beta
+        return dataclasses.replace(own, low=own.low * factor, high=own.high * factor)
     import scipy.stats
 
     frozen = own.distribution
