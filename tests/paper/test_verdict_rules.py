@@ -21,6 +21,7 @@ from stiction.papers.albertini2020.claims.rules import (
     Printed,
     Rising,
     SameCount,
+    Softly,
     Within,
     near,
     worst,
@@ -157,6 +158,12 @@ def _(rule: All):
         for verdict in part.verdicts:
             made[verdict] = [own[verdict if i == j else HOLDS] for j, own in enumerate(each)]
     return made
+
+
+@witnesses.register
+def _(rule: Softly):
+    own = witnesses(rule.rule)
+    return {CORRECTED if verdict is FAILS else verdict: made for verdict, made in own.items()}
 
 
 @witnesses.register

@@ -94,6 +94,7 @@ HOURS = Limit("hours", 0.5, "h", "what takes longer than a break is not routine 
 MUCH_LONGER = Limit(
     "considerably larger", 10.0, "", "an order of magnitude: what the word stands for in physics"
 )
+CONSIDERABLE = Limit("considerable time", 2.0, "", "half of the time, or more, is saved")
 SLOPE = Limit(
     "proportional to", 0.05, "", "an exponent of 1 to 5 % cannot be told from 1 over a decade"
 )

@@ -156,7 +156,7 @@ def long_stress(data: Data) -> Measured:
     where="Sec. 4.2, Fig. 6b",
     says="For correlation much longer than h_n the critical stress is close to the lower bound.",
     needs=("trend",),
-    rule=Below(limits.CLOSE_TO_BOUND, partly=True),
+    rule=Below(limits.CLOSE_TO_BOUND),
 )
 def near_the_bound(data: Data) -> Measured:
     """Share of the way from the lower to the upper bound at fixed L, from the longest length on."""
@@ -177,7 +177,7 @@ def near_the_bound(data: Data) -> Measured:
     where="Sec. 5.3",
     says="With strength skewed to low values the critical stress is close to the lower bound.",
     needs=("monte_carlo",),
-    rule=Below(limits.CLOSE_TO_BOUND, partly=True),
+    rule=Below(limits.CLOSE_TO_BOUND),
 )
 def close_to_bound(data: Data) -> Measured:
     """Mean of tau_cr as a share of the way from the lower to the upper bound."""

@@ -135,7 +135,7 @@ def higher_modes(data: Data) -> Measured:
     where="Sec. 4.1, Eqs. 11 to 13",
     says="Pre-computed modal terms save considerable time.",
     needs=("modes",),
-    rule=Above(limits.MUCH_LONGER),
+    rule=Above(limits.CONSIDERABLE),
 )
 def precomputed_terms(data: Data) -> Measured:
     """Time of the integral by quadrature at every node over that of the dot product with modes."""

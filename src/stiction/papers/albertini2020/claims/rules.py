@@ -338,6 +338,26 @@ class EachReading:
 
 
 @dataclass(frozen=True)
+class Softly:
+    """A rule on a word beside the statement: where it fails the statement needs a correction."""
+
+    rule: Rule
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        found = (CORRECTED if each is FAILS else each for each in self.rule.verdicts)
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def text(self) -> str:
+        return f"{self.rule.text} (else with a correction)"
+
+    def __call__(self, numbers: Any) -> Verdict:
+        found = self.rule(numbers)
+        return CORRECTED if found is FAILS else found
+
+
+@dataclass(frozen=True)
 class Construction:
     """What the definitions make true: there is nothing to be found."""
 

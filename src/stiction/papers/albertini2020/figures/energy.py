@@ -32,10 +32,10 @@ def caption(data: Data) -> str:
         " (b) Longest arrested patch by equilibrium in the samples whose first instability comes to"
         f" rest, {count} of them, each run again with inertia: filled where it comes to rest with"
         " inertia, too, open where inertia carries it through. (c) Speed of the front in each"
-        " rupture of Figure 4, its median over the interface (filled) and its largest over two nucleation"
-        " lengths (open), against the Rayleigh, shear and dilatational wave speeds. These are"
-        " apparent speeds: patches that grow ahead of the front and are swallowed add to them, so"
-        " that they may exceed c_d, which no disturbance does."
+        " rupture of Figure 4, its median over the interface (filled) and its largest over two"
+        " nucleation lengths (open), against the Rayleigh, shear and dilatational wave speeds."
+        " These are apparent speeds: patches that grow ahead of the front and are swallowed add to"
+        " them, so that they may exceed c_d, which no disturbance does."
         f"{' The ruptures are supershear.' if fast else ''}"
     )
 

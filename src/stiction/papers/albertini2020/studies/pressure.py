@@ -24,6 +24,7 @@ RESIDUAL = 0.3
 STRENGTH = 0.5
 """<tau_p> over the pressure."""
 MOST = 400
+_NODES_IN_PATCH = 8.0
 
 
 def _count(context: Context) -> int:
@@ -40,9 +41,13 @@ def problem_at(setting: Setting, factor: float) -> Problem:
 
     At a factor of one h_n is the setting's.
     """
+    resolution = setting.problem.nucleation_length / setting.problem.interface.spacing
+    finer = 2 ** max(int(np.ceil(np.log2(_NODES_IN_PATCH * FACTORS[-1] / resolution))), 0)
+    grid = setting.problem.interface
     rate = float(np.max(setting.problem.friction.weakening_rate)) * factor
     return dataclasses.replace(
         setting.problem,
+        interface=dataclasses.replace(grid, nodes=grid.size * finer),
         friction=dataclasses.replace(
             setting.problem.friction,
             weakening_rate=rate,
