@@ -1,6 +1,8 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction.criterion.griffith import energy_release_rate as energy_release_rate
+from stiction.criterion.griffith import griffith_length as griffith_length
 from stiction.criterion.method import LocalCriterion as LocalCriterion
 from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
 from stiction.dynamics.method import Rupture as Rupture
@@ -42,6 +44,8 @@ from stiction.inference.peaks import read_peaks as read_peaks
 from stiction.inference.posterior import Posterior as Posterior
 from stiction.inference.simulator import simulator as simulator
 from stiction.interface import Interface as Interface
+from stiction.load import EdgeLoad as EdgeLoad
+from stiction.load import GradientLoad as GradientLoad
 from stiction.load import Load as Load
 from stiction.merge import (
     merge_parts as merge_parts,
@@ -94,6 +98,7 @@ from stiction.statistics.moments import (
 from stiction.statistics.moments import (
     nucleation_statistics as nucleation_statistics,
 )
+from stiction.statistics.quantiles import quantile_distance as quantile_distance
 from stiction.statistics.quantiles import quantiles as quantiles
 from stiction.statistics.rice import rice_distribution as rice_distribution
 from stiction.stored_run import (

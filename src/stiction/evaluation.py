@@ -21,7 +21,14 @@ from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profile_nodes import Gaps, check_gaps
-from stiction.results import FRICTION_COEFFICIENT, SAMPLE, Variable, coordinate, to_dataset
+from stiction.results import (
+    DIRECTION,
+    FRICTION_COEFFICIENT,
+    SAMPLE,
+    Variable,
+    coordinate,
+    to_dataset,
+)
 from stiction.sample import Sample, named_profiles
 
 FIRST = 16
@@ -173,7 +180,7 @@ def label(
     variables |= dict(more_variables)
     coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
     used = {dim for name in values for dim in variables[name].dims}
-    for dim in sorted(used - {"sample"}):
+    for dim in sorted(used & {*problem.interface.dims, DIRECTION}):
         coordinates[dim] = coordinate(problem.interface, dim)
     return to_dataset(values, variables, coordinates, attributes)
 

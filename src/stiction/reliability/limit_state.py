@@ -183,7 +183,7 @@ class LimitState:
         fields = self.random.properties
         low, high = support_in_stress(self.problem, fields, "strength")
         load = self.problem.load
-        profile = np.asarray(load.profile, dtype=np.float64)
+        profile = np.asarray(self.problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(load.initial_stress, dtype=np.float64)
         most: Any = least
         if "initial_stress" in fields:
@@ -223,7 +223,7 @@ class LimitState:
             return "the normal pressure, and so the strength, varies along the interface"
         load, friction = self.problem.load, self.problem.friction
         parts = {
-            "the load profile": load.profile,
+            "the load profile": self.problem.load_profile,
             "the initial stress": load.initial_stress,
             "the residual strength": friction.residual_strength,
             "the residual ratio": friction.residual_ratio,

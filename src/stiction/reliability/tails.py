@@ -78,7 +78,7 @@ def longer(problem: Problem, ratio: int) -> Problem:
     """
     load, friction = problem.load, problem.friction
     parts = {
-        "load.profile": load.profile,
+        "load.profile": problem.load_profile,
         "load.initial_stress": load.initial_stress,
         "load.normal_pressure": load.normal_pressure,
         "friction.weakening_rate": friction.weakening_rate,

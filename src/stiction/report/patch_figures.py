@@ -69,7 +69,7 @@ def draw_patches(
         parts = figure.subfigures(1, 2, width_ratios=(1.0, 0.96))
     _draw_strength(parts[0], problem, tau_p, exact, results, names)
     first = float(exact["first_instability"][0]) - float(np.mean(problem.load.initial_stress))
-    loads = first / float(np.mean(problem.load.profile)) * np.array(SHARES)
+    loads = first / float(np.mean(problem.load_profile)) * np.array(SHARES)
     draw_growth(parts[1], problem, equilibrium_path(problem, tau_p, loads))
     return figure
 

@@ -94,7 +94,7 @@ def _nucleation_arrow(axes: Axes, problem: Problem, run: xr.Dataset, height: flo
     # Beside the arrow, on the side where there is room.
     right = centre + half < 0.9 * problem.interface.extent * _MILLI
     at, align = (centre + 1.3 * half, "left") if right else (centre - 1.3 * half, "right")
-    axes.text(at, height, "$h_n$", color=ACCENT, ha=align, va="center")
+    axes.text(at, height, r"$h_\mathrm{n}$", color=ACCENT, ha=align, va="center")
 
 
 def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
@@ -141,7 +141,7 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         lowest, highest = np.nanmin(strength), np.nanmax(strength)
         height = highest + 0.04 * (highest - lowest)
         _nucleation_arrow(top, problem, run, height)
-        top.set_ylabel(r"$\tau_p$ (MPa)")
+        top.set_ylabel(r"$\tau_\mathrm{p}$ (MPa)")
         top.set_ylim(lowest - 0.05, height + 0.25 * (highest - lowest))
 
         before = _BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
