@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.report.style import PAGE, color, marker, new_figure, panel, series
+from stiction.plot.style import PAGE, color, marker, new_figure, panel, series
 
 XI = r"correlation length $\xi_0$ (mm)"
 

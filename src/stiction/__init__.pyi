@@ -1,6 +1,7 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction import plot as plot
 from stiction.criterion.method import LocalCriterion as LocalCriterion
 from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
 from stiction.dynamics.method import Rupture as Rupture

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stiction._typing import Array
 from stiction.errors import warn_accuracy
-from stiction.evaluation import label
+from stiction.evaluation import label, study_attributes
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, along
@@ -124,4 +124,7 @@ def profiles_of(state: LimitState, draws: Array) -> xr.Dataset:
     values = dict(profiles) | {name: onset[name] for name in ONSET_VARIABLES}
     interface = state.problem.interface
     meaning = {name: along(interface, PROFILES[name]) for name in profiles}
-    return label(state.problem, state.method, values, np.arange(draws.shape[0]), {}, meaning)
+    attributes = study_attributes(state.problem, state.method)
+    return label(
+        state.problem, state.method, values, np.arange(draws.shape[0]), attributes, meaning
+    )
