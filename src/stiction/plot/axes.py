@@ -35,9 +35,10 @@ def on_axes(ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8) 
         return
     import matplotlib.pyplot as plt  # notebooks and galleries show the figures that it knows
 
+    # Made outside the style: a notebook's backend, loaded by its first figure, sets parameters too.
+    figure = plt.figure(figsize=(width, height), layout="constrained")
     with paper_style():
-        _, made = plt.subplots(figsize=(width, height))
-        yield made
+        yield figure.subplots()
 
 
 def add_legend(axes: Axes, given: Axes | None) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stiction._brief import brief_html
 from stiction._checks import is_real
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
@@ -89,6 +90,8 @@ class DesignStress:
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
+
+    _repr_html_ = brief_html
 
     @property
     def stress_above_bound(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._brief import brief_html
 from stiction._typing import Array
 from stiction.errors import warn_accuracy
 from stiction.evaluation import label, study_attributes
@@ -74,6 +75,8 @@ class FailureProbability:
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
+
+    _repr_html_ = brief_html
 
     @property
     def stress_above_bound(self) -> float:
