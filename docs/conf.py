@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -14,6 +15,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 # Pictures need no screen, and pages no progress of compilers.
 os.environ.setdefault("MPLBACKEND", "agg")
+sys.path.insert(0, str(HERE / "_extensions"))
 
 import stiction  # noqa: E402  # after the environment is set
 from stiction.cli.app import app as commands  # noqa: E402
@@ -31,7 +33,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
+    "mathml",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["README.md", "_build", "**/GALLERY_HEADER.rst", "**/*.ipynb", "gallery/*"]
@@ -79,7 +81,7 @@ def mark_titles():
         text = (ROOT / "examples" / f"{name}.py").read_text("utf-8")
         title, _, rest = text.removeprefix('"""').partition("\n")
         texts[f"{name}.py"] = f'"""\n{title}\n{"=" * len(title)}\n{rest}'
-    for path in SCRIPTS.iterdir():
+    for path in SCRIPTS.glob("*.py"):
         if path.name not in texts:
             path.unlink()
     for name, text in texts.items():
@@ -90,6 +92,7 @@ def mark_titles():
 
 mark_titles()
 
+html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = f"stiction {version}"
 html_static_path = ["_static"]
@@ -111,16 +114,23 @@ html_theme_options = {
 html_context = {"default_mode": "auto"}
 
 
+SECTIONS = ("start", "use", "understand", "evidence", "reference")
+
+
 def other_pages(app, docname, source):
-    """Put pages that no list on the front page names into its last one: none is ever lost."""
-    if docname != "index":
+    """Put pages that no section names where they probably belong: none is ever lost."""
+    if docname not in ("start", "understand"):
         return
-    named = set(re.findall(r"^([\w/-]+)$", source[0], flags=re.MULTILINE))
-    there = {path.relative_to(HERE).with_suffix("").as_posix() for path in HERE.glob("*.md")}
-    there |= {f"notebooks/{path.stem}" for path in (HERE / "notebooks").glob("*.md")}
-    there |= {f"tutorials/{path.stem}" for path in (HERE / "tutorials").glob("*.md")}
-    rest = sorted(there - named - {"index", "README"})
-    source[0] = source[0].replace("@other pages@", "\n".join(rest))
+    named = set()
+    for section in SECTIONS:
+        text = (HERE / f"{section}.md").read_text("utf-8")
+        named |= set(re.findall(r"^([\w/-]+)$", text, flags=re.MULTILINE))
+    folders = "", "notebooks/", "tutorials/"
+    there = {f"{one}{path.stem}" for one in folders for path in (HERE / one).glob("*.md")}
+    rest = sorted(there - named - {"index", "README", *SECTIONS})
+    lessons = [name for name in rest if "tutorial" in name or "/" in name]
+    mine = lessons if docname == "start" else [name for name in rest if name not in lessons]
+    source[0] = source[0].replace("@other pages@", "\n".join(mine))
 
 
 def plain_text(app, what, name, obj, options, lines):

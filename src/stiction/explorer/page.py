@@ -151,7 +151,11 @@ class Explorer:
         }
 
     def _figures(self) -> list[Any]:
-        options: dict[str, Any] = {"height": 210, "toolbar_location": None}
+        options: dict[str, Any] = {
+            "height": 210,
+            "toolbar_location": None,
+            "sizing_mode": "stretch_width",
+        }
         wide = figure(**options, y_axis_label="MPa", title="strength and shear stress")
         wide.line("x", "strength", source=self.profile, color=QUIET, legend_label="strength")
         wide.line(
@@ -184,7 +188,7 @@ class Explorer:
         for one in (wide, patches, spread, tail):
             one.title.text_font_style = "normal"
             for legend in one.select(Legend):
-                legend.orientation = "horizontal"
+                legend.ncols = 2
                 legend.background_fill_alpha = 0.6
                 legend.label_text_font_size = "8pt"
                 legend.padding = 2
