@@ -13,8 +13,8 @@ import typer.main
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-# Pictures need no screen, and pages no progress of compilers.
-os.environ.setdefault("MPLBACKEND", "agg")
+# Notebooks show figures by a backend of their own, which this would switch off.
+os.environ.pop("MPLBACKEND", None)
 sys.path.insert(0, str(HERE / "_extensions"))
 
 import stiction  # noqa: E402  # after the environment is set
@@ -37,6 +37,8 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["README.md", "_build", "**/GALLERY_HEADER.rst", "**/*.ipynb", "gallery/*"]
+# Times of the gallery's scripts: a page whose tables come from elsewhere.
+exclude_patterns += ["**/sg_execution_times.rst", "sg_execution_times.rst"]
 source_suffix = {".rst": "restructuredtext", ".md": "myst-nb"}
 default_role = "py:obj"
 suppress_warnings = ["config.cache"]  # a function in the configuration of the gallery

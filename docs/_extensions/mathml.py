@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers set by themselves: no script, nothing fetched from elsewhere."""
+"""Formulas as MathML, which browsers set by themselves: no script, nothing fetched."""
 
 from __future__ import annotations
 
