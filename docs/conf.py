@@ -149,6 +149,24 @@ def plain_text(app, what, name, obj, options, lines):
             lines[number] = "".join(parts)
 
 
+def write_if_new(path, text):
+    """Unchanged, a page is not built again."""
+    if not path.exists() or path.read_text("utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def write_other_names(app):
+    """A page with the public names that api/index.rst does not list: none is ever lost."""
+    index = (HERE / "api" / "index.rst").read_text("utf-8")
+    listed = set(re.findall(r"^   (\w+)$", index, flags=re.MULTILINE))
+    modules = {"paper", "plot", "__version__"}
+    rest = sorted(set(stiction.__all__) - listed - modules)
+    title = "More names\n==========\n"
+    table = ".. currentmodule:: stiction\n\n.. autosummary::\n   :toctree: generated\n   :nosignatures:\n"
+    body = "\n".join([table, *(f"   {name}" for name in rest)]) if rest else "There are none."
+    write_if_new(HERE / "api" / "others.rst", f"{title}\n{body}\n")
+
+
 def write_commands(app):
     """The page of commands, from the commands."""
     group = typer.main.get_command(commands)
@@ -158,13 +176,11 @@ def write_commands(app):
     for name, command in sorted(group.commands.items()):
         inner = click.Context(command, info_name=name, parent=context, terminal_width=90)
         parts.append(f"## `stiction {name}`\n\n```text\n{command.get_help(inner)}\n```\n")
-    path = HERE / "api" / "commands.md"
-    text = "\n".join(parts)
-    if not path.exists() or path.read_text("utf-8") != text:  # unchanged, it is not built again
-        path.write_text(text, encoding="utf-8")
+    write_if_new(HERE / "api" / "commands.md", "\n".join(parts))
 
 
 def setup(app):
     app.connect("source-read", other_pages)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)
+    app.connect("builder-inited", write_other_names, priority=1)  # before autosummary looks
