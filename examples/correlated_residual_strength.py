@@ -26,3 +26,4 @@ for rho in (0.0, 0.8):
         f"correlation {rho}: critical stress {mean / 1e6:.4f} MPa,"
         f" {arrested:.0f} % of samples with arrested events"
     )
+st.plot.monte_carlo({f"correlation {rho}": onset for rho, onset in onsets.items()})

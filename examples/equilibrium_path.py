@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 import stiction as st
-from stiction.report.style import ACCENT, COLUMN, new_figure, paper_style
+from stiction.plot.style import ACCENT, COLUMN, new_figure, paper_style
 
 
 def compute(nodes: int = 1024, sample: int = 0) -> tuple[np.ndarray, xr.Dataset, xr.Dataset]:

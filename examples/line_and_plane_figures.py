@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from PIL import Image
 
 from stiction.equilibrium.plane_patches import critical_patch
-from stiction.report.style import (
+from stiction.plot.style import (
     ACCENT,
     INK,
     PAGE,

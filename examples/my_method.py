@@ -59,3 +59,4 @@ exact = onsets["equilibrium"].critical_stress
 for name, onset in onsets.items():
     error = 100.0 * np.abs(onset.critical_stress / exact - 1.0)
     print(f"{name}: mean error {float(error.mean()):.3f} %, largest {float(error.max()):.2f} %")
+st.plot.monte_carlo(onsets)

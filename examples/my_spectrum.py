@@ -31,3 +31,4 @@ for name, spectrum in {"machined": own, "power law": alike}.items():
     print(
         f"{name}: critical stress {mean / 1e6:.3f} MPa, standard deviation {spread / 1e3:.1f} kPa"
     )
+st.plot.monte_carlo({name: onset.to_dataset() for name, onset in onsets.items()})

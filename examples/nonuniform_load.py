@@ -26,3 +26,4 @@ for name, load in loads.items():
     middle = 100.0 * float(((place > 0.25) & (place < 0.75)).mean())
     mean = float(onsets[name].critical_stress.mean())
     print(f"{name}: {mean / 1e6:.3f} MPa on average, {middle:.0f} % begin in the middle half")
+st.plot.monte_carlo(onsets, quantity="critical_position")

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import stiction as st
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, new_figure, paper_style
 from stiction.report.rupture_figures import rupture_figure
-from stiction.report.style import INK, PAGE, PALE, QUIET, color, new_figure, paper_style
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400

@@ -32,3 +32,4 @@ for name, (law, more) in cases.items():
     mean = float(onsets[name].critical_stress.mean())
     patch = float(onsets[name].critical_patch_length.median())
     print(f"{name}: critical stress {mean / 1e6:.3f} MPa, critical patch {patch * 1e3:.1f} mm")
+st.plot.monte_carlo(onsets)

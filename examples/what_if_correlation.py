@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from what_if_plots import axes_of, events_of, longest, percent
 
 import stiction as st
-from stiction.report.style import marker, series
+from stiction.plot.style import marker, series
 
 RUPTURES = 60
 LOADING_RATE = 2e7  # Pa/s

@@ -22,7 +22,7 @@ from what_if_plots import (
 )
 
 import stiction as st
-from stiction.report.style import PALE, color, marker, series
+from stiction.plot.style import PALE, color, marker, series
 
 Shown = tuple[Figure, list[str]]
 MEGA = 1e-6

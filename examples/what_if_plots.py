@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import stiction as st
 from stiction.papers.albertini2020.claims.claim import rounded
-from stiction.report.style import PAGE, color, marker, new_figure, panel, series
+from stiction.plot.style import PAGE, color, marker, new_figure, panel, series
 from stiction.statistics.estimates import Estimate, share
 
 XI = r"correlation length $\xi_0$ (mm)"

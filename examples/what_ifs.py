@@ -15,7 +15,7 @@ from PIL import Image
 from what_if_parts import PARTS
 
 import stiction as st
-from stiction.report.style import paper_style
+from stiction.plot.style import paper_style
 
 HERE = Path(__file__).parent
 INTRODUCTION = """# What if

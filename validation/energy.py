@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
-from stiction.report.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 LOAD = 7.5e5

@@ -13,7 +13,7 @@ import numpy as np
 
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel
-from stiction.report.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
 
 PAPER = np.sqrt(2.0 / 0.67)  # c_d/c_s in plane stress at nu = 0.33
 SOLIDS = {

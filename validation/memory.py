@@ -14,7 +14,7 @@ import numpy as np
 
 import stiction as st
 from stiction.elasticity.memory_kernels import arc_quadrature
-from stiction.report.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, new_figure, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES, STEPS, LOADING = 128, 1200, 3e9

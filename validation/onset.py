@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
-from stiction.report.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, new_figure, paper_style, series
 
 RATES = (1e3, 1e4, 1e5, 1e6, 2e7, 1e8, 1e9)
 

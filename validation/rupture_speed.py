@@ -15,7 +15,7 @@ import numpy as np
 
 import stiction as st
 from stiction.dynamics.energies import rupture_speed
-from stiction.report.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, new_figure, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 RATE, STRENGTH = 1e12, 1e6

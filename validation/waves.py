@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.ticker import NullFormatter
 
 import stiction as st
-from stiction.report.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 ETA = SOLID.wave_speed_ratio

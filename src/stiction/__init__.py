@@ -73,7 +73,7 @@ _HOMES = {
     "AccuracyWarning": "errors",
     "UnitWarning": "errors",
 }
-_MODULES = {"paper": "papers.albertini2020"}
+_MODULES = {"paper": "papers.albertini2020", "plot": "plot"}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 

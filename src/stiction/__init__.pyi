@@ -1,6 +1,7 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction import plot as plot
 from stiction.criterion.griffith import energy_release_rate as energy_release_rate
 from stiction.criterion.griffith import griffith_length as griffith_length
 from stiction.criterion.method import LocalCriterion as LocalCriterion

@@ -16,7 +16,7 @@ import pydantic_core
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from stiction._brief import brief
+from stiction._brief import brief, brief_html
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 
@@ -293,6 +293,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     wrapped.__eq__ = _equal
     if bare:
         wrapped.__repr__ = brief
+    wrapped._repr_html_ = brief_html
     wrapped.__hash__ = _hash
     return wrapped
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -14,7 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._brief import brief
+from stiction._brief import brief, brief_html
 from stiction._checks import as_path
 from stiction._model import describe
 from stiction._netcdf import DamagedError, read_dataset
@@ -72,6 +73,7 @@ class Status:
     active: bool
 
     __repr__ = brief
+    _repr_html_ = brief_html
 
     @property
     def complete(self) -> bool:
@@ -114,6 +116,9 @@ class StoredRun:
         points = len(self.study.plans)
         each = f"{points} points of " if points > 1 else ""
         return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{html.escape(repr(self))}</p>{brief_html(self.status(verify=False))}"
 
     def status(self, *, verify: bool = True) -> Status:
         """How far it is.

@@ -9,7 +9,8 @@ import stiction as st
 from stiction import InputError
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
-from stiction.report.rupture_figures import front_figure, rupture_figure, rupture_film
+from stiction.plot import film
+from stiction.report.rupture_figures import front_figure, rupture_figure
 
 
 @pytest.fixture(scope="module")
@@ -41,18 +42,18 @@ def test_front_figure_names_the_wave_speeds(simulated):
 
 
 def test_film_moves(simulated, tmp_path):
-    problem, run = simulated
-    path = rupture_film(run, problem, tmp_path / "film.gif", pictures=6)
-    film = Image.open(path)
-    assert film.n_frames == 6
-    first = np.asarray(film.convert("RGB")).astype(int)
-    film.seek(5)
-    assert np.abs(np.asarray(film.convert("RGB")) - first).max() > 50
+    _, run = simulated
+    path = film(run, tmp_path / "film.gif", pictures=6)
+    moving = Image.open(path)
+    assert moving.n_frames == 6
+    first = np.asarray(moving.convert("RGB")).astype(int)
+    moving.seek(5)
+    assert np.abs(np.asarray(moving.convert("RGB")) - first).max() > 50
 
 
 def test_what_is_missing_is_named(simulated, tmp_path):
     problem, run = simulated
     with pytest.raises(InputError, match=r"\.gif or \.mp4, got 'film\.avi'"):
-        rupture_film(run, problem, tmp_path / "film.avi")
+        film(run, tmp_path / "film.avi")
     with pytest.raises(InputError, match="has no slip_rate"):
         rupture_figure(run.drop_vars("slip_rate"), problem)

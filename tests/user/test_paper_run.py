@@ -52,7 +52,7 @@ def test_figures_are_legible_in_grey(folder):
     """No series may be so light that grey print loses it."""
     from matplotlib.colors import to_rgb
 
-    from stiction.report.style import color, series
+    from stiction.plot.style import color, series
 
     styles = [series(i, marker=True) for i in range(4)]
     assert len({str(style["linestyle"]) for style in styles}) == 4

@@ -53,7 +53,7 @@ def test_every_public_name_is_there_and_documented(name):
 def test_no_module_bears_the_name_of_a_public_function():
     modules = {path.stem for path in (ROOT / "src" / "stiction").glob("*.py")}
     folders = {path.parent.name for path in (ROOT / "src" / "stiction").glob("*/__init__.py")}
-    functions = {name for name in st.__all__ if name not in ("__version__", "paper")}
+    functions = {name for name in st.__all__ if name not in ("__version__", "paper", "plot")}
     assert not (modules | folders) & functions
 
 

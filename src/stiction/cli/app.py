@@ -14,6 +14,7 @@ import typer
 
 from stiction import __version__
 from stiction.cli.common import echo
+from stiction.cli.explore import explore
 from stiction.cli.fit import fit
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
@@ -25,7 +26,6 @@ from stiction.errors import InputError, RunError
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -42,7 +42,8 @@ def _say_version(asked: bool) -> None:
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="And exit.")
+        bool,
+        typer.Option("--version", "-V", callback=_say_version, is_eager=True, help="And exit."),
     ] = False,
 ) -> None:
     pass
@@ -76,6 +77,7 @@ for command in (
     export,
     plot,
     report,
+    explore,
 ):
     app.command()(_interruptible(command))
 

@@ -89,13 +89,13 @@ def reliability(
     arrested or not, which is never later. The time limit holds for the curve and each answer.
     """
     from stiction.export import write_result
+    from stiction.plot.style import save_figure
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import check_probability, design_stress
     from stiction.reliability.estimate import check_stress, failure_probability
     from stiction.reliability.result import bounded
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
-    from stiction.report.style import save_figure
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)

@@ -72,13 +72,10 @@ def rupture(
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
     from stiction.export import write_result
-    from stiction.report.film import can_write_mp4
-    from stiction.report.rupture_figures import (
-        front_figure,
-        rupture_figure,
-        rupture_film,
-    )
-    from stiction.report.style import save_figure
+    from stiction.plot.film_writer import can_write_mp4
+    from stiction.plot.films import film as write_film
+    from stiction.plot.style import save_figure
+    from stiction.report.rupture_figures import front_figure, rupture_figure
     from stiction.study.study import Study, read_setup
 
     writable_folder(out)
@@ -118,9 +115,9 @@ def rupture(
                 save_figure(figure, out / f"{name}.{ending}")
     if film:
         with Meter("drawing the film"):
-            echo(f"film: {rupture_film(result, problem, out / 'rupture.gif')}")
+            echo(f"film: {write_film(result, out / 'rupture.gif')}")
             if can_write_mp4():
-                echo(f"film: {rupture_film(result, problem, out / 'rupture.mp4')}")
+                echo(f"film: {write_film(result, out / 'rupture.mp4')}")
             else:
                 echo("no rupture.mp4: the program ffmpeg was not found")
     echo(f"written to {out}")

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from stiction._brief import brief_html
 from stiction._checks import is_real
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
@@ -105,6 +106,8 @@ class DesignStress:
     def friction_coefficient(self) -> float:
         """`stress` over the mean normal pressure; NaN without one."""
         return self.stress / self.normal_pressure
+
+    _repr_html_ = brief_html
 
     @property
     def stress_above_bound(self) -> float:

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from stiction._brief import brief_html
 from stiction._typing import Array
 from stiction.errors import warn_accuracy
-from stiction.evaluation import label
+from stiction.evaluation import label, study_attributes
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, along
@@ -84,6 +85,8 @@ class FailureProbability:
         """`stress` over the mean normal pressure; NaN without one."""
         return self.stress / self.normal_pressure
 
+    _repr_html_ = brief_html
+
     @property
     def stress_above_bound(self) -> float:
         """`stress` less `lower_bound`, Pa."""
@@ -139,4 +142,7 @@ def profiles_of(state: LimitState, draws: Array) -> xr.Dataset:
     values = dict(profiles) | {name: onset[name] for name in ONSET_VARIABLES}
     interface = state.problem.interface
     meaning = {name: along(interface, PROFILES[name]) for name in profiles}
-    return label(state.problem, state.method, values, np.arange(draws.shape[0]), {}, meaning)
+    attributes = study_attributes(state.problem, state.method)
+    return label(
+        state.problem, state.method, values, np.arange(draws.shape[0]), attributes, meaning
+    )

@@ -1,40 +1,33 @@
-"""Figures of planes: strength, nucleation stress and where each method sees it let go."""
+"""Figures of a plane with several maps: strength and what slips, and how patches grow."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
+from matplotlib.figure import Figure, SubFigure
 
 from stiction._typing import Array
 from stiction.criterion.nucleation import nucleation_stress
+from stiction.equilibrium.path import equilibrium_path
 from stiction.errors import InputError
+from stiction.plot import maps
+from stiction.plot.axes import MEGA, MICRO
+from stiction.plot.onsets import draw_plane_onset, has_maps
+from stiction.plot.paths import draw_slip
+from stiction.plot.style import PAGE, new_figure, panel
 from stiction.problem import Problem
-from stiction.report.style import COLUMN, PAGE, color, marker, new_figure, panel, paper_style
 
-_MAP = "cividis"
-_EDGE = "white"
-Box = tuple[float, float, float, float]
-NEAR = 2.0
-"""Nucleation lengths on either side that are shown of weak spots."""
+SHARES = (0.9, 0.96, 0.99, 1.0 - 1e-5)
+"""Of the load of the first instability, at which the growth of patches is shown."""
+WIDE = 1.6
+"""Ratio of the lengths along x and y from which on the panels lie below each other."""
 
 
-def _image(figure: Figure, axes: Axes, values: Array, box: Box, label: str) -> None:
-    """A field of a plane (nx, ny), Pa, over `box` in the units of the axes."""
-    drawn = axes.imshow(values.T * 1e-6, origin="lower", extent=box, cmap=_MAP)
-    figure.colorbar(drawn, ax=axes, label=label, shrink=0.75)
-
-
-def draw_plane_onset(
-    problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset], names: Mapping[str, str]
-) -> Figure:
+def averages_figure(problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]) -> Figure:
     """Strength and nucleation stress of a plane, with the onset by each method.
 
     Parameters
@@ -44,90 +37,83 @@ def draw_plane_onset(
         Pa.
     results : mapping of Dataset
         By the type of the method, one sample each.
-    names : mapping of str
-        What methods are called, by their type.
     """
     fields = [(tau_p, r"strength $\tau_p$ (MPa)")]
     with suppress(InputError):  # without one critical patch the strength alone is shown
         fields.append((nucleation_stress(problem, tau_p), r"nucleation stress $\tau_n$ (MPa)"))
-    lengths = [1e3 * length for length in problem.interface.lengths]
-    across = min(max(lengths[1] / lengths[0], 0.3), 1.5)
+    across = float(np.clip(maps.relative_height(problem.interface), 0.3, 1.5))
     figure = new_figure(PAGE, 0.9 + 0.42 * PAGE * across)
     panels = np.atleast_1d(figure.subplots(1, len(fields), sharey=True))
-    step = [1e3 * spacing for spacing in problem.interface.spacings]
-    # A pixel around each node; the first node is at the origin.
-    box = (-0.5 * step[0], lengths[0] - 0.5 * step[0], -0.5 * step[1], lengths[1] - 0.5 * step[1])
     for letter, axes, (values, label) in zip("ab", panels, fields, strict=False):
-        _image(figure, axes, values, box, label)
-        for number, (name, result) in enumerate(results.items()):
-            _mark(axes, result, number, names.get(name, name), lengths)
-        axes.set_xlim(box[0], box[1])
-        axes.set_ylim(box[2], box[3])
-        axes.set_xlabel("$x$, along the slip (mm)")
+        drawn = draw_plane_onset(axes, problem, values, results, cmap="cividis")
+        figure.colorbar(drawn, ax=axes, label=label, shrink=0.75)
+        axes.label_outer()
         panel(axes, letter)
-    panels[0].set_ylabel("$y$ (mm)")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center")
     return figure
 
 
-def _mark(axes: Axes, result: xr.Dataset, number: int, name: str, lengths: list[float]) -> None:
-    x, y = (float(one) * 1e3 for one in result["critical_position"].values[0])
-    load = float(result["critical_load"][0]) * 1e-6
-    axes.plot(
-        x,
-        y,
-        linestyle="none",
-        marker=marker(number),
-        markersize=5.0,
-        markerfacecolor=_EDGE,
-        markeredgecolor=color(number + 1),
-        label=f"{name}: {load:.4f} MPa at ({x:.2f}, {y:.2f}) mm",
-    )
-    if "critical_aspect" not in result:
-        return
-    extent = result["critical_patch_extent"].values[0] * 1e3
-    for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
-        axes.add_patch(
-            Ellipse(
-                (x + i * lengths[0], y + j * lengths[1]), *extent, fill=False, edgecolor=_EDGE,
-                linewidth=0.9,
-            )
-        )  # fmt: skip
-
-
-def plane_weak_spot_figure(failing: xr.Dataset, nucleation_length: float) -> Figure:
-    """Mean strength of failing samples of a plane, each moved so that it lets go in the middle.
+def patches_figure(problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]) -> Figure:
+    """Map of the strength with the onset by each method, and the growth of the slip patches.
 
     Parameters
     ----------
-    failing : Dataset
-        `failing_profiles` of a `FailureProbability`.
-    nucleation_length : float
-        h_n, m; the unit of length.
+    problem : Problem
+        On a plane.
+    tau_p : (nx, ny) array
+        Pa.
+    results : mapping of Dataset
+        By the type of the method, one sample each; one of them with `slip` and `sensitivity`.
     """
-    places = [failing[dim].values for dim in ("x", "y")]
-    spacings = [float(place[1] - place[0]) for place in places]
-    middle = [place.size // 2 for place in places]
-    positions = failing["critical_position"].values
-    total: Any = 0.0
-    for strength, at in zip(failing["strength"].values, positions, strict=True):
-        shift = [m - round(float(a) / h) for m, a, h in zip(middle, at, spacings, strict=True)]
-        total = total + np.roll(strength, shift, (0, 1)) / positions.shape[0]
-    reach = [
-        min(m, max(1, int(NEAR * nucleation_length / h)))
-        for m, h in zip(middle, spacings, strict=True)
-    ]
-    near = total[
-        middle[0] - reach[0] : middle[0] + reach[0] + 1,
-        middle[1] - reach[1] : middle[1] + reach[1] + 1,
-    ]
-    ends = [(r + 0.5) * h / nucleation_length for r, h in zip(reach, spacings, strict=True)]
-    with paper_style():
-        figure = new_figure(COLUMN * 1.2, 2.7)
-        axes = figure.subplots()
-        box = (-ends[0], ends[0], -ends[1], ends[1])
-        _image(figure, axes, near, box, "mean strength (MPa)")
-        axes.set_xlabel(r"$(x - x_{\mathrm{cr}})/h_n$")
-        axes.set_ylabel(r"$(y - y_{\mathrm{cr}})/h_n$")
+    exact = next(result for result in results.values() if has_maps(result))
+    x, y = problem.interface.lengths
+    ratio = maps.relative_height(problem.interface)
+    if x > WIDE * y:
+        heights = 0.9 * PAGE * ratio + 1.7, 2.0 * (0.44 * PAGE * ratio + 0.3) + 1.0
+        figure = new_figure(PAGE, sum(heights))
+        parts: Any = figure.subfigures(2, 1, height_ratios=heights)
+    else:
+        figure = new_figure(PAGE, 0.46 * PAGE * ratio + 1.7)
+        parts = figure.subfigures(1, 2, width_ratios=(1.0, 0.96))
+    axes = parts[0].subplots()
+    drawn = draw_plane_onset(axes, problem, tau_p, results)
+    parts[0].colorbar(drawn, ax=axes, label=r"strength $\tau_p$ (MPa)", **maps.BAR)
+    parts[0].legend(loc="outside lower center", ncols=1)
+    first = float(exact["first_instability"][0]) - float(np.mean(problem.load.initial_stress))
+    loads = first / float(np.mean(problem.load_profile)) * np.array(SHARES)
+    growth_figure(parts[1], problem, equilibrium_path(problem, tau_p, loads))
     return figure
+
+
+def growth_figure(figure: Figure | SubFigure, problem: Problem, path: xr.Dataset) -> None:
+    """Slip at several loads, a panel each, on one scale of colours.
+
+    Parameters
+    ----------
+    figure : Figure or SubFigure
+        An empty one to draw on.
+    problem : Problem
+        On a plane.
+    path : Dataset
+        From `equilibrium_path`; loads at which the interface slides are left out.
+    """
+    slip, loads = path["slip"].values, path["load"].values * MEGA
+    balanced = np.flatnonzero(~path["sliding"].values)
+    most = float(np.nanmax(slip[balanced])) if balanced.size else 0.0
+    columns = 2 if balanced.size > 1 else 1
+    rows = max(1, -(-balanced.size // columns))
+    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).reshape(-1)
+    for axes in panels[balanced.size :]:
+        axes.set_axis_off()
+    drawn = None
+    for axes, number in zip(panels, balanced, strict=False):
+        drawn = draw_slip(axes, problem.interface, slip[number], loads[number], most)
+        axes.label_outer()
+    if drawn is not None:
+        shares = (0.01, 0.1, 0.4, 1.0)
+        ticks = [0.0, *(float(f"{most * MICRO * share:.1g}") for share in shares)]
+        figure.colorbar(
+            drawn, ax=list(panels), label=r"slip ($\mu$m)", format="%g",
+            ticks=[tick for tick in ticks if tick <= most * MICRO], **maps.BAR,
+        )  # fmt: skip

@@ -2,77 +2,39 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, FigureBase
 
 from stiction._typing import Array
+from stiction.plot.plane_films import RATES, edges, fast, length_unit, rate_scale, unit_of
+from stiction.plot.style import ACCENT, INK, PAGE, new_figure, panel, paper_style, series
 from stiction.problem import Problem
-from stiction.report.film import write_film
-from stiction.report.style import ACCENT, INK, PAGE, QUIET, new_figure, panel, paper_style, series
 
-_RATES = "inferno_r"
 _STRENGTH = "Greys"
 _MEGA = 1e6
 _SNAPSHOTS = 6
 _CONTOURS = 10
-_DECADES = 4.0
-"""Of slip rate below the largest that are shown."""
-
-
-def _scale(values: Array, units: tuple[str, ...]) -> tuple[float, str]:
-    """Factor and name of the unit, thousands apart, in which the largest value is below 1000."""
-    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    factor, number = 1.0, 0
-    while largest * factor < 1.0 and number + 1 < len(units) and largest > 0.0:
-        factor, number = factor * 1e3, number + 1
-    return factor, units[number]
-
-
-def _length_unit(problem: Problem) -> tuple[float, str]:
-    if max(problem.interface.lengths) >= 1e3:
-        return 1e-3, "km"
-    return _scale(np.array(problem.interface.lengths), ("m", "mm", "µm"))
-
-
-def _box(problem: Problem, factor: float) -> tuple[float, float, float, float]:
-    """Edges of the cells around the nodes, in the unit of the axes."""
-    (dx, dy), (lx, ly) = problem.interface.spacings, problem.interface.lengths
-    return tuple(  # type: ignore[return-value]  # four by construction
-        factor * edge for edge in (-0.5 * dx, lx - 0.5 * dx, -0.5 * dy, ly - 0.5 * dy)
-    )
 
 
 def _finite(strength: Array) -> Array:
     return np.where(np.isfinite(strength), strength, np.nan)
 
 
-def _rate_scale(rate: Array) -> LogNorm:
-    top = max(float(rate.max()), 1e-12)
-    return LogNorm(top * 10.0**-_DECADES, top)
-
-
-def _fast(rate: Array, norm: LogNorm) -> Any:
-    """Slip rates as they are drawn: what sticks, or nearly so, stays white."""
-    return np.ma.masked_less(rate, norm.vmin or 0.0).T
-
-
 def _contours(figure: FigureBase, axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     """Strength in grey, and where the front is at equal intervals of time after the onset."""
-    factor, unit = _length_unit(problem)
+    factor, unit = length_unit(run)
     strength = _finite(run["peak_strength"].values) / _MEGA
     drawn = axes.imshow(
-        strength.T, origin="lower", extent=_box(problem, factor), cmap=_STRENGTH, aspect="equal"
+        strength.T, origin="lower", extent=edges(run, factor), cmap=_STRENGTH, aspect="equal"
     )
     figure.colorbar(drawn, ax=axes, label=r"$\tau_p$ (MPa)", shrink=0.8)
     since = run["arrival_time"].values - float(run["onset_time"])
-    scale, name = _scale(since, ("s", "ms", "µs"))
+    scale, name = unit_of(since, ("s", "ms", "µs"))
     x, y = (factor * place for place in problem.interface.coordinates.values())
     later = since[np.isfinite(since) & (since > 0.0)]
     if later.size and np.ptp(later) > 0.0:
@@ -100,12 +62,12 @@ def _moments(run: xr.Dataset) -> list[int]:
 
 def plane_rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
     """The front on the strength, the mean stress, and the slip rate at six moments."""
-    factor, unit = _length_unit(problem)
+    factor, unit = length_unit(run)
     times, onset = run["time"].values, float(run["onset_time"])
     shown = _moments(run)
     rate = run["slip_rate"].values[shown]
-    norm = _rate_scale(rate)
-    scale, name = _scale(times[shown] - onset, ("s", "ms", "µs"))
+    norm = rate_scale(rate)
+    scale, name = unit_of(times[shown] - onset, ("s", "ms", "µs"))
     with paper_style():
         figure = new_figure(PAGE, 5.6)
         parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
@@ -124,14 +86,14 @@ def plane_rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         below = list(lower.subplots(2, 3, sharex=True, sharey=True).ravel())
         for i, (axes, frame, values) in enumerate(zip(below, shown, rate, strict=True)):
             axes.imshow(
-                _fast(values, norm), origin="lower", norm=norm, cmap=_RATES,
-                extent=_box(problem, factor), aspect="equal",
+                fast(values, norm), origin="lower", norm=norm, cmap=RATES,
+                extent=edges(run, factor), aspect="equal",
             )  # fmt: skip
             axes.set_title(f"{scale * (times[frame] - onset):.3g} {name}", fontsize="medium")
             axes.set_xlabel(f"$x$ ({unit})" if i >= 3 else "")
             axes.set_ylabel(f"$y$ ({unit})" if i % 3 == 0 else "")
         lower.colorbar(
-            ScalarMappable(norm, _RATES), ax=below, label="slip rate (m/s)", extend="min",
+            ScalarMappable(norm, RATES), ax=below, label="slip rate (m/s)", extend="min",
             shrink=0.8,
         )  # fmt: skip
         for letter, axes in zip("abc", (front, load, below[0]), strict=True):
@@ -141,10 +103,10 @@ def plane_rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
 
 def plane_front_figure(run: xr.Dataset, problem: Problem) -> Figure:
     """Arrival and apparent speed of the front along x and y through the critical position."""
-    factor, unit = _length_unit(problem)
+    factor, unit = length_unit(run)
     interface, solid = problem.interface, problem.solid
     since = run["arrival_time"].values - float(run["onset_time"])
-    scale, name = _scale(since, ("s", "ms", "µs"))
+    scale, name = unit_of(since, ("s", "ms", "µs"))
     node = [
         round(float(at) / h) % n
         for at, h, n in zip(
@@ -181,45 +143,3 @@ def plane_front_figure(run: xr.Dataset, problem: Problem) -> Figure:
         panels[0, 0].set_ylabel(f"$t - T$ ({name})")
         panels[1, 0].set_ylabel("front speed (m/s)")
     return figure
-
-
-def plane_rupture_film(
-    run: xr.Dataset, problem: Problem, path: Path, *, pictures: int, rate: int
-) -> Path:
-    """A film of slip rate and shear stress side by side."""
-    factor, unit = _length_unit(problem)
-    times, onset = run["time"].values, float(run["onset_time"])
-    speeds, stress = run["slip_rate"].values, run["shear_stress"].values / _MEGA
-    norm = _rate_scale(speeds)
-    scale, name = _scale(times[times > onset] - onset, ("s", "ms", "µs"))
-    mean = run["mean_stress"].values / _MEGA
-    low, high = np.quantile(stress, [0.001, 0.999])
-    with paper_style():
-        figure = new_figure(PAGE * 1.15, 3.4)
-        panels = figure.subplots(1, 2, sharey=True)
-        box = _box(problem, factor)
-        left = panels[0].imshow(
-            _fast(speeds[0], norm), origin="lower", norm=norm, cmap=_RATES, extent=box
-        )
-        right = panels[1].imshow(
-            stress[0].T, origin="lower", vmin=low, vmax=high, cmap="cividis", extent=box
-        )
-        for axes, image, label in (
-            (panels[0], left, "slip rate (m/s)"),
-            (panels[1], right, "shear stress (MPa)"),
-        ):
-            figure.colorbar(image, ax=axes, label=label, location="bottom", shrink=0.9)
-            axes.set_xlabel(f"$x$ ({unit})")
-        panels[0].set_ylabel(f"$y$ ({unit})")
-        clock = panels[0].text(0.0, 1.04, " ", transform=panels[0].transAxes, color=QUIET)
-
-        def show(i: int) -> None:
-            left.set_data(_fast(speeds[i], norm))
-            right.set_data(stress[i].T)
-            clock.set_text(
-                f"$t - T$ = {scale * (times[i] - onset):,.1f} {name},  "
-                rf"$\langle\tau\rangle$ = {mean[i]:.3f} MPa"
-            )
-
-        moving: list[Any] = [left, right, clock]
-        return write_film(path, figure, moving, show, times.size, pictures=pictures, rate=rate)

@@ -16,8 +16,8 @@ import xarray as xr
 from stiction import __version__
 from stiction.ensemble.files import write_whole
 from stiction.errors import InputError
+from stiction.plot.style import paper_style
 from stiction.report.run_figures import run_figures
-from stiction.report.style import paper_style
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean, standard_deviation
 from stiction.statistics.quantiles import quantiles

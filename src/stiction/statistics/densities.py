@@ -12,7 +12,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from stiction._brief import brief
+from stiction._brief import brief, brief_html
 from stiction._checks import is_real
 from stiction._jit import jit
 from stiction._model import describe
@@ -47,6 +47,7 @@ class Density:
     bandwidth: float
 
     __repr__ = brief
+    _repr_html_ = brief_html
 
 
 @jit

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import simpson
 
+from stiction._brief import brief_html
 from stiction._checks import check_flag, check_instance
 from stiction.criterion.assumptions import check_law
 from stiction.criterion.eigenproblem import Weight
@@ -35,16 +36,22 @@ class NucleationStatistics:
 
     Attributes
     ----------
-    mean, variance : float
-        E[tau_n] in Pa, Var[tau_n] in Pa^2.
-    strength_mean, strength_variance : float
-        E[tau_p] in Pa, Var[tau_p] in Pa^2.
+    mean : float
+        E[tau_n], Pa.
+    variance : float
+        Var[tau_n], Pa^2.
+    strength_mean : float
+        E[tau_p], Pa.
+    strength_variance : float
+        Var[tau_p], Pa^2.
     """
 
     mean: float
     variance: float
     strength_mean: float
     strength_variance: float
+
+    _repr_html_ = brief_html
 
     @property
     def standard_deviation(self) -> float:
@@ -80,6 +87,8 @@ class NucleationLimits:
     long_stress_fixed_length : str
         The same for L fixed.
     """
+
+    _repr_html_ = brief_html
 
     short_slope: float
     short_stress: float

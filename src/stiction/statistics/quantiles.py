@@ -9,7 +9,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from stiction._brief import brief
+from stiction._brief import brief, brief_html
 from stiction._checks import is_real, numbers
 from stiction._model import describe
 from stiction.errors import InputError
@@ -41,6 +41,7 @@ class Quantiles:
     confidence: float
 
     __repr__ = brief
+    _repr_html_ = brief_html
 
 
 def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Quantiles:

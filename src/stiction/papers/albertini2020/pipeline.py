@@ -22,8 +22,8 @@ from stiction.papers.albertini2020.results import write_results
 from stiction.papers.albertini2020.setting import Setting
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.summary import assemble, claims_table
+from stiction.plot.style import paper_style
 from stiction.report.page import ShownFigure
-from stiction.report.style import paper_style
 
 QUICK = 500
 FEWEST = 64

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.studies.driving import cases, curve, problem_of
-from stiction.report.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel, series
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel, series
 from stiction.report.tables import Table
 
 name = "driving"

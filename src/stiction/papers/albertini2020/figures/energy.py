@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import release_rate, toughest
-from stiction.report.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel, series
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel, series
 from stiction.report.tables import Table
 
 name = "energy"

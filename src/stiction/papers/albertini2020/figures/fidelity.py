@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import fidelity
-from stiction.report.style import PAGE, PALE, QUIET, color, marker, new_figure, panel, series
+from stiction.plot.style import PAGE, PALE, QUIET, color, marker, new_figure, panel, series
 from stiction.report.tables import Table
 from stiction.statistics.control_variates import combined_mean, combined_quantiles
 from stiction.statistics.densities import density

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
-from stiction.report.style import PAGE, color, new_figure, panel, series
+from stiction.plot.style import PAGE, color, new_figure, panel, series
 from stiction.report.tables import Table
 
 name = "growth"

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import misplaced, overprediction
-from stiction.report.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel, series
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel, series
 from stiction.report.tables import Table
 from stiction.statistics.densities import density
 from stiction.statistics.estimates import mean, share, standard_deviation

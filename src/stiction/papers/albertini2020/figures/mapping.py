@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 from stiction.papers.albertini2020.data import Data
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel
 from stiction.random.marginals import quantile_of_normal
-from stiction.report.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel
 from stiction.report.tables import Table
 
 name = "mapping"

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
-from stiction.report.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, new_figure, panel
 from stiction.report.tables import Table
 
 name = "mechanism"

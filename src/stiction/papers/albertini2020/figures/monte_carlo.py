@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
-from stiction.report.style import INK, PAGE, PALE, QUIET, new_figure, panel, series
+from stiction.plot.style import INK, PAGE, PALE, QUIET, new_figure, panel, series
 from stiction.report.tables import Table
 from stiction.statistics.densities import Density, density, density_of_counts
 from stiction.statistics.quantiles import quantiles

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import displaced, shift_of
-from stiction.report.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, marker, new_figure, panel
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean
 

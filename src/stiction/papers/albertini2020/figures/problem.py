@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
 from stiction.papers.albertini2020.data import Data
-from stiction.report.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, panel, series
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, panel, series
 from stiction.report.tables import Table
 
 name = "problem"

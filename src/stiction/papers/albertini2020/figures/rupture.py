@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from stiction._typing import Array
 from stiction.papers.albertini2020.data import Data
-from stiction.report.style import ACCENT, INK, PAGE, new_figure, panel
+from stiction.plot.style import ACCENT, INK, PAGE, new_figure, panel
 from stiction.report.tables import Table
 
 name = "rupture"

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.studies.sequence import FACTOR
-from stiction.report.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel, series
+from stiction.plot.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel, series
 from stiction.report.tables import Table
 from stiction.statistics.estimates import share
 

@@ -11,7 +11,7 @@ from stiction.papers.albertini2020.claims.size import QUOTED_VARIATION
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import required_width
 from stiction.papers.albertini2020.studies.summary import estimates
-from stiction.report.style import INK, PAGE, PALE, QUIET, color, new_figure, panel, series
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, new_figure, panel, series
 from stiction.report.tables import Table
 
 name = "size"

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import dynamic_mean
-from stiction.report.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel
+from stiction.plot.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean
 from stiction.statistics.quantiles import quantiles

@@ -34,8 +34,7 @@ _SERIES: tuple[tuple[str, Any, str], ...] = (
 )
 
 _RC: dict[str, Any] = {
-    "font.family": "serif",
-    "font.serif": ["STIXGeneral", "DejaVu Serif"],
+    "font.family": ["STIXGeneral", "DejaVu Serif"],  # by name: "serif" is looked up when drawn
     "mathtext.fontset": "stix",
     "font.size": 8.5,
     "axes.labelsize": 9.0,

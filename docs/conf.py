@@ -1,0 +1,186 @@
+"""How the documentation is built: `python -m sphinx -W --keep-going docs build/docs`."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import typer.main
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+# Notebooks show figures by a backend of their own, which this would switch off.
+os.environ.pop("MPLBACKEND", None)
+sys.path.insert(0, str(HERE / "_extensions"))
+
+import stiction  # noqa: E402  # after the environment is set
+from stiction.cli.app import app as commands  # noqa: E402
+
+META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+URLS = META.get("urls", {})
+
+project = "stiction"
+author = "The Stiction developers"
+copyright = "2026, The Stiction developers"
+version = release = stiction.__version__
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "mathml",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["README.md", "_build", "**/GALLERY_HEADER.rst", "**/*.ipynb", "gallery/*"]
+# Times of the gallery's scripts: a page whose tables come from elsewhere.
+exclude_patterns += ["**/sg_execution_times.rst", "sg_execution_times.rst"]
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb"}
+default_role = "py:obj"
+suppress_warnings = ["config.cache"]  # a function in the configuration of the gallery
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "build" / "notebooks")
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+nb_output_stderr = "remove"  # compilation and progress
+
+numpydoc_show_class_members = False
+autosummary_generate = True
+autodoc_typehints = "none"  # the docstrings say types with shapes and units
+templates_path = ["_templates"]
+
+# The how-tos that README.md lists, with what the gallery wants of a script: a title that is marked.
+HOW_TOS = re.findall(r"examples/(\w+)\.py\)? \|", (HERE / "README.md").read_text("utf-8"))
+SCRIPTS = ROOT / "build" / "how-to"
+sphinx_gallery_conf = {
+    "examples_dirs": [str(SCRIPTS), "gallery"],
+    "gallery_dirs": ["how-to", "pictures"],
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "show_memory": False,
+    "capture_repr": (),
+    "abort_on_example_error": True,
+}
+
+
+def mark_titles():
+    """Copy the how-tos to `SCRIPTS`, unchanged ones untouched so that they are not run again."""
+    SCRIPTS.mkdir(parents=True, exist_ok=True)
+    texts = {
+        "GALLERY_HEADER.rst": "How-tos\n=======\n\nEach is a script of some twenty-five lines with a"
+        " question, a printed answer and a picture, all made when\nthese pages are built.\n"
+    }
+    for name in HOW_TOS:
+        text = (ROOT / "examples" / f"{name}.py").read_text("utf-8")
+        title, _, rest = text.removeprefix('"""').partition("\n")
+        texts[f"{name}.py"] = f'"""\n{title}\n{"=" * len(title)}\n{rest}'
+    for path in SCRIPTS.glob("*.py"):
+        if path.name not in texts:
+            path.unlink()
+    for name, text in texts.items():
+        path = SCRIPTS / name
+        if not path.exists() or path.read_text("utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+mark_titles()
+
+html_math_renderer = "mathml"
+html_theme = "pydata_sphinx_theme"
+html_title = f"stiction {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_theme_options = {
+    "logo": {"text": "stiction"},
+    "icon_links": [
+        {"name": "Source", "url": URLS[name], "icon": "fa-solid fa-code"}
+        for name in ("Repository",)
+        if name in URLS
+    ],
+    "navbar_align": "left",
+    "header_links_before_dropdown": 6,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_context = {"default_mode": "auto"}
+
+
+SECTIONS = ("start", "use", "understand", "evidence", "reference")
+
+
+def other_pages(app, docname, source):
+    """Put pages that no section names where they probably belong: none is ever lost."""
+    if docname not in ("start", "understand"):
+        return
+    named = set()
+    for section in SECTIONS:
+        text = (HERE / f"{section}.md").read_text("utf-8")
+        named |= set(re.findall(r"^([\w/-]+)$", text, flags=re.MULTILINE))
+    folders = "", "notebooks/", "tutorials/"
+    there = {f"{one}{path.stem}" for one in folders for path in (HERE / one).glob("*.md")}
+    rest = sorted(there - named - {"index", "README", *SECTIONS})
+    lessons = [name for name in rest if "tutorial" in name or "/" in name]
+    mine = lessons if docname == "start" else [name for name in rest if name not in lessons]
+    source[0] = source[0].replace("@other pages@", "\n".join(mine))
+
+
+def plain_text(app, what, name, obj, options, lines):
+    """Docstrings are read in terminals too: |k| and (*shape) have no meaning for Sphinx."""
+    code = False
+    for number, line in enumerate(lines):
+        if line.strip():
+            code = line.startswith(">>>") or (code and line.startswith(" "))
+        if not code:
+            parts = re.split(r"(``.*?``|`.*?`)", line)
+            parts[::2] = [
+                re.sub(r"(?<!\\)\||(?<=[( ])\*(?=\w+[,)])", r"\\\g<0>", part) for part in parts[::2]
+            ]
+            lines[number] = "".join(parts)
+
+
+def write_if_new(path, text):
+    """Unchanged, a page is not built again."""
+    if not path.exists() or path.read_text("utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def write_other_names(app):
+    """A page with the public names that api/index.rst does not list: none is ever lost."""
+    index = (HERE / "api" / "index.rst").read_text("utf-8")
+    listed = set(re.findall(r"^   (\w+)$", index, flags=re.MULTILINE))
+    modules = {"paper", "plot", "__version__"}
+    rest = sorted(set(stiction.__all__) - listed - modules)
+    title = "More names\n==========\n"
+    table = ".. currentmodule:: stiction\n\n.. autosummary::\n   :toctree: generated\n   :nosignatures:\n"
+    body = "\n".join([table, *(f"   {name}" for name in rest)]) if rest else "There are none."
+    write_if_new(HERE / "api" / "others.rst", f"{title}\n{body}\n")
+
+
+def write_commands(app):
+    """The page of commands, from the commands."""
+    group = typer.main.get_command(commands)
+    head = "What each says with `--help`. In study files and in Python the names are the same."
+    parts = [f"# Commands\n\n{head}\n"]
+    context = click.Context(group, info_name="stiction")
+    for name, command in sorted(group.commands.items()):
+        inner = click.Context(command, info_name=name, parent=context, terminal_width=90)
+        parts.append(f"## `stiction {name}`\n\n```text\n{command.get_help(inner)}\n```\n")
+    write_if_new(HERE / "api" / "commands.md", "\n".join(parts))
+
+
+def setup(app):
+    app.connect("source-read", other_pages)
+    app.connect("autodoc-process-docstring", plain_text, priority=900)
+    app.connect("builder-inited", write_commands, priority=1)
+    app.connect("builder-inited", write_other_names, priority=1)  # before autosummary looks

@@ -1,0 +1,25 @@
+"""
+Failure probability over decades
+================================
+
+The probability that the interface slides below a stress, by subset simulation, with plain Monte
+Carlo and Rice's formula beside it; and what failing interfaces have in common.
+"""
+
+import stiction as st
+
+problem = st.paper.problem(nodes=512)
+strength = st.paper.strength(problem, correlation_ratio=1.0)
+curve = st.failure_curve(problem, strength, method=st.LocalCriterion(), smallest=1e-6)
+st.plot.failure_curve(curve)
+
+# %%
+# Against the stress above the least strength the tail is a straight line:
+
+st.plot.failure_curve(curve, above_bound=True)
+
+# %%
+# Weak interfaces, each moved so that it begins to slide in the middle:
+
+found = st.failure_probability(problem, strength, stress=0.67e6, method=st.LocalCriterion())
+st.plot.weak_spots(found)

@@ -1,0 +1,23 @@
+"""
+Strength along an interface
+===========================
+
+Profiles of a random field at two correlation lengths: the same draws, another spectrum. Where the
+problem has a normal pressure, friction coefficients stand beside the stresses.
+"""
+
+import matplotlib.pyplot as plt
+
+import stiction as st
+
+plain = st.paper.problem(nodes=1024)
+problem = st.Problem(
+    plain.solid, plain.interface, plain.friction, st.Load(normal_pressure=5e6)
+)
+with st.plot.paper_style():
+    figure, panels = plt.subplots(2, 1, figsize=(6.75, 4), sharex=True)
+for axes, ratio in zip(panels, (0.25, 2.0), strict=True):
+    strength = st.paper.strength(problem, correlation_ratio=ratio)
+    tau_p = strength.sample(problem.interface, seed=3)
+    st.plot.nucleation_stress(problem, tau_p, ax=axes)
+    axes.set_title(rf"$\xi_0/h_n$ = {ratio:g}")

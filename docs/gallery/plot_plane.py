@@ -1,0 +1,28 @@
+"""
+Onset on a plane
+================
+
+A strength on a plane, the critical ellipse of the local criterion, and what slips at the exact
+onset.
+"""
+
+import stiction as st
+
+problem = st.Problem(
+    solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    interface=st.Interface(length=(0.02, 0.01), nodes=(128, 64)),
+    friction=st.SlipWeakening(weakening_rate=0.5e12),
+)
+strength = st.RandomField(
+    marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    spectrum=st.PowerLawSpectrum(correlation_length=3e-3),
+)
+tau_p = strength.sample(problem.interface, seed=0)
+local = st.onset(problem, tau_p, method=st.LocalCriterion())
+st.plot.onset(local, tau_p)
+
+# %%
+# With the maps of `Equilibrium` the picture shows what slips.
+
+exact = st.onset(problem, tau_p, method=st.Equilibrium(slip=True, sensitivity=True))
+st.plot.onset([local, exact], tau_p)

@@ -1,0 +1,30 @@
+"""
+A rupture
+=========
+
+Slip rate in space and time, the speed of the front, and a film as a file.
+"""
+
+import tempfile
+from pathlib import Path
+
+import stiction as st
+
+problem = st.paper.problem(nodes=512)
+tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
+run = st.simulate_rupture(problem, tau_p, method=st.Rupture(loading_rate=2e7), every=4)
+st.plot.rupture(run)
+
+# %%
+# The whole run, most of it creep:
+
+st.plot.rupture(run, whole=True)
+
+# %%
+
+st.plot.front(run)
+
+# %%
+
+film = st.plot.film(run, Path(tempfile.mkdtemp()) / "rupture.gif", pictures=10)
+print(film.stat().st_size // 1000, "kB")
