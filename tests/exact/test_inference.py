@@ -154,7 +154,15 @@ def log_densities_at(samples, points, error=0.0, bound=-np.inf):
     out = np.empty((1, points.size))
     one = np.ones(1)
     log_likelihoods(
-        np.zeros((1, 1), dtype=np.int64), one[:, None], 0.0 * one, one, error, found, points, out
+        np.zeros((1, 1), dtype=np.int64),
+        one[:, None],
+        0.0 * one,
+        one,
+        error,
+        found,
+        points,
+        -np.inf,
+        out,
     )
     return out[0]
 

@@ -14,6 +14,7 @@ import typer
 
 from stiction import __version__
 from stiction.cli.common import echo
+from stiction.cli.infer import infer
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
@@ -67,6 +68,7 @@ for command in (
     onset,
     rupture,
     reliability,
+    infer,
     check,
     schema,
     status,

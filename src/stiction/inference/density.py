@@ -30,7 +30,9 @@ REACH = 10.0
 STEP = 0.05
 LARGE = 0.6
 """Load-cell error over the spread of the onset from which on it is not small."""
-_ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
+MODE = 1.0
+"""Logarithm of the density of no standardised onset is above this: of a normal one it is -0.9."""
+_ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 
@@ -160,12 +162,14 @@ def log_likelihoods(
     error: float,
     densities: Densities,
     peaks: Array,
+    floor: float,
     out: Array,
 ) -> None:
     """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
 
     Bound, mean and spread are linear between nodes, and so is the logarithm of the standardised
-    density.
+    density. A point whose sum would fall below `floor` even if all peaks to come were at the mode
+    is given up, and the rest of its row is -inf.
     """
     for i in range(index.shape[0]):
         near, share = index[i], weight[i]
@@ -175,7 +179,12 @@ def log_likelihoods(
         own = error / stretch[i]
         typical = spread * math.exp(mean) if bounded else spread
         large = own > LARGE * typical
+        at_mode = MODE - math.log(stretch[i] * math.hypot(typical, own))
+        hopeless, so_far = False, 0.0
         for j in range(peaks.size):
+            if hopeless:
+                out[i, j] = -np.inf
+                continue
             y = (peaks[j] - shift[i]) / stretch[i]
             top, total = -np.inf, 0.0
             count = COARSE if large else (_ABSCISSAE.size if own > 0.0 else 1)
@@ -201,3 +210,5 @@ def log_likelihoods(
                 elif value > -np.inf:
                     total += math.exp(value - top)
             out[i, j] = (top + math.log(total) if total > 0.0 else -np.inf) - math.log(stretch[i])
+            so_far += out[i, j]
+            hopeless = so_far + (peaks.size - 1 - j) * at_mode < floor
