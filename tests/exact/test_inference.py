@@ -227,6 +227,19 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
         np.testing.assert_allclose(found[likely], exact[likely], atol=0.03)
 
 
+def test_points_that_are_given_up_are_hopeless():
+    prior = make_prior(PROBLEM, STRENGTH, THREE)
+    likelihood = make_likelihood(model_of(prior), [1e6 * np.linspace(0.68, 0.74, 9)], [None])
+    u = np.random.default_rng(0).random((3000, 3))
+    whole = likelihood(u)
+    floor = whole.max() - 40.0
+    quick = likelihood(u, floor)
+    kept = np.isfinite(quick)
+    assert (~kept & np.isfinite(whole)).sum() > 1000
+    np.testing.assert_array_equal(quick[kept], whole[kept])
+    assert whole[~kept].max() < floor
+
+
 def test_grid_against_a_sum_by_hand():
     """One shift, likelihood known on a fine grid: evidence, information and quantiles."""
     prior = make_prior(PROBLEM, STRENGTH, {"marginal.low": (0.5e6, 0.8e6)})
