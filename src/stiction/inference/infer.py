@@ -227,6 +227,7 @@ def _posterior(
     prior = model.prior
     diagnostics: dict[str, float] = {}
     total = evidence = float("nan")
+    meter.stage("posterior")
     if sampler == "grid":
         grid = on_grid(likelihood, meter)
         u = grid.draws(DRAWS, seed)[None]
