@@ -25,7 +25,7 @@ from stiction.inference.prior import make_prior
 DRAWS, BINS, TESTS = 99, 10, 25
 ERROR = 5e3
 """Standard deviation of the load cell, Pa."""
-POINTS = 40**3
+POINTS = 30**3
 
 
 def setting(nodes=256):
@@ -72,7 +72,7 @@ def coverage(own, confidence=0.9):
     return float(np.mean((own >= tail) & (own < DRAWS + 1 - tail)))
 
 
-def main(folder=".", campaigns=200):
+def main(folder=".", campaigns=100):
     """Print p-values and coverage, and draw the ranks."""
     warnings.simplefilter("ignore", st.AccuracyWarning)
     names, found, *_ = ranks(int(campaigns))

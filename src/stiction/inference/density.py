@@ -7,7 +7,8 @@ onset itself where there is no bound (Wand, Marron and Ruppert, 1991). Their wid
 (1986, section 3.4.2), and what it adds to the variance is taken from the sample (section 6.1.2).
 Densities are tabulated in units in which v has mean 0 and variance 1, where they hardly change from
 node to node. The error of the load cell is integrated: by Gauss and Hermite's rule where it is
-small against the spread of the onset, over the onset's distribution where it is not.
+small against the spread of the onset, Legendre's between the bound and where the error ends where
+it reaches the bound, and over the onset's distribution where it is large.
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ MODE = 1.0
 """Logarithm of the density of no standardised onset is above this: of a normal one it is -0.9."""
 _ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_PLACES, _PARTS = np.polynomial.legendre.leggauss(16)
+NEAR = 4.5
+"""Standard deviations of the load cell that matter; nearer to the bound, the rule is Legendre's."""
 
 
 class Densities(NamedTuple):
@@ -187,7 +191,13 @@ def log_likelihoods(
                 continue
             y = (peaks[j] - shift[i]) / stretch[i]
             top, total = -np.inf, 0.0
-            count = COARSE if large else (_ABSCISSAE.size if own > 0.0 else 1)
+            near_bound = bounded and own > 0.0 and y - NEAR * own < bound and not large
+            width = max(y, bound) + NEAR * own - bound
+            count = _ABSCISSAE.size if own > 0.0 else 1
+            if large:
+                count = COARSE
+            elif near_bound:
+                count = _PLACES.size
             for k in range(count):
                 if large:
                     z = _blend(densities.groups[:, k], near, share)
@@ -196,13 +206,19 @@ def log_likelihoods(
                     mass = _blend(densities.shares[:, k], near, share)
                     value = math.log(mass / (own * math.sqrt(2.0 * math.pi))) - 0.5 * away * away
                 else:
-                    x = y if own == 0.0 else y - own * _ABSCISSAE[k]
+                    x = y if own == 0.0 else y - own * _ABSCISSAE[k % _ABSCISSAE.size]
+                    if near_bound:
+                        x = bound + 0.5 * width * (1.0 + _PLACES[k])
                     if bounded and x <= bound:
                         continue
                     v = math.log(x - bound) if bounded else x
                     value = _interpolated(densities.table, near, share, (v - mean) / spread)
                     value -= math.log(spread) + (v if bounded else 0.0)
-                    if own > 0.0:
+                    if near_bound:
+                        away = (y - x) / own
+                        part = 0.5 * width * _PARTS[k] / (own * math.sqrt(2.0 * math.pi))
+                        value += math.log(part) - 0.5 * away * away
+                    elif own > 0.0:
                         value += math.log(_WEIGHTS[k])
                 if value > top:
                     total = total * math.exp(top - value) + 1.0
