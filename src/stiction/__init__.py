@@ -39,6 +39,8 @@ _HOMES = {
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",
     "open_rupture": "dynamics.stream",
+    "misfit": "dynamics.misfit",
+    "RuptureMisfit": "dynamics.compared",
     "read_profile": "profiles",
     "onset": "evaluation",
     "monte_carlo": "ensemble.monte_carlo",
