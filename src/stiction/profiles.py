@@ -22,6 +22,7 @@ from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
 from stiction.profile_text import Table, read_table
+from stiction.topographies import is_topography, mapped
 from stiction.units import factor_to, parse
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ UNITS = {
     "fracture_energy": "J/m2",
     "load_profile": "1",
     "slip": "m",
+    "friction_coefficient": "1",
 }
 """What can be a profile, and its SI unit."""
 
@@ -52,6 +54,7 @@ _NAMES = {
     "fracture_energy": ("gamma",),
     "load_profile": ("profile", "load"),
     "slip": ("d", "delta"),
+    "friction_coefficient": ("mu", "coefficient"),
 }
 _PLACES = ("x", "position", "pos", "distance", "coordinate")
 _SAMPLES = ("sample", "samples", "kept_sample")
@@ -110,7 +113,8 @@ def read_profile(
     source : path, xarray.DataArray or xarray.Dataset
         ``.npy``: shape (nodes,), or columns. ``.csv``, ``.txt``, ``.dat``, ``.tsv``: columns
         separated by semicolons, tabs, commas or blanks, with or without a line of names, such as
-        ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate.
+        ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. Also a
+        line scan or map of the SurfaceTopography library, with `strength`.
     x, value : str or int, optional
         Name or number (from 0) of the column, coordinate or variable. Without them: the columns
         that are called so (``x``, ``position``; ``strength``, ``tau_p``), the only variable whose
@@ -120,7 +124,7 @@ def read_profile(
         that contradicts the source is refused.
     quantity : str
         What it is: 'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
-        'weakening_rate' (Pa/m), 'critical_slip' (m) or 'load_profile' (1).
+        'weakening_rate' (Pa/m), 'critical_slip' (m), 'load_profile' or 'friction_coefficient' (1).
     strength : callable, optional
         Map from another measured quantity, such as heights in SI units, to the strength in Pa;
         nothing is taken for a strength without one.
@@ -162,6 +166,13 @@ def read_profile(
         raise InputError(f"interface: must be an Interface, got {describe(interface)}")
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
+    if is_topography(source):
+        try:
+            source, strength = mapped(source, strength, quantity, UNITS[quantity]), None
+        except InputError as error:
+            raise InputError([_prefixed(name, text) for text in error.problems]) from None
+        if interface is None:
+            return source
     if interface is not None and interface.is_plane:
         return _of_plane(name, source, quantity, interface, value, unit, (x, x_unit, strength))
     try:
