@@ -18,6 +18,7 @@ from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.plane_gaps import close_gaps
 from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
@@ -131,7 +132,8 @@ def read_profile(
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
         in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
-        shape (nx, ny), or from ``.nc`` or labelled arrays over 'x' and 'y'.
+        shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y', or text with the columns x, y
+        and value in any order of lines.
     interpolate : bool
         Whether points may lie elsewhere than the nodes; then linearly between them.
     gaps : {"refuse", "fill", "skip"}
@@ -174,7 +176,8 @@ def read_profile(
         if interface is None:
             return source
     if interface is not None and interface.is_plane:
-        return _of_plane(name, source, quantity, interface, value, unit, (x, x_unit, strength))
+        others = (x, x_unit, strength)
+        return _of_plane(name, source, quantity, interface, value, unit, others, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
@@ -206,6 +209,7 @@ def _of_plane(
     value: Any,
     unit: str | None,
     others: tuple[Any, ...],
+    gaps: Gaps,
 ) -> xr.DataArray:
     """`read_profile` of a plane, which takes values at the nodes only."""
     import xarray as xr
@@ -222,12 +226,15 @@ def _of_plane(
         values = read(given, quantity, UNITS[quantity], interface, value, unit)
         if values.shape != interface.shape:
             raise InputError(f"must hold one profile, got shape {values.shape}")
+        values, measured = close_gaps(values, interface, gaps)
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
-    coords = {
+    coords: dict[str, Any] = {
         dim: (dim, place, {"units": "m", "long_name": f"position along {dim}"})
         for dim, place in interface.coordinates.items()
     }
+    if measured is not None:
+        coords[MEASURED] = (interface.dims, measured, {"long_name": "measured, not filled in"})
     attributes = {"units": UNITS[quantity], "long_name": quantity.replace("_", " ")}
     return xr.DataArray(values, dims=interface.dims, coords=coords, name=quantity, attrs=attributes)
 
@@ -514,6 +521,14 @@ def _magnitude(value: Any, si: str) -> Any:
     return value
 
 
+def _and_own_gaps(measured: Any, source: Any) -> Any:
+    """Where a map was measured, those that were filled earlier taken into account."""
+    if MEASURED not in getattr(source, "coords", {}):
+        return measured
+    own = source.coords[MEASURED].transpose("x", "y").values.astype(bool)
+    return own if measured is None else measured & own
+
+
 def at_nodes(
     name: str, value: Any, quantity: str, interface: Interface, gaps: Gaps = "refuse"
 ) -> AtNodes:
@@ -524,7 +539,11 @@ def at_nodes(
     try:
         value = simplified(value, quantity)
         if is_labelled(value) and interface.is_plane:
-            return AtNodes(on_plane(value, quantity, UNITS[quantity], interface), None)
+            found = on_plane(value, quantity, UNITS[quantity], interface)
+            if found.shape[-2:] != interface.shape:
+                return AtNodes(found, None)
+            filled = close_gaps(found, interface, gaps)
+            return AtNodes(filled.values, _and_own_gaps(filled.measured, value))
         if is_labelled(value):
             points = labelled(value, quantity)
             if points.x is None and points.values.shape[1:] == (1,):  # one value a sample
@@ -534,6 +553,8 @@ def at_nodes(
             return points.on(interface, interpolate=False, gaps=gaps)
         if gaps != "refuse":
             array = real_array(value)
+            if interface.is_plane and array.shape[-2:] == interface.shape:
+                return close_gaps(array, interface, gaps)
             if array.shape[-1:] == (interface.size,) and np.isnan(array).any():
                 return in_order(array, interface, gaps)
     except TypeError:
