@@ -60,7 +60,8 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < scope["found"].probability < 0.5
     assert 1.0 < scope["design"].safety_factor < 3.0
-    (command,) = [b for b in re.findall(r"^```\n(.*?)^```", (ROOT / page).read_text(), re.M | re.S)]
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", (ROOT / page).read_text("utf-8"), re.M | re.S)
+    (command,) = (text for language, text in fenced if not language)
     arguments = command.replace("--bootstrap 200", "--bootstrap 20").split()
     assert arguments[0] == "stiction"
     result = CliRunner().invoke(app, arguments[1:], catch_exceptions=False)
