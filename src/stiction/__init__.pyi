@@ -94,6 +94,7 @@ from stiction.reliability.estimate import failure_probability as failure_probabi
 from stiction.reliability.limit_state import limit_state as limit_state
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
+from stiction.statistics.control_variates import combined_mean as combined_mean
 from stiction.statistics.densities import density as density
 from stiction.statistics.moments import (
     nucleation_limits as nucleation_limits,
