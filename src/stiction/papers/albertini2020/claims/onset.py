@@ -7,13 +7,12 @@ from scipy.stats import ks_2samp, kstest
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import at_each, labelled, pairs
 from stiction.papers.albertini2020.claims.rules import (
     Above,
-    All,
     Below,
     Chance,
-    Construction,
     Falling,
     Rising,
     Verdict,

@@ -9,16 +9,9 @@ import numpy as np
 from stiction.criterion.eigenproblem import eigenvalues_and_vector, rounded_weight
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import at_each, labelled, one, pairs
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    All,
-    Below,
-    Construction,
-    Graded,
-    Printed,
-    Within,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Graded, Printed, Within
 from stiction.papers.albertini2020.data import Data
 from stiction.statistics.estimates import Estimate, mean, standard_deviation
 
