@@ -1,4 +1,4 @@
-"""Rules made of rules: several at once, under several readings, softly; and what is not to be found."""
+"""Rules made of rules: several at once, under each reading of the text, softly."""
 
 from __future__ import annotations
 
