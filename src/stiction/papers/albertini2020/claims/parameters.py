@@ -207,7 +207,9 @@ def correlation_length(data: Data) -> Measured:
     where="Sec. 5.1, Eq. 14",
     says="The fracture energy varies with (tau_p - tau_r)^2: stronger places dissipate more.",
     needs=("griffith",),
-    rule=Construction("W and tau_r are uniform, so that Gamma is a rising function of tau_p"),
+    rule=Construction(
+        "weakening rate and residual strength are uniform, so that a stronger place dissipates more"
+    ),
 )
 def fracture_energy_varies(data: Data) -> Measured:
     """Mean and spread of Gamma(x)."""
