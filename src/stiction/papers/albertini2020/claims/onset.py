@@ -281,7 +281,7 @@ def weakest_does_not_govern(data: Data) -> Measured:
     where="Sec. 3.1",
     says="The critical stress is not reached when the first point begins to slip.",
     needs=("monte_carlo",),
-    rule=Construction("an average of the strength over h_n cannot be below its minimum"),
+    rule=Construction("an average of the strength over a length cannot be below its minimum"),
 )
 def above_first_slip(data: Data) -> Measured:
     """tau_cr above the weakest strength of the same sample, mean over <tau_p>."""
