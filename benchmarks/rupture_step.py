@@ -84,13 +84,14 @@ def pass_time(nodes: int) -> float:
     from stiction.dynamics.memory_layout import advance_memory
 
     run, state = prepared(nodes)
-    pairs = run.medium.kernel.poles.size
+    pairs = run.medium.grid.poles.size
+    run.advance(state, 1)
     rate = np.zeros_like(state.carried)
     times = []
     for _ in range(REPEATS):
         start = time.process_time()
         for _ in range(500):
-            advance_memory(state.memory, run.medium.table, rate, state.carried, pairs)
+            advance_memory(state.memory, run.tables.table, rate, state.carried, pairs, 1)
         times.append((time.process_time() - start) / 500)
     return 1e6 * statistics.median(times)
 
@@ -100,14 +101,14 @@ def convolution_time(nodes: int, history: int) -> float:
     run, _ = prepared(nodes)
     medium = run.medium
     arcs = arc_quadrature("II", np.sqrt(2.0 / (1.0 - 0.33)))
-    z = np.multiply.outer(arcs[0], medium.pace * medium.step)
+    z = np.multiply.outer(arcs[0], medium.grid.pace * medium.step)
     first = arcs[1][:, None] * medium.step * phi(z)
     decay = np.exp(z)
-    weights = np.empty((history, medium.pace.size))
+    weights = np.empty((history, medium.grid.pace.size))
     for m in range(history):
         weights[m] = first.sum(axis=0).real
         first *= decay
-    past = np.zeros((history, medium.pace.size), dtype=complex)
+    past = np.zeros((history, medium.grid.pace.size), dtype=complex)
     values = np.zeros(nodes)
     times = []
     for _ in range(REPEATS):
@@ -136,6 +137,7 @@ def main() -> None:
     early, late = step_time(1024, before=100), step_time(1024, before=1_000_000)
     print(f"1024 nodes: {early:.1f} us after 100 steps, {late:.1f} us after 1,000,000")
     run, state = prepared(1024)
+    run.advance(state, 1)
     arrays = [
         state.slip,
         state.rate,
@@ -144,10 +146,9 @@ def main() -> None:
         state.memory,
         state.carried,
         state.arrival,
-        run.medium.table,
-        run.medium.gain,
-        run.medium.stiffness,
-        run.rows,
+        run.medium.grid.stiffness,
+        *run.setting.nodes,
+        *run.tables[1:],
     ]
     print(f"memory of a run at 1024 nodes: {sum(a.nbytes for a in arrays) / 1e6:.2f} MB, constant")
 

@@ -16,7 +16,7 @@ from statistics import median
 
 import stiction as st
 from stiction.ensemble.plan import chunks, compute
-from stiction.ensemble.store import Store
+from stiction.ensemble.store_writer import StoreWriter
 
 REPEATS = 5
 METHOD = {"type": "equilibrium"}
@@ -49,9 +49,9 @@ def main(samples):
         return [compute(plan, *piece) for piece in chunks(samples, 256)]
 
     times = {name: [] for name in ("plain", "memory", "stored", "stored, 2 workers", "writing")}
-    add = Store.add
+    add = StoreWriter.add
     spent, offered = [], []
-    Store.add = lambda *arguments: spent.append(timed(lambda: add(*arguments)))
+    StoreWriter.add = lambda *arguments: spent.append(timed(lambda: add(*arguments)))
     for _ in range(REPEATS):  # in turn, so that a busy moment falls on all alike
         offered.append(two_cores())
         times["plain"].append(timed(plain))

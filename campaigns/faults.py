@@ -32,7 +32,7 @@ from harness import Summary, command_line, finish, trial
 from numpy.typing import NDArray
 
 from stiction import open_run
-from stiction.ensemble.store import MANIFEST
+from stiction.ensemble.manifest import MANIFEST
 
 NAMES = (
     "open", "fsync", "replace", "rename", "unlink", "remove", "rmdir", "mkdir", "ftruncate",

@@ -12,14 +12,13 @@ from what_if_plots import (
     XI,
     axes_of,
     band,
-    change,
     events_of,
     lengths,
     logarithmic,
     longest,
-    percent,
-    signed,
+    share_of,
     sizes,
+    told,
 )
 
 import stiction as st
@@ -27,6 +26,8 @@ from stiction.plot.style import PALE, color, marker, series
 
 Shown = tuple[Figure, list[str]]
 MEGA = 1e-6
+RUPTURES = 24
+"""Samples that are run again with inertia."""
 TAU = r"$\tau_\mathrm{cr}$ (MPa)"
 
 
@@ -44,16 +45,30 @@ def skewness(study: st.Study, result: xr.Dataset) -> Shown:
     spread.set_ylim(bottom=0)
     mean.legend()
     ratio = stress[1].std(axis=-1) / stress[0].std(axis=-1)
-    fall = [100.0 * (1.0 - row[-1].mean() / row[0].mean()) for row in stress]
     above = (stress[1].mean(axis=-1) - 0.66) / (stress[0].mean(axis=-1) - 0.66)
+    low, high, near, far = ratio.argmin(), ratio.argmax(), above.argmin(), above.argmax()
     return figure, [
         f"With few weak regions in a mostly strong interface the critical stress varies"
-        f" {ratio.min():.1f} to {ratio.max():.1f} times as much.",
-        f"It lies {above.min():.1f} to {above.max():.1f} times as far above the lower bound of the"
-        " strength, which the interface no longer comes close to.",
+        f" {told(_wider, stress[:, low])} to {told(_wider, stress[:, high])} times as much"
+        " (standard deviations).",
+        f"It lies {told(_above, stress[:, near])} to {told(_above, stress[:, far])} times as far"
+        " above the lower bound of the strength, which the interface no longer comes close to.",
         f"The trend stays: from the shortest to the longest correlation the mean falls by"
-        f" {fall[1]:.0f} %, against {fall[0]:.0f} % for the distribution of the paper.",
+        f" {told(_fall, stress[1])} %, against {told(_fall, stress[0])} % for the distribution of"
+        " the paper.",
     ]
+
+
+def _wider(stress: np.ndarray) -> float:
+    return float(stress[1].std() / stress[0].std())
+
+
+def _above(stress: np.ndarray) -> float:
+    return float((stress[1].mean() - 0.66) / (stress[0].mean() - 0.66))
+
+
+def _fall(stress: np.ndarray) -> float:
+    return float(100.0 * (1.0 - stress[-1].mean() / stress[0].mean()))
 
 
 def exponent(study: st.Study, result: xr.Dataset) -> Shown:
@@ -64,7 +79,7 @@ def exponent(study: st.Study, result: xr.Dataset) -> Shown:
     near = x < 20.0
     for i in (0, len(values) - 1):
         plan = study.plans[i]
-        tau_p = plan.strength.sample(plan.problem.interface, samples=1, seed=0)[0] * MEGA
+        tau_p = plan.random.strength.sample(plan.problem.interface, samples=1, seed=0)[0] * MEGA
         profiles.plot(x[near], tau_p[near], label=f"exponent {values[i]:g}", **series(i and 2))
     profiles.set_xlabel("$x$ (mm)")
     profiles.set_ylabel(r"$\tau_\mathrm{p}$ (MPa)")
@@ -74,15 +89,21 @@ def exponent(study: st.Study, result: xr.Dataset) -> Shown:
     logarithmic(mean, values, "spectral exponent")
     mean.set_ylabel(TAU)
     usual = int(np.argmin(np.abs(values - 4.0)))
-    shifts = stress.mean(axis=-1) / stress[usual].mean() - 1.0
-    widths = stress.std(axis=-1) / stress[usual].std() - 1.0
-    patches = result["slip_patches"].values.mean(axis=-1)
+    patches = result["slip_patches"].values
+
+    def shift(rows: np.ndarray) -> float:
+        return float(np.abs(rows.mean(axis=-1) / rows[usual].mean() - 1.0).max())
+
+    def width(rows: np.ndarray) -> float:
+        return float(np.abs(rows.std(axis=-1) / rows[usual].std() - 1.0).max())
+
     return figure, [
         f"Between exponents {values[0]:g} and {values[-1]:g} the mean critical stress changes by at"
-        f" most {percent(np.abs(shifts).max())} of that at {values[usual]:g}: the expected minor"
-        " effect.",
-        f"Its standard deviation changes by at most {percent(np.abs(widths).max())}.",
-        f"Rough strength makes more patches, {patches[0]:.0f} at onset against {patches[-1]:.1f},"
+        f" most {told(shift, stress, scale=100.0)} % of that at {values[usual]:g}: the expected"
+        " minor effect.",
+        f"Its standard deviation changes by at most {told(width, stress, scale=100.0)} %.",
+        f"Rough strength makes more patches, {told(np.mean, patches[0])} at onset against"
+        f" {told(np.mean, patches[-1])},"
         " but the moving average over the nucleation length hides them.",
     ]
 
@@ -99,14 +120,21 @@ def length(study: st.Study, result: xr.Dataset) -> Shown:
     mean.set_ylabel(TAU)
     spread.set_ylabel("standard deviation (kPa)")
     spread.set_ylim(bottom=0)
-    slope = np.polyfit(np.log(x), np.log(deviation), 1)[0]
+
+    def slope(rows: np.ndarray) -> float:
+        return float(np.polyfit(np.log(x), np.log(rows.std(axis=-1)), 1)[0])
+
+    def step(i: int) -> str:
+        return told(lambda rows: 1.0 - rows[i + 1].mean() / rows[i].mean(), stress, scale=100.0)
+
     doubling = np.diff(stress.mean(axis=-1)) / stress.mean(axis=-1)[:-1]
     return figure, [
-        f"A longer interface varies less: {deviation[0]:.0f} kPa at {x[0]:g} mm,"
-        f" {deviation[-1]:.0f} kPa at {x[-1]:g} mm.",
-        f"Its standard deviation falls roughly like the power {signed(slope)} of the length; that"
-        " of an average over the interface would fall like the power \u22120.5.",
-        f"The mean falls, too, by {percent(-doubling.max())} to {percent(-doubling.min())} with"
+        f"A longer interface varies less: {told(np.std, stress[0], scale=1e3)} kPa at {x[0]:g} mm,"
+        f" {told(np.std, stress[-1], scale=1e3)} kPa at {x[-1]:g} mm (standard deviations).",
+        f"Its standard deviation falls roughly like the power {told(slope, stress)} of the length;"
+        " that of an average over the interface would fall like the power \u22120.5.",
+        f"The mean falls, too, by {step(int(doubling.argmax()))} to"
+        f" {step(int(doubling.argmin()))} % with"
         " each doubling, because a longer interface has more places to be weak in.",
     ]
 
@@ -129,10 +157,12 @@ def normal_load(study: st.Study, result: xr.Dataset) -> Shown:
         f"From {x[0]:g} to {x[-1]:g} MPa of pressure the nucleation length shrinks from"
         f" {shortest[0]:.2f} to {shortest[-1]:.2f} mm while the roughness keeps its length, so that"
         " the strength becomes long-ranged by comparison.",
-        f"The static friction coefficient falls from {mu[0].mean():.3f} to {mu[-1].mean():.3f}"
-        f" ({change(mu[-1], mu[0])}), though every point of the interface obeys Coulomb's law.",
-        f"Its standard deviation goes from {mu[0].std():.4f} to {mu[-1].std():.4f}, and the number"
-        f" of patches at onset from {number[0].mean():.0f} to {number[-1].mean():.0f}.",
+        f"The static friction coefficient falls from {told(np.mean, mu[0])} to"
+        f" {told(np.mean, mu[-1])} (by {told(_fall, mu)} %), though every point of the"
+        " interface obeys Coulomb's law.",
+        f"Its standard deviation goes from {told(np.std, mu[0])} to {told(np.std, mu[-1])}, and"
+        f" the number of patches at onset from {told(np.mean, number[0])} to"
+        f" {told(np.mean, number[-1])}.",
     ]
 
 
@@ -141,7 +171,7 @@ def wide_strength(study: st.Study, result: xr.Dataset) -> Shown:
     figure, (arrested, stress, size) = axes_of(3)
     factor = (result["high"].values - 0.66e6) / 1e6
     some = (result["arrested_events"].values > 0).mean(axis=-1)
-    number = result["arrested_events"].values.mean(axis=-1)
+    arrests = result["arrested_events"].values
     arrested.plot(factor, some, marker="o", color=color(1))
     arrested.set_xlabel("range of strength (times)")
     arrested.set_ylabel("share with arrested events")
@@ -158,17 +188,34 @@ def wide_strength(study: st.Study, result: xr.Dataset) -> Shown:
     size.set_xlabel("moment of event (N)")
     size.set_ylabel("larger events a sample")
     size.legend(title="range")
+    rupture = st.Rupture(loading_rate=2e7)
+    dynamic = [
+        st.onset(study.plans[i].problem, result["strength"].values[i][:RUPTURES], method=rupture)[
+            "arrested_events"
+        ].values
+        for i in (1, -1)
+    ]
     moments = np.concatenate([each["moment"].values for each in events])
     low, high = np.quantile(moments, (0.05, 0.95)) if moments.size else (1.0, 1.0)
     return figure, [
-        f"With the range of the paper {percent(some[0])} of samples have an arrested event, with"
-        f" {factor[-1]:g} times that range {percent(some[-1])}: far from slightly more.",
-        f"Then {number[-1]:.1f} events a sample come first, and global sliding needs"
-        f" {percent(last[-1].mean() / first[-1].mean() - 1.0)} more stress than the first of them:"
-        " a cascade rather than pre-slip.",
-        f"Arrested patches get as long as {longest(study, events)} nucleation lengths, and the"
-        f" moments of nine events of ten lie within a factor of {high / low:,.0f}.",
+        f"Without inertia {share_of(arrests[0])} of samples have an arrested event with the range"
+        f" of the paper, {share_of(arrests[1])} with {factor[1]:g} times and"
+        f" {share_of(arrests[-1])} with {factor[-1]:g} times that range: far from slightly more."
+        f" Inertia carries some of them through: of {dynamic[0].size} ruptures each,"
+        f" {share_of(dynamic[0])} at {factor[1]:g} and {share_of(dynamic[1])} at {factor[-1]:g}"
+        " times the range have one.",
+        f"Without inertia {told(np.mean, arrests[-1])} events a sample come first at the widest,"
+        f" and global sliding needs {told(_later, last[-1], first[-1])} % more stress than the"
+        " first of them: a cascade rather than pre-slip.",
+        f"The longest arrested patch, one of"
+        f" {sum(each.sizes['event'] for each in events)}, is {longest(study, events)} nucleation"
+        f" lengths long, and the moments of nine events of ten lie within a factor of"
+        f" {high / low:,.0f}.",
     ]
+
+
+def _later(last: np.ndarray, first: np.ndarray) -> float:
+    return float(100.0 * (last.mean() / first.mean() - 1.0))
 
 
 def random_load(study: st.Study, result: xr.Dataset) -> Shown:
@@ -178,7 +225,8 @@ def random_load(study: st.Study, result: xr.Dataset) -> Shown:
     found = result["critical_stress"].values * MEGA
     band(stress, deviation, found, 1)
     stress.set_ylabel(TAU)
-    some = (result["arrested_events"].values > 0).mean(axis=-1)
+    arrests = result["arrested_events"].values
+    some = (arrests > 0).mean(axis=-1)
     arrested.plot(deviation, 100.0 * some, marker="o", color=color(2))
     arrested.set_ylabel("samples with arrested events (%)")
     arrested.set_ylim(0, max(5.0, 110.0 * some.max()))
@@ -186,12 +234,14 @@ def random_load(study: st.Study, result: xr.Dataset) -> Shown:
         axes.set_xlabel("standard deviation of the load (kPa)")
     return figure, [
         f"A random initial stress of standard deviation {deviation[0]:.0f} to"
-        f" {deviation[-1]:.0f} kPa lowers the mean critical stress from {found[0].mean():.3f} to"
-        f" {found[-1].mean():.3f} MPa: sliding begins where strength less stress is least.",
-        f"Its standard deviation grows from {1e3 * found[0].std():.0f} to"
-        f" {1e3 * found[-1].std():.0f} kPa.",
-        f"Yet only {percent(some.min())} to {percent(some.max())} of samples have an arrested"
-        f" event, {percent(some[-1])} at the strongest disorder of the load.",
+        f" {deviation[-1]:.0f} kPa lowers the mean critical stress from {told(np.mean, found[0])}"
+        f" to {told(np.mean, found[-1])} MPa: sliding begins where strength less stress is least.",
+        f"Its standard deviation grows from {told(np.std, found[0], scale=1e3)} to"
+        f" {told(np.std, found[-1], scale=1e3)} kPa.",
+        f"Yet, without inertia, only {share_of(arrests[some.argmin()])} to"
+        f" {share_of(arrests[some.argmax()])} of samples have an arrested event,"
+        f" {share_of(arrests[-1])} at the strongest disorder of the load: too few to tell these"
+        " apart.",
     ]
 
 
@@ -219,13 +269,13 @@ def random_residual(study: st.Study, result: xr.Dataset) -> Shown:
     size.legend()
     first, last = (result[key].values[-1, -1] for key in ("first_instability", "critical_stress"))
     return figure, [
-        f"A random residual strength, and with it a random stress drop, arrests"
-        f" {percent(some[-1].min())} to {percent(some[-1].max())} of first instabilities at a"
-        f" standard deviation of {deviation[-1]:.0f} kPa, against {percent(some[0].max())} at"
-        f" {deviation[0]:.0f} kPa.",
+        f"A random residual strength, and with it a random stress drop, arrests without inertia"
+        f" {share_of(count[-1, some[-1].argmin()])} to {share_of(count[-1, some[-1].argmax()])} of"
+        f" first instabilities at a standard deviation of {deviation[-1]:.0f} kPa, against"
+        f" {share_of(count[0, some[0].argmax()])} at {deviation[0]:.0f} kPa.",
         "The first instability hardly notices it, since little has weakened fully by then; global"
-        f" sliding comes {percent(last.mean() / first.mean() - 1.0)} above it on average.",
-        f"At the widest there are {count[-1].mean():.2f} arrested events a sample, the largest"
+        f" sliding comes {told(_later, last, first)} % above it on average.",
+        f"At the widest there are {told(np.mean, count[-1])} arrested events a sample, the largest"
         f" {longest(study, events)} nucleation lengths long.",
     ]
 
@@ -248,8 +298,8 @@ def plane(study: st.Study, result: xr.Dataset) -> Shown:
         f"G* is {modulus[0]:.3f} GPa in plane stress and {modulus[1]:.3f} GPa in plane strain, and"
         " the nucleation length grows in proportion.",
         f"A longer nucleation length averages over more strength: the mean critical stress is"
-        f" {more[0].mean():.1f} % higher at the shortest correlation length and"
-        f" {more[-1].mean():.1f} % at the longest.",
+        f" {told(np.mean, more[0])} % higher at the shortest correlation length and"
+        f" {told(np.mean, more[-1])} % at the longest.",
         "This is the size of the error of the printed formula, which takes the modulus of plane"
         " strain for a plane-stress interface.",
     ]
@@ -274,13 +324,22 @@ def uniform_dc(study: st.Study, result: xr.Dataset) -> Shown:
     longer = np.median(critical[1], axis=-1) / np.median(critical[0], axis=-1)
     return figure, [
         "With uniform d_c weak places weaken slowly, W = (tau_p - tau_r)/d_c, and need a longer"
-        f" patch to become unstable: {longer.min():.2f} to {longer.max():.2f} times as long in the"
-        " median.",
+        f" patch to become unstable: {told(_median, critical[:, longer.argmin()])} to"
+        f" {told(_median, critical[:, longer.argmax()])} times as long in the median.",
         f"A longer patch takes in stronger neighbours, so the mean critical stress is"
-        f" {more.max():.1f} % higher at most and {more.min():.1f} % at least.",
+        f" {told(_more, found[:, more.argmax()])} % higher at most and"
+        f" {told(_more, found[:, more.argmin()])} % at least.",
         "There is no single nucleation length then, so that the local criterion does not apply;"
         " equilibrium takes any W(x).",
     ]
+
+
+def _median(critical: np.ndarray) -> float:
+    return float(np.median(critical[1]) / np.median(critical[0]))
+
+
+def _more(stress: np.ndarray) -> float:
+    return float(100.0 * (stress[1].mean() / stress[0].mean() - 1.0))
 
 
 def free_end(study: st.Study, result: xr.Dataset) -> Shown:
@@ -315,14 +374,18 @@ def free_end(study: st.Study, result: xr.Dataset) -> Shown:
     place.set_xlabel(r"distance of onset from the end$\,/h_\mathrm{n}$")
     place.set_ylabel("onsets, relative to chance")
     place.legend()
-    near = [float((each < 0.5).mean()) / (0.5 * chance) for each in ends]
+
+    def near(i: int) -> str:
+        return told(lambda each: (each < 0.5).mean() / (0.5 * chance), ends[i])
+
     return figure, [
         "In mode III a field mirrored at both ends leaves the mirror planes free of stress, so an"
         " interface with free ends can be had exactly.",
-        f"Free ends lower the mean critical stress, but little: by {-np.mean(changes[0]):.2f} % at"
-        f" the shortest and {-np.mean(changes[-1]):.3f} % at the longest correlation length.",
-        f"Onsets within half a nucleation length of an end are {near[0]:.1f} times as frequent as"
-        f" elsewhere at the shortest correlation length, {near[-1]:.1f} times at the longest: an"
+        f"Free ends lower the mean critical stress, but little: by"
+        f" {told(np.mean, -changes[0])} % at the shortest and {told(np.mean, -changes[-1])} % at"
+        " the longest correlation length.",
+        f"Onsets within half a nucleation length of an end are {near(0)} times as frequent as"
+        f" elsewhere at the shortest correlation length, {near(-1)} times at the longest: an"
         " end needs only half a patch.",
     ]
 

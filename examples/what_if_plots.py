@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import stiction as st
+from stiction.papers.albertini2020.claims.claim import rounded
 from stiction.plot.style import PAGE, color, marker, new_figure, panel, series
+from stiction.statistics.estimates import Estimate, share
 
 XI = r"correlation length $\xi_0$ (mm)"
 
@@ -47,6 +50,34 @@ def lengths(result: xr.Dataset) -> np.ndarray:
 def percent(share: float) -> str:
     """A share for reading."""
     return f"{100.0 * share:.2g} %"
+
+
+def told(statistic: Callable[..., Any], *arrays: Any, scale: float = 1.0) -> str:
+    """A number made of samples with its standard error, '0.262 \u00b1 0.011'.
+
+    Parameters
+    ----------
+    statistic : callable
+        Of arrays with the samples on the last axis, to a number.
+    *arrays : (..., samples) arrays
+        Of the same samples, which are drawn again together, 200 times (bootstrap).
+    scale : float
+        Factor on both.
+    """
+    rows = [np.asarray(each) for each in arrays]
+    generator = np.random.default_rng(0)
+    count = rows[0].shape[-1]
+    again = [
+        statistic(*(row[..., chosen] for row in rows))
+        for chosen in generator.integers(0, count, (200, count))
+    ]
+    estimate = Estimate(scale * float(statistic(*rows)), abs(scale) * float(np.std(again, ddof=1)))
+    return rounded(estimate).replace("-", "\u2212")
+
+
+def share_of(events: Any) -> str:
+    """Share of samples with an event, in per cent, with its standard error."""
+    return f"{rounded(share(np.asarray(events) > 0).scaled(100.0))} %"
 
 
 def signed(value: float) -> str:

@@ -25,7 +25,10 @@ load were different. Each question is a study of its own, a TOML file in `exampl
 `stiction check`, `run` and `report` take; `python examples/what_ifs.py` runs them all, draws these
 figures and writes this page, numbers included, and `python examples/what_ifs.py correlation` one of
 them. Stresses are onsets by exact equilibrium, with every interaction between patches, unless
-something else is said; lines are means and shades span 5 to 95 % of the samples.
+something else is said; lines are means and shades span 5 to 95 % of the samples. Errors are one
+standard error. Arrest is told without inertia unless ruptures are named. The report of
+`stiction paper` asks some of the same questions of fewer or of other samples, and of the local
+criterion where it says so: its numbers then differ by their errors, or by the method.
 """
 
 

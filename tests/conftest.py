@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -61,3 +62,25 @@ def make_strength(problem):
         )
 
     return make
+
+
+@pytest.fixture
+def command(monkeypatch, capfd):
+    """Run a command line in this process: exit code, output, errors."""
+    from stiction.cli import app
+
+    # pytest turns warnings into errors; on the command line they are lines of text.
+    monkeypatch.setattr("warnings.showwarning", None, raising=False)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
+        code = 0
+        try:
+            app.main()
+        except SystemExit as ended:
+            code = ended.code or 0
+        said = capfd.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out, said.err
+
+    return run

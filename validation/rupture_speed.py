@@ -43,7 +43,7 @@ def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
         every=500,
         steps=False,
     )
-    found = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
+    found = rupture_speed(run["arrival_time"].values, [spacing], [problem.nucleation_length])
     right = slice(nodes // 2, nodes // 2 + int(0.425 * nodes))
     return x[right] / problem.nucleation_length, found[right] / SOLID.rayleigh_wave_speed
 

@@ -2,6 +2,8 @@
 # A test keeps the two equal.
 
 from stiction import plot as plot
+from stiction.criterion.griffith import energy_release_rate as energy_release_rate
+from stiction.criterion.griffith import griffith_length as griffith_length
 from stiction.criterion.method import LocalCriterion as LocalCriterion
 from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
 from stiction.dynamics.method import Rupture as Rupture
@@ -31,11 +33,39 @@ from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
+from stiction.inference.design import design_of_tests as design_of_tests
+from stiction.inference.fit import (
+    FieldFit as FieldFit,
+)
+from stiction.inference.fit import (
+    fit_field as fit_field,
+)
+from stiction.inference.infer import infer as infer
+from stiction.inference.peaks import read_peaks as read_peaks
+from stiction.inference.posterior import Posterior as Posterior
+from stiction.inference.simulator import simulator as simulator
 from stiction.interface import Interface as Interface
+from stiction.load import EdgeLoad as EdgeLoad
+from stiction.load import GradientLoad as GradientLoad
 from stiction.load import Load as Load
+from stiction.merge import (
+    merge_parts as merge_parts,
+)
 from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
+from stiction.random.families import (
+    Gamma as Gamma,
+)
+from stiction.random.families import (
+    Lognormal as Lognormal,
+)
+from stiction.random.families import (
+    TruncatedNormal as TruncatedNormal,
+)
+from stiction.random.families import (
+    Weibull as Weibull,
+)
 from stiction.random.marginals import Beta as Beta
 from stiction.random.random_field import RandomField as RandomField
 from stiction.random.random_interface import RandomInterface as RandomInterface
@@ -59,6 +89,7 @@ from stiction.reliability.design import (
     design_stress as design_stress,
 )
 from stiction.reliability.estimate import failure_probability as failure_probability
+from stiction.reliability.limit_state import limit_state as limit_state
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
 from stiction.statistics.densities import density as density
@@ -68,6 +99,7 @@ from stiction.statistics.moments import (
 from stiction.statistics.moments import (
     nucleation_statistics as nucleation_statistics,
 )
+from stiction.statistics.quantiles import quantile_distance as quantile_distance
 from stiction.statistics.quantiles import quantiles as quantiles
 from stiction.statistics.rice import rice_distribution as rice_distribution
 from stiction.stored_run import (

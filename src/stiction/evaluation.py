@@ -17,11 +17,18 @@ from stiction._checks import check_instance, refusals
 from stiction._model import describe, to_plain
 from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
-from stiction.gaps import gather, with_gaps
+from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profile_nodes import Gaps, check_gaps
-from stiction.results import FRICTION_COEFFICIENT, SAMPLE, Variable, coordinate, to_dataset
+from stiction.results import (
+    DIRECTION,
+    FRICTION_COEFFICIENT,
+    SAMPLE,
+    Variable,
+    coordinate,
+    to_dataset,
+)
 from stiction.sample import Sample, named_profiles
 
 FIRST = 16
@@ -46,7 +53,9 @@ class Method(Protocol):
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
     package that names it under the entry points "stiction.methods" offers it in study files too;
     its `type` is then a ``Literal`` with a default.
-    It may have `accepts` as well, of "barriers" and "overstress": see `Problem.sample`.
+    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
+    `Problem.sample`), and `first_stage`, the type of a cheaper method whose onsets lie close to
+    its own, by which rare failures are found first.
     """
 
     @property
@@ -171,7 +180,7 @@ def label(
     variables |= dict(more_variables)
     coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
     used = {dim for name in values for dim in variables[name].dims}
-    for dim in sorted(used - {"sample"}):
+    for dim in sorted(used & {*problem.interface.dims, DIRECTION}):
         coordinates[dim] = coordinate(problem.interface, dim)
     return to_dataset(values, variables, coordinates, attributes)
 
@@ -198,9 +207,9 @@ def onset(
         see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         How to find out; nothing is chosen silently.
-    gaps : {"refuse", "fill"}
-        Whether missing values (NaN) are an error or are filled with straight lines between their
-        ends.
+    gaps : {"refuse", "fill", "skip"}
+        Whether missing values (NaN) are an error, are filled with straight lines between their
+        ends, or make that the samples that have any are left out; the others keep their numbers.
     progress : bool or callable
         True shows how far it is, on standard error, once it takes more than two seconds; a
         callable gets (done, total).
@@ -243,8 +252,13 @@ def onset(
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
+    numbers = None
+    if gaps == "skip" and measured is not None:
+        profiles, numbers = without_gaps(profiles, measured)
+        measured = None
     sample = problem.sample(profiles, accept=accepted(method))
     warn_of_units(problem, sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
-    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    numbers = np.arange(sample.samples) if numbers is None else numbers
+    result = label(problem, method, values, numbers, attributes)
     return result if measured is None else with_gaps(problem, result, measured)

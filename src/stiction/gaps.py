@@ -59,6 +59,30 @@ def gather(
     return values, everywhere
 
 
+def without_gaps(
+    values: Mapping[str, Any], measured: Mask
+) -> tuple[dict[str, Any], NDArray[np.int64]]:
+    """The samples that have no gap in any profile, and their numbers.
+
+    Raises
+    ------
+    InputError
+        If every sample has one.
+    """
+    whole = measured.all(axis=1)
+    if not whole.any():
+        raise InputError(
+            f"gaps: all of {whole.size} samples have gaps, so none is left (gaps='skip');"
+            " gaps='fill' fills them with straight lines, which the result then remembers"
+        )
+    warn_accuracy(f"{int((~whole).sum())} of {whole.size} samples have gaps and are left out")
+
+    def kept(value: Any) -> Any:
+        return value[whole] if np.ndim(value) > 1 and len(value) == whole.size else value
+
+    return {name: kept(value) for name, value in values.items()}, np.flatnonzero(whole)
+
+
 def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Dataset:
     """A result that says where its profiles have gaps, and which onsets lie in one."""
     position = result["critical_position"]

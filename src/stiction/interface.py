@@ -171,6 +171,12 @@ class Interface:
         """Node positions along x in [0, L), shape (nodes,), m."""
         return self.coordinates["x"]
 
+    def describe_node(self, node: int) -> str:
+        """Where a node is, counted in the order of a flat profile, for messages."""
+        entry = np.unravel_index(int(node), self.shape)
+        places = zip(self.dims, entry, self.spacings, strict=True)
+        return ", ".join(f"{dim} = {i * spacing:.6g} m" for dim, i, spacing in places)
+
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
         """Components of the wave vectors of `transform`, rad/m.

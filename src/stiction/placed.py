@@ -87,6 +87,8 @@ def placed_profile(given: Any, field: str, folder: Any) -> Any:
             raise InputError("file: must be a path")
     put = {name: options.pop(name) for name in _PUT if name in options}
     check_gaps(put.get("gaps", "refuse"))
+    if put.get("gaps") == "skip":
+        raise InputError("gaps: 'skip' leaves samples out, and this is of all; take 'fill'")
     if not isinstance(put.get("interpolate", False), bool):
         raise InputError("interpolate: must be true or false")
     if given is None:

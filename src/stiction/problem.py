@@ -132,6 +132,11 @@ class Problem:
             raise InputError(problems)
 
     @property
+    def load_profile(self) -> Any:
+        """p of the load: a number, or at the nodes, (*shape)."""
+        return self.load.profile_on(self.interface)
+
+    @property
     def effective_modulus(self) -> float:
         """Static modulus G* of the plane state and mode, Pa; on a plane that along x."""
         return self.solid.effective_modulus(self.mode)
@@ -338,5 +343,5 @@ class Problem:
         )
         if too_few:
             raise InputError(too_few)
-        profile = np.array(np.broadcast_to(load.profile, shape), dtype=np.float64)
+        profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=np.float64)
         return Sample(strength, residual, rates, initial, profile, pressure)

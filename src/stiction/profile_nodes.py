@@ -15,7 +15,7 @@ from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 
-Gaps = Literal["refuse", "fill"]
+Gaps = Literal["refuse", "fill", "skip"]
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
@@ -31,7 +31,7 @@ class AtNodes(NamedTuple):
     ----------
     values : (..., nodes) array
     measured : (..., nodes) array of bool or None
-        False where there was no value and one was filled in; None if nothing was.
+        False where there was no value, be it filled in or left out; None if nothing is missing.
     """
 
     values: Array
@@ -41,7 +41,7 @@ class AtNodes(NamedTuple):
 def check_gaps(gaps: object) -> None:
     """Refuse what is no way to deal with gaps."""
     if gaps not in get_args(Gaps):
-        raise InputError(f"gaps: must be 'refuse' or 'fill', got {gaps!r}")
+        raise InputError(f"gaps: must be 'refuse', 'fill' or 'skip', got {gaps!r}")
 
 
 def in_order(values: Array, interface: Interface, gaps: Gaps) -> AtNodes:
@@ -205,6 +205,8 @@ def _filled(values: Array, interface: Interface, gaps: Gaps) -> AtNodes:
             f"must be finite: there {text}; give what was measured, or fill gaps with straight"
             " lines, which the result then remembers (gaps='fill', --fill-gaps)"
         )
+    if gaps == "skip":
+        return AtNodes(values, ~missing)
     values = values.copy()
     rows, holes = values.reshape(-1, interface.size), missing.reshape(-1, interface.size)
     for row, hole in zip(rows, holes, strict=True):

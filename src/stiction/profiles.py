@@ -56,7 +56,7 @@ _NAMES = {
 _PLACES = ("x", "position", "pos", "distance", "coordinate")
 _SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
-"""Coordinate along x of a profile with gaps: False where the value was filled in."""
+"""Coordinate along x of a profile with gaps: False where there was no value."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -130,9 +130,10 @@ def read_profile(
         shape (nx, ny), or from ``.nc`` or labelled arrays over 'x' and 'y'.
     interpolate : bool
         Whether points may lie elsewhere than the nodes; then linearly between them.
-    gaps : {"refuse", "fill"}
-        Whether missing values (NaN, empty cells, missing points) are an error or are filled with
-        straight lines between their ends.
+    gaps : {"refuse", "fill", "skip"}
+        Whether missing values (NaN, empty cells, missing points) are an error, are filled with
+        straight lines between their ends, or stay NaN, for `stiction.fit_field` to leave out.
+        Without an interface they stay in any case.
 
     Returns
     -------
@@ -534,7 +535,7 @@ def at_nodes(
                     raise InputError("has no dimension along the interface; call it 'x'")
                 return AtNodes(points.values, None)
             return points.on(interface, interpolate=False, gaps=gaps)
-        if gaps == "fill":
+        if gaps != "refuse":
             array = real_array(value)
             if array.shape[-1:] == (interface.size,) and np.isnan(array).any():
                 return in_order(array, interface, gaps)

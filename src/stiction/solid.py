@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import ArgsKwargs
 
-from stiction._checks import check_choice
-from stiction._model import Mode, Positive, _number, model
+from stiction._checks import check_choice, is_finite
+from stiction._model import Mode, Positive, _number, describe, model
+from stiction.errors import InputError
 from stiction.plausible import warn_of_waves
 
 
@@ -20,7 +22,7 @@ class Solid:
     Parameters
     ----------
     shear_modulus : float
-        G, Pa.
+        G, Pa. Or, by name, `youngs_modulus`, E in Pa: then G = E/(2 (1 + nu)) is what is kept.
     poisson_ratio : float
         nu, in (-1, 0.5).
     density : float
@@ -46,6 +48,55 @@ class Solid:
     ]
     density: Positive
     plane: Literal["strain", "stress"] = "strain"
+
+    if TYPE_CHECKING:  # what the validator below makes of it
+
+        @overload
+        def __init__(
+            self,
+            shear_modulus: float,
+            poisson_ratio: float,
+            density: float,
+            plane: Literal["strain", "stress"] = ...,
+        ) -> None: ...
+        @overload
+        def __init__(
+            self,
+            *,
+            youngs_modulus: float,
+            poisson_ratio: float,
+            density: float,
+            plane: Literal["strain", "stress"] = ...,
+        ) -> None: ...
+        def __init__(self, *args: Any, **kwargs: Any) -> None: ...
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_youngs_modulus(cls, given: Any) -> Any:
+        """G = E/(2 (1 + nu)); what is kept is G."""
+        named = given.kwargs if isinstance(given, ArgsKwargs) else given
+        if not isinstance(named, dict) or "youngs_modulus" not in named:
+            return given
+        places = given.args if isinstance(given, ArgsKwargs) else ()
+        named = dict(named)
+        modulus, ratio = named.pop("youngs_modulus"), named.get("poisson_ratio", math.nan)
+        if places or "shear_modulus" in named:
+            raise InputError("give shear_modulus or youngs_modulus, by name, and not both")
+        if not (is_finite(modulus) and modulus > 0.0):
+            raise InputError(f"youngs_modulus: must be a positive number, got {describe(modulus)}")
+        # Without a usable ratio any modulus will do: the ratio is what is complained of.
+        usable = is_finite(ratio) and ratio > -1.0
+        named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
+        return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Any:
+        schema = handler.resolve_ref_schema(handler(core))
+        schema["properties"]["youngs_modulus"] = {
+            "type": "number", "exclusiveMinimum": 0, "title": "Youngs Modulus",
+        }  # fmt: skip
+        schema["required"] = [name for name in schema["required"] if name != "shear_modulus"]
+        return schema
 
     @model_validator(mode="after")
     def _plausible(self) -> Solid:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -23,19 +22,14 @@ from stiction._netcdf import DamagedError, read_dataset
 from stiction._progress import Show
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
-from stiction.ensemble.files import HeldError, Lock
+from stiction.ensemble.files import cannot_write
+from stiction.ensemble.manifest import MANIFEST, refuse_another
 from stiction.ensemble.monte_carlo import check_run, warn_of_fields
+from stiction.ensemble.part import Part
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
-from stiction.ensemble.same import refuse_another
-from stiction.ensemble.store import (
-    LOCK,
-    MANIFEST,
-    Store,
-    empty,
-    prepare_folder,
-    writing,
-)
+from stiction.ensemble.store import LOCK, Store, is_active
+from stiction.ensemble.store_writer import empty, prepare_folder, writing
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError, StoreError
@@ -57,7 +51,7 @@ class Status:
     done_by_point : (points,) array
     failures : tuple of Failure
     damaged : tuple of str
-        What is wrong with which chunk; running the study again computes it again.
+        What is wrong with which chunk; running the study again mends it.
     verified : bool
         Whether everything was read and compared with its checksum, or chunks looked at only.
     chunks, bytes : int
@@ -152,6 +146,7 @@ class StoredRun:
             )
         store = self._store
         bad = store.verify(whole=verify)
+        wrong = [f"{file} {text}" for file, text in sorted(bad.items())] + store.unlisted()
         intact = [chunk for chunk in store.chunks if chunk.file not in bad]
         done = stored_samples(intact, points, ensemble.samples, ensemble.first).sum(axis=1)
         return Status(
@@ -159,13 +154,21 @@ class StoredRun:
             int(done.sum()),
             done,
             self.failures,
-            (*store.damage, *(f"{file} {text}" for file, text in sorted(bad.items()))),
+            (*store.damage, *wrong),
             verify,
             len(intact),
             sum(chunk.bytes for chunk in intact),
             sum(chunk.seconds for chunk in intact),
-            _is_active(store.path),
+            is_active(store.path),
         )
+
+    def missing(self, part: Part | None = None) -> int:
+        """How many samples are neither stored nor have failed, of a part or of all."""
+        if self._store is None:
+            return 0
+        ensemble, points = self.study.ensemble, len(self.study.plans)
+        spans = self._store.missing(points, ensemble.samples, ensemble.first, part=part)
+        return sum(span.samples for span in spans)
 
     @property
     def versions(self) -> list[str]:
@@ -200,11 +203,9 @@ class StoredRun:
         attributes = study.attributes
         if self.failures:
             attributes[FAILED] = [list(failure) for failure in self.failures]
-        ensemble = study.ensemble
-        spans = self._store.missing(len(study.plans), ensemble.samples, ensemble.first)
-        missing = sum(span.samples for span in spans)
+        missing = self.missing()
         if missing:
-            total = len(study.plans) * ensemble.samples
+            total = len(study.plans) * study.ensemble.samples
             attributes["cut_short"] = f"{total - missing} of {total} samples are done"
         return gathered.dataset(attributes, study.axes)
 
@@ -223,21 +224,30 @@ class StoredRun:
         export(self.dataset(), target)
 
 
-def _is_active(folder: Path) -> bool:
-    if not os.access(folder / LOCK, os.W_OK):
-        return False
-    try:
-        with Lock(folder / LOCK, announce=False):
-            return False
-    except HeldError:
-        return True
-    except StoreError:  # no locks here: nobody knows
-        return False
-
-
 def folder_beside(file: Path) -> Path:
     """Where the chunks of ``result.nc`` are until it is complete."""
     return file.parent / f"{file.name}.run"
+
+
+def parts_folder(path: Path) -> Path:
+    """Where the parts of a run are until they are merged."""
+    return path.parent / f"{path.name}.parts"
+
+
+def make_part_folder(path: Path, part: Part) -> Path:
+    """The folder of a part, made if need be.
+
+    Raises
+    ------
+    StoreError
+        If the place cannot take it.
+    """
+    folder = parts_folder(path)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    return folder / part.name
 
 
 def _read_result(path: Path) -> xr.Dataset:
@@ -300,6 +310,7 @@ def run_into(
     retry: bool = False,
     time_limit: float | None = None,
     lock: bool = True,
+    part: Part | None = None,
 ) -> StoredRun:
     """Run a study, or what is missing of it, into a folder or a file; see `Study.run`.
 
@@ -311,11 +322,12 @@ def run_into(
         If samples are missing in the end that have not failed.
     """
     path = as_path("out", out)
+    if part is not None:
+        path = make_part_folder(path, part)
     ensemble, plans = study.ensemble, study.plans
     check_run(ensemble.samples, ensemble.first, workers, executor, time_limit)
     plain = study.to_dict()  # refuses what cannot be written down
     check_target(path)
-    warn_of_fields(plans)
     to_file = path.suffix == ".nc"
     folder = folder_beside(path) if to_file else path
     before = None
@@ -328,6 +340,8 @@ def run_into(
     with writing(folder, plain, versions(), lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
             store.add(_outcomes_of(before, len(plans)), variables_in(plans))
+        if store.missing(len(plans), ensemble.samples, ensemble.first, retry=retry, part=part):
+            warn_of_fields(plans)
         run_stored(
             store,
             plans,
@@ -338,34 +352,31 @@ def run_into(
             progress=progress,
             retry=retry,
             time_limit=time_limit,
+            part=part,
         )
         stored = StoredRun(folder)
-        state = stored.status()
-        if time_limit is not None and _missing(state) and not state.damaged:
+        state, missing = stored.status(), stored.missing(part)
+        if time_limit is not None and missing and not state.damaged:
             return StoredRun(path)
-        _refuse_incomplete(folder, state)
+        if state.damaged or missing:
+            raise StoreError(
+                f"{folder}: {state.done} of {state.samples} samples are stored: others were damaged"
+                f" or removed while the run went on ({'; '.join(state.damaged[:3]) or 'gone'}); the"
+                " same command computes them again"
+            )
         if to_file:
-            stored.export(path)
-            if not store.failures:
-                empty(folder)
-    if to_file and not (folder / MANIFEST).exists():
-        with suppress(OSError):  # somebody else's files are in it
-            (folder / LOCK).unlink(missing_ok=True)
-            folder.rmdir()
+            write_result(stored, store, path)
     return StoredRun(path)
 
 
-def _missing(state: Status) -> int:
-    return state.samples - state.done - len(state.failures)
-
-
-def _refuse_incomplete(folder: Path, state: Status) -> None:
-    if state.damaged or _missing(state):
-        raise StoreError(
-            f"{folder}: {state.done} of {state.samples} samples are stored: others were damaged or"
-            f" removed while the run went on ({'; '.join(state.damaged[:3]) or 'gone'}); the same"
-            " command computes them again"
-        )
+def write_result(stored: StoredRun, store: Store, path: Path) -> None:
+    """Make the file of a complete run, and take away its folder unless samples have failed."""
+    stored.export(path)
+    if not store.failures:
+        empty(store.path)
+        with suppress(OSError):  # somebody else's files are in it
+            (store.path / LOCK).unlink(missing_ok=True)
+            store.path.rmdir()
 
 
 INNER = ("sample", "kept_sample", "x", "y", DIRECTION)

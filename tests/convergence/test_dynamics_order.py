@@ -28,8 +28,7 @@ def rupture(nodes, steps):
     state = run.start(0.0)
     run.advance(state, steps)
     energy = radiated_energy(
-        problem.friction, float(state.watch[monitor.WORK]), state.slip, state.slip_hat, run.rows,
-        run.medium.stiffness[0], run.medium.spacing,
+        problem.friction, run.setting.nodes, run.medium.grid, state.fields
     )  # fmt: skip
     return state, energy
 

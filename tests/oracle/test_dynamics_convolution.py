@@ -11,19 +11,19 @@ from stiction.elasticity.memory_kernels import arc_quadrature
 
 def direct_convolution(run, start, steps):
     """Plain numpy: predictor-corrector with the whole history and the 280-term kernel."""
-    medium, rows = run.medium, run.rows
-    n, h, z = medium.nodes, medium.step, medium.impedance
+    medium, nodes = run.medium, run.setting.nodes
+    n, h, z, pace = medium.interface.size, medium.step, medium.impedance, medium.grid.pace
     s, w = arc_quadrature("II", np.sqrt(2.0 / 0.67))
-    sk = np.multiply.outer(s, medium.pace)
+    sk = np.multiply.outer(s, pace)
     # int over step m of C(k c_s t) dt, exactly.
     first = w[:, None] * np.expm1(sk * h) / sk
-    weights = np.empty((steps + 1, medium.pace.size))
+    weights = np.empty((steps + 1, pace.size))
     for m in range(steps + 1):
         weights[m] = first.sum(axis=0).real
         first *= np.exp(sk * h)
-    static, dynamic = medium.stiffness
+    static, dynamic = medium.grid.stiffness[:, 1:]
     slip, rate = np.zeros(n), start.rate.copy()
-    past = np.zeros((steps, medium.pace.size), dtype=complex)
+    past = np.zeros((steps, pace.size), dtype=complex)
     for i in range(steps):
         load = run.history[1][1] * (start.time + (i + 1) * h)
         lag = np.einsum("mk,mk->k", weights[1 : i + 1], past[:i][::-1])
@@ -34,8 +34,8 @@ def direct_convolution(run, start, steps):
             stress = np.fft.irfft(
                 np.r_[0.0, dynamic * (lag + weights[0] * mean_hat) - static * slip_hat], n
             )
-            limit = np.maximum(rows[0] - rows[2] * fresh, rows[1])
-            return fresh, np.maximum(stress + load * rows[4] + rows[5] - limit, 0.0) / z
+            limit = np.maximum(nodes.strength - nodes.weakening * fresh, nodes.residual)
+            return fresh, np.maximum(stress + load * nodes.profile + nodes.initial - limit, 0.0) / z
 
         _, guess = moved(rate)
         mean = 0.5 * (rate + guess)

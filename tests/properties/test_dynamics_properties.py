@@ -156,8 +156,7 @@ def test_radiated_energy_is_steady_after_arrest():
 
     def radiated():
         return radiated_energy(
-            PROBLEM.friction, float(state.watch[monitor.WORK]), state.slip, state.slip_hat,
-            run.rows, run.medium.stiffness[0], run.medium.spacing,
+            PROBLEM.friction, run.setting.nodes, run.medium.grid, state.fields,
         )  # fmt: skip
 
     run.advance(state, 3000)

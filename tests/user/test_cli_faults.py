@@ -3,54 +3,28 @@
 import errno
 import json
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from small_study import small_study
 
 import stiction as st
 from stiction._cache import private_folder
 from stiction._netcdf import write_dataset
-from stiction.cli import app
 from stiction.ensemble import files
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 64},
-        "friction": {"weakening_rate": 0.1e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 0.02},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 40, "seed": 3},
-}
+STUDY = small_study(
+    nodes=64, weakening_rate=0.1e12, correlation_length=0.02, ensemble={"samples": 40, "seed": 3}
+)
 
 
-@pytest.fixture
-def command(monkeypatch, capfd, tmp_path):
-    """Run a command in a folder of its own: exit code, output, errors."""
+@pytest.fixture(autouse=True)
+def folder(monkeypatch, tmp_path):
+    """Commands run in a folder of their own."""
     monkeypatch.chdir(tmp_path)
     st.Study.from_dict(STUDY).to_toml("study.toml")
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
-        try:
-            app.main()
-            code = 0
-        except SystemExit as ended:
-            code = ended.code or 0
-        said = capfd.readouterr()
-        assert "Traceback" not in said.err
-        return code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

@@ -8,42 +8,20 @@ import time
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
+from small_study import lengths, small_study
 
 import stiction as st
-from stiction.cli import app as room
 from stiction.study.study import read_setup
 
-TEXT = """
-title = "a small sweep"
-[problem.solid]
-shear_modulus = 1e9
-poisson_ratio = 0.33
-density = 1170.0
-[problem.interface]
-length = 0.1
-nodes = 128
-[problem.friction]
-weakening_rate = 0.25e12
-[problem.load]
-normal_pressure = 5e6
-[random.strength.marginal]
-type = "beta"
-alpha = 1.5
-beta = 3.0
-low = 0.66e6
-high = 1.66e6
-[random.strength.spectrum]
-type = "power_law"
-correlation_length = 4e-3
-[method]
-type = "local_criterion"
-[ensemble]
-samples = 200
-seed = 3
-[[sweep]]
-"random.strength.spectrum.correlation_length" = [4e-3, 6e-3, 8e-3]
-"""
+STUDY = small_study(
+    title="a small sweep",
+    ensemble={"samples": 200, "seed": 3},
+    sweep=lengths(4e-3, 6e-3, 8e-3),
+)
+STUDY["problem"]["load"] = {"normal_pressure": 5e6}
+TEXT = tomli_w.dumps(STUDY)
 
 
 @pytest.fixture
@@ -51,22 +29,6 @@ def study(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(TEXT)
     return path
-
-
-@pytest.fixture
-def command(monkeypatch, capsys):
-    """Run a command line in this process: exit code, output, errors."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            room.main()
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    # pytest turns warnings into errors; on the command line they are lines of text.
-    monkeypatch.setattr("warnings.showwarning", None, raising=False)
-    return run
 
 
 def test_check_says_what_will_be_done(command, study):
@@ -340,7 +302,7 @@ def test_onset_by_every_method(command, study, tmp_path):
 
 
 def test_a_method_that_does_not_apply_says_why(command, study, tmp_path):
-    text = TEXT.replace("weakening_rate = 0.25e12", "critical_slip = 8e-6")
+    text = TEXT.replace("weakening_rate = 250000000000.0", "critical_slip = 8e-6")
     study.write_text(text.replace('"local_criterion"', '"equilibrium"'))
     _, profile = profile_of(study)
     np.save(tmp_path / "p.npy", profile)

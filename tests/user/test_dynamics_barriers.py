@@ -8,6 +8,7 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
+from stiction.dynamics.arrays import Nodes
 from stiction.dynamics.scale import stress_scale
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.plot import film
@@ -45,20 +46,23 @@ def test_a_barrier_does_not_blind_the_onset(height):
 
 
 def test_the_stress_scale_is_the_mean_drop_where_strengths_are_alike_and_grows_with_the_load():
-    rows = np.zeros((6, 4))
-    rows[0], rows[1], rows[4] = [1.0, 1.2, 100.0, np.inf], 0.2, 1.0
-    loads, scales = stress_scale(rows)
+    def nodes(strength, residual):
+        strength = np.array(strength)
+        even, none = np.ones_like(strength), np.zeros_like(strength)
+        return Nodes(strength, none + residual, even, even, even, none)
+
+    strength = np.array([1.0, 1.2, 100.0, np.inf])
+    loads, scales = stress_scale(nodes(strength, 0.2))
     for load in (0.1, 0.3, 1.0, 2.0, 20.0, 60.0, 200.0):
         drop = 3.0 * max(load - 0.2, 0.0)
-        expected = np.mean(np.minimum(rows[0] - 0.2, drop))
+        expected = np.mean(np.minimum(strength - 0.2, drop))
         # Beyond the last load it goes on with the slope of the infinite barrier.
         found = np.interp(load, loads, scales)
         if load > loads[-1]:
             slope = (scales[-1] - scales[-2]) / (loads[-1] - loads[-2])
             found = scales[-1] + slope * (load - loads[-1])
         assert found == pytest.approx(expected, rel=1e-12)
-    even = np.tile(np.array([[1.0], [0.0], [1.0], [1.0], [1.0], [0.0]]), (1, 8))
-    assert np.interp(1.0, *stress_scale(even)) == pytest.approx(1.0, rel=1e-12)
+    assert np.interp(1.0, *stress_scale(nodes([1.0] * 8, 0.0))) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from small_study import lengths, small_study
 
 import stiction as st
 from stiction.cli import app as room
@@ -19,22 +20,13 @@ from stiction.ensemble.work import do_work
 from stiction.errors import WorkerError
 from stiction.stored_run import StoredRun, run_into
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 256},
-        "friction": {"weakening_rate": 0.4e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 3e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 60_000, "seed": 3},
-    "sweep": [{"random.strength.spectrum.correlation_length": [3e-3, 4e-3]}],
-}
+STUDY = small_study(
+    nodes=256,
+    weakening_rate=0.4e12,
+    correlation_length=3e-3,
+    ensemble={"samples": 60_000, "seed": 3},
+    sweep=lengths(3e-3, 4e-3),
+)
 
 # Dask warns of its own affairs (ports, garbage collection) in every version differently.
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -3,14 +3,12 @@
 import csv
 import importlib.util
 import re
-import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.cli import app as room
 from stiction.export import SUFFIXES, columns, export
 
 
@@ -33,18 +31,6 @@ def run(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def command(monkeypatch, capsys):
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            room.main()
-        return ended.value.code or 0, capsys.readouterr()
-
-    monkeypatch.setattr("warnings.showwarning", None, raising=False)
-    return run
-
-
 def test_a_table_reads_back_to_the_last_bit(run, tmp_path):
     with pytest.warns(st.AccuracyWarning, match="strength: profiles along the interface"):
         st.open_run(run).export(tmp_path / "out.csv")
@@ -64,8 +50,8 @@ def test_a_table_reads_back_to_the_last_bit(run, tmp_path):
 
 
 def test_netcdf_holds_everything(run, command, tmp_path):
-    code, said = command("export", run, tmp_path / "out.nc")
-    assert (code, said.err) == (0, "")
+    code, _, err = command("export", run, tmp_path / "out.nc")
+    assert (code, err) == (0, "")
     with xr.open_dataset(tmp_path / "out.nc") as found:
         assert found["strength"].attrs["units"] == "Pa"
         assert found["strength"].dims[-1] == "x"
@@ -73,9 +59,9 @@ def test_netcdf_holds_everything(run, command, tmp_path):
 
 @pytest.mark.parametrize("name", ["out.txt", "out.hdf5", "out"])
 def test_other_suffixes_are_refused(run, command, tmp_path, name):
-    code, said = command("export", run, tmp_path / name)
+    code, _, err = command("export", run, tmp_path / name)
     assert code == 2
-    assert all(suffix in said.err for suffix in SUFFIXES)
+    assert all(suffix in err for suffix in SUFFIXES)
     assert not (tmp_path / name).exists()
     with pytest.raises(st.InputError, match="suffix"):
         st.open_run(run).export(tmp_path / name)
@@ -88,9 +74,9 @@ def test_what_needs_a_library_says_which(run, command, tmp_path, suffix, library
         assert command("export", run, path)[0] == 0
         assert path.exists()
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    code, said = command("export", run, tmp_path / f"other{suffix}")
+    code, _, err = command("export", run, tmp_path / f"other{suffix}")
     assert code == 2
-    assert f"python -m pip install {library}" in said.err
+    assert f"python -m pip install {library}" in err
 
 
 def test_missing_samples_are_nan_and_nothing_is_left_half_written(tmp_path):

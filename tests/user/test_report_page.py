@@ -49,16 +49,17 @@ def test_table(tmp_path):
 
 
 def test_page_escapes_what_it_is_given():
-    claim = ShownClaim("Sec. 1", "<b>bold</b>", "", ("1 & 2",), "does not hold", "")
+    claim = ShownClaim("Sec. 1", "<b>bold</b>", "", ("1 & 2",), "does not hold", "", "below 1 %")
     html = render(
         title="<T>",
         lead="lead",
         headline=[("does not hold", 1)],
         points=["point"],
         exceptions=[],
-        key_table=None,
+        key_tables=[],
         figures=[],
         claims=[("Subject", [claim])],
+        limits=Table.of("limits", "Limits", ("word", "limit"), [("well", "1 %")]),
         parameters=[],
         notes=[],
         provenance=[],

@@ -14,30 +14,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_study import lengths, small_study
 
-from stiction.ensemble import files, resume, scheduler, store, work
+from stiction.ensemble import files, resume, scheduler, store_writer, work
 from stiction.ensemble.files import Lock
-from stiction.ensemble.store import Store
+from stiction.ensemble.store import Store, sealed
+from stiction.ensemble.store_writer import StoreWriter
 from stiction.errors import StoreError
 from stiction.stored_run import StoredRun, folder_beside, run_into
 from stiction.study.study import Study
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 128},
-        "friction": {"weakening_rate": 0.25e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
-    "sweep": [{"random.strength.spectrum.correlation_length": [4e-3, 6e-3]}],
-}
+STUDY = small_study(
+    ensemble={"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
+    sweep=lengths(4e-3, 6e-3),
+)
 
 
 def make_study(**changes):
@@ -118,7 +108,7 @@ def test_a_line_that_says_more_than_its_chunk_holds(run, reference):
     entry = json.loads(lines[0].partition(b" ")[2])
     point, first, count = entry["done"][0]
     entry["done"][0] = [point, first, count + 200]
-    lines[0] = store._sealed(entry)
+    lines[0] = sealed(entry)
     (run / "chunks.jsonl").write_bytes(b"".join(lines))
     state = StoredRun(run).status()
     assert "holds other samples than the list says" in state.damaged[0]
@@ -146,6 +136,32 @@ def test_one_bit_anywhere_is_found_and_mended(run, reference, name):
             assert make_study().run(out=run, workers=1).identical(reference)
         assert StoredRun(run).status().damaged == ()
         assert again(run).identical(reference)
+
+
+@pytest.mark.parametrize("left", [None, 0, 0.5, 0.99], ids=["gone", "empty", "half", "cut"])
+def test_chunks_that_no_list_names_are_said(run, reference, left):
+    path = run / "chunks.jsonl"
+    data = path.read_bytes()
+    path.unlink()
+    if left is not None:
+        path.write_bytes(data[: int(left * len(data))])
+    with pytest.warns(UserWarning, match=r"not in chunks\.jsonl.*running the study again"):
+        found = StoredRun(run).dataset()
+    assert "samples are done" in found.attrs["cut_short"]
+    state = StoredRun(run).status(verify=False)
+    assert state.done < state.samples
+    assert all("not in chunks.jsonl" in text for text in state.damaged)
+    assert again(run).identical(reference)
+
+
+def test_what_joining_has_left_is_no_damage(run, reference):
+    """Killed between the list and the removal of what was joined."""
+    first = chunks(run)[0]
+    (run / "chunks" / "000099-0123abcd.nc").write_bytes(first.read_bytes())
+    assert StoredRun(run).status().damaged == ()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert StoredRun(run).dataset().identical(reference)
 
 
 def test_a_lost_list_is_made_of_the_chunks(run, reference, monkeypatch):
@@ -269,10 +285,11 @@ def test_a_file_system_without_locks(tmp_path, reference, monkeypatch, number):
 
 def test_two_writers_without_a_lock_damage_nothing(tmp_path, reference, monkeypatch):
     """Each joins its chunks and writes the list as if alone; the next run finds all of both."""
-    monkeypatch.setattr(store, "MANY", 3)
+    monkeypatch.setattr(store_writer, "MANY", 3)
     code = (
         "import sys, json; from stiction.ensemble import resume, scheduler;"
-        "resume.FLUSH_SECONDS = 0.0; from stiction.ensemble import store; store.MANY = 3;"
+        "resume.FLUSH_SECONDS = 0.0; from stiction.ensemble import store_writer;"
+        "store_writer.MANY = 3;"
         "scheduler.Sizer.next = lambda sizer, plan, span, *rest: min(20, span.samples);"
         "from stiction.study.study import Study; from stiction.stored_run import run_into;"
         "run_into(Study.from_dict(json.loads(sys.argv[1])), sys.argv[2], lock=False, workers=1)"
@@ -309,7 +326,7 @@ def test_the_name_of_another_writer_is_printed_safely(tmp_path):
 
 @pytest.mark.parametrize("name", ["run", "result.nc"])
 def test_small_chunks_are_joined(tmp_path, reference, monkeypatch, name):
-    monkeypatch.setattr(store, "MANY", 4)
+    monkeypatch.setattr(store_writer, "MANY", 4)
     monkeypatch.setattr(
         scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(7, span.samples)
     )
@@ -327,9 +344,8 @@ def test_killed_while_chunks_are_joined(run, reference, monkeypatch):
     """At each write in turn; nothing is lost, nothing computed again."""
     write = files.write_atomically
     for allowed in range(4):
-        opened = Store(run)
-        opened._lock = files.NoLock()
-        monkeypatch.setattr(store, "MANY", 2)
+        opened = StoreWriter(run, files.NoLock())
+        monkeypatch.setattr(store_writer, "MANY", 2)
         left = [allowed]
 
         def dying(path, content, left=left):
@@ -348,7 +364,7 @@ def test_killed_while_chunks_are_joined(run, reference, monkeypatch):
 
 
 def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "MANY", 3)
+    monkeypatch.setattr(store_writer, "MANY", 3)
     thread = threading.Thread(
         target=lambda: make_study().run(out=tmp_path / "run", workers=1), daemon=True
     )

@@ -6,24 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import scipy.stats
+from small_study import small_study
 
 import stiction as st
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 128},
-        "friction": {"weakening_rate": 0.25e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 4e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 30, "seed": 3},
-}
+STUDY = small_study()
 KEEPING = {"samples": 30, "seed": 3, "keep": ["strength"], "keep_samples": 2}
 LENGTH = "random.strength.spectrum.correlation_length"
 

@@ -15,12 +15,13 @@ import typer
 from stiction import __version__
 from stiction.cli.common import echo
 from stiction.cli.explore import explore
+from stiction.cli.fit import fit
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
 from stiction.cli.runs import export, plot, report, status
 from stiction.cli.rupture import rupture
-from stiction.cli.studies import check, run, schema
+from stiction.cli.studies import check, merge, run, schema
 from stiction.errors import InputError, RunError
 
 app = typer.Typer(
@@ -65,9 +66,11 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
 for command in (
     paper,
     run,
+    merge,
     onset,
     rupture,
     reliability,
+    fit,
     check,
     schema,
     status,

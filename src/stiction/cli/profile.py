@@ -30,6 +30,11 @@ FillGaps = Annotated[
 ]
 
 
+def column(text: str | None) -> str | int | None:
+    """A column by name or number."""
+    return int(text) if text is not None and text.isdecimal() else text
+
+
 def profile_of(
     path: Path,
     problem: Any,
@@ -43,9 +48,6 @@ def profile_of(
 ) -> Any:
     """The strength in a file, on the nodes of a problem."""
     from stiction.profiles import read_profile
-
-    def column(text: str | None) -> str | int | None:
-        return int(text) if text is not None and text.isdecimal() else text
 
     return read_profile(
         path,

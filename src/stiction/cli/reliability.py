@@ -103,9 +103,9 @@ def reliability(
     problem, random, method = loaded.problem, loaded.random, loaded.method
     seed = loaded.ensemble.seed
     others: dict[str, Any] = {"workers": workers, "time_limit": time_limit}
-    # By the local criterion the first unstable patch is the whole interface.
+    # Without arrest the first unstable patch is the whole interface.
     events: list[Event] = ["critical_stress"]
-    if method.type != "local_criterion":
+    if "arrested_events" in method.variables(problem):
         events.append("first_instability")
     # What is asked for last is refused first: the curve may take minutes.
     mistakes = [] if stress is None else check_stress("--stress", stress)

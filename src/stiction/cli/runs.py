@@ -49,7 +49,7 @@ def status(
         if len(open_points) > SHOWN:
             echo(f"  and {len(open_points) - SHOWN} more points that are not complete")
     for text in state.damaged[:SHOWN]:
-        echo(f"  damaged   {text}; running the study again computes it again")
+        echo(f"  damaged   {text}; running the study again mends this")
     if state.verified and not state.damaged:
         echo("  verified  everything that is stored is what was written")
     if state.failures:

@@ -47,7 +47,13 @@ def rupture(
     film: Annotated[
         bool, typer.Option("--film", help="Also a film: rupture.gif, and .mp4 if there is ffmpeg.")
     ] = False,
-    every: Annotated[int, typer.Option(help="Explicit steps between frames kept.")] = 5,
+    every: Annotated[
+        int | None,
+        typer.Option(
+            help="Explicit steps between frames kept; if left out 5, on a plane 20 without a film.",
+            show_default=False,
+        ),
+    ] = None,
     unit: Unit = None,
     x_unit: XUnit = None,
     value: ValueName = None,
@@ -66,7 +72,7 @@ def rupture(
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
     from stiction.export import write_result
-    from stiction.plot.films import can_write_mp4
+    from stiction.plot.film_writer import can_write_mp4
     from stiction.plot.films import film as write_film
     from stiction.plot.style import save_figure
     from stiction.report.rupture_figures import front_figure, rupture_figure
@@ -92,7 +98,14 @@ def rupture(
         )
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
-    result = simulate_rupture(problem, profiles, method=method, every=every)
+    plane = problem.interface.is_plane  # where frames are large, and creep is of less interest
+    result = simulate_rupture(
+        problem,
+        profiles,
+        method=method,
+        every=every or (20 if plane and not film else 5),
+        every_implicit=10 if plane else 1,
+    )
     write_result(result, out / "rupture.nc")
     echo(_summary(result, problem))
     with Meter("drawing the figures"):
@@ -126,21 +139,39 @@ def _summary(result: xr.Dataset, problem: Problem) -> str:
         )
     lines = [
         loads,
-        f"onset at x = {float(result.critical_position) * 1e3:.3f} mm after"
-        f" {float(result.onset_time):.5g} s",
+        f"onset at {_place(result, problem)} after {float(result.onset_time):.5g} s",
     ]
-    if np.isfinite(result.median_rupture_speed):
+    median, fastest = (
+        np.atleast_1d(result[name].values) for name in ("median_rupture_speed", "rupture_speed")
+    )
+    if np.isfinite(median).any():
         lines.append(
-            f"front speed {float(result.median_rupture_speed):.0f} m/s (median;"
+            f"front speed {_along_axes(median)} m/s (median;"
             f" c_R {solid.rayleigh_wave_speed:.0f}, c_s {solid.shear_wave_speed:.0f},"
             f" c_d {solid.dilatational_wave_speed:.0f})"
         )
-    if np.isfinite(result.rupture_speed):
-        fastest = float(result.rupture_speed)
-        text = f"largest apparent speed over 2 h_n {fastest:.0f} m/s"
-        if fastest > solid.dilatational_wave_speed:
+    if np.isfinite(fastest).any():
+        text = f"largest apparent speed over 2 h_n {_along_axes(fastest)} m/s"
+        if np.nanmax(fastest) > solid.dilatational_wave_speed:
             text += ": above c_d, because patches ahead of the front slip before it comes"
         lines.append(text)
-    energy = float(result.radiated_energy[-1])
-    lines.append(f"radiated energy {energy:.4g} J/m; ended by: {result.attrs['stopped']}")
+    energy, unit = float(result.radiated_energy[-1]), result.radiated_energy.attrs["units"]
+    lines.append(f"radiated energy {energy:.4g} {unit}; ended by: {result.attrs['stopped']}")
     return "\n".join(lines)
+
+
+def _place(result: xr.Dataset, problem: Problem) -> str:
+    values = np.atleast_1d(result.critical_position.values) * 1e3
+    pairs = zip(problem.interface.dims, values, strict=True)
+    return ", ".join(f"{dim} = {value:.3f} mm" for dim, value in pairs)
+
+
+def _along_axes(speeds: Any) -> str:
+    """Of a line one number, of a plane one along each axis."""
+    if speeds.size == 1:
+        return f"{speeds[0]:.0f}"
+    return ", ".join(
+        f"{value:.0f} along {dim}"
+        for dim, value in zip("xy", speeds, strict=True)
+        if np.isfinite(value)
+    )

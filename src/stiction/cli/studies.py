@@ -59,6 +59,15 @@ def run(
         bool, typer.Option("--retry", help="Compute stored samples that failed again.")
     ] = False,
     time_limit: TimeLimit = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            metavar="K/N",
+            help="Compute the K-th of N parts only, into RUN.parts, for jobs that know nothing of"
+            " each other; `stiction merge RUN` joins them.",
+            show_default=False,
+        ),
+    ] = None,
     no_lock: Annotated[
         bool,
         typer.Option(
@@ -77,14 +86,20 @@ def run(
     or the command; 3: the time limit was reached; 130: interrupted.
     """
     from stiction._checks import as_path
-    from stiction.stored_run import StoredRun, check_target, run_into
+    from stiction.ensemble.part import as_part
+    from stiction.stored_run import StoredRun, check_target, make_part_folder, run_into
     from stiction.study.study import Study
 
     if sum((workers is not None, scheduler is not None, slurm)) > 1:
         raise InputError("--workers, --scheduler, --slurm: give one of them")
+    mine = None if part is None else as_part(part)
     loaded = Study.from_toml(study)
     loaded.to_dict()
-    check_target(as_path("--out", out))
+    place = as_path("--out", out)
+    if mine is None:
+        check_target(place)
+    else:
+        place = make_part_folder(place, mine)
     try:
         with _terminated_like_interrupted(), _executor(loaded, scheduler, slurm) as executor:
             stored = run_into(
@@ -95,11 +110,12 @@ def run(
                 retry=retry,
                 time_limit=time_limit,
                 lock=not no_lock,
+                part=mine,
             )
     except KeyboardInterrupt:
         try:
-            state = StoredRun(out).status()
-            done = f"{state.done} of {state.samples} samples are stored in {out}"
+            state = StoredRun(place).status()
+            done = f"{state.done} of {state.samples} samples are stored in {place}"
         except RuntimeError:
             done = "nothing is stored yet"
         echo(f"interrupted: {done}; the same command goes on", err=True)
@@ -107,14 +123,40 @@ def run(
     names = ["critical_stress", "friction_coefficient"]
     result = stored.dataset(only=names)
     _show_results(loaded, result)
-    if "cut_short" in result.attrs:
-        text = f"time limit reached: {result.attrs['cut_short']}, stored in {out}"
+    if stored.missing(mine):
+        text = f"time limit reached: {result.attrs['cut_short']}, stored in {place}"
         echo(f"{text}; the same command goes on", err=True)
         raise typer.Exit(3)
     state = stored.status()
-    echo(f"{state.done} samples in {out}")
+    which = "" if mine is None else f"part {mine.number} of {mine.of}: "
+    echo(f"{which}{state.done} samples in {place}")
     if state.failures:
-        _show_failures(state.failures, f"stiction run {study} --out {out} --retry")
+        again = "" if mine is None else f" --part {part}"
+        _show_failures(state.failures, f"stiction run {study} --out {out}{again} --retry")
+        raise typer.Exit(1)
+
+
+def merge(
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="What was given as --out with --part."),
+    ],
+) -> None:
+    """Join the parts of a run that jobs have computed with `stiction run --part K/N`.
+
+    The numbers are those of one run, to the bit. Parts stay as they are. Those that are missing,
+    not finished or damaged are named, and the others are joined.
+
+    Exit code 0: complete; 1: samples are missing or have failed.
+    """
+    from stiction.merge import merge_parts
+
+    stored = merge_parts(run)
+    _show_results(stored.study, stored.dataset(only=["critical_stress", "friction_coefficient"]))
+    state = stored.status()
+    echo(f"{state.done} of {state.samples} samples in {run}")
+    if state.failures:
+        _show_failures(state.failures, f"stiction run STUDY.toml --out {run} --retry")
     if not state.complete:
         raise typer.Exit(1)
 

@@ -14,7 +14,7 @@ from stiction.dynamics import monitor
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 
-FORMAT = 4
+FORMAT = 5
 
 _SLIPS = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
 
@@ -40,25 +40,26 @@ _NAMES = {
 
 def identity(run: Run) -> dict[str, NDArray[Any]]:
     """All that a run depends on besides its state."""
-    medium, rows = run.medium, run.rows
+    medium, setting = run.medium, run.setting
+    grid, nodes = medium.grid, setting.nodes
     # When to stop may differ between the parts of one run; how to step may not.
     control = run.control.copy()
     stops = [monitor.SLID_STOP, monitor.EVENT_STOP, monitor.REST_STOP, monitor.END_TIME]
     control[stops] = 0.0
     values: dict[str, Any] = {
-        "nodes": medium.nodes,
-        "spacing": medium.spacing,
-        "impedance": medium.impedance,
+        "nodes": medium.interface.nodes,
+        "spacing": np.squeeze(medium.interface.spacings),
+        "impedance": grid.impedance,
         "time_step": medium.step,
-        "stiffness": medium.stiffness,
-        "poles": medium.kernel.poles,
-        "weights": medium.kernel.weights,
-        "law": np.concatenate([run.friction.fraction(_SLIPS), *map(np.ravel, run.law)]),
-        "tau_p": rows[0],
-        "tau_r": rows[1],
-        "weakening_rate": rows[2],
-        "profile": rows[4],
-        "initial_stress": rows[5],
+        "stiffness": grid.stiffness,
+        "poles": grid.poles,
+        "weights": grid.weights,
+        "law": np.concatenate([run.friction.fraction(_SLIPS), *map(np.ravel, setting.law)]),
+        "tau_p": nodes.strength,
+        "tau_r": nodes.residual,
+        "weakening_rate": nodes.weakening,
+        "profile": nodes.profile,
+        "initial_stress": nodes.initial,
         "load_times": run.history[0],
         "load_values": run.history[1],
         "control": control,

@@ -18,7 +18,10 @@ _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the str
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the nucleation length is not resolved, with the error to expect."""
-    resolution = problem.nucleation_length_of(rows.steepest_rate) / problem.interface.spacing
+    unit = problem.nucleation_length_of(rows.steepest_rate) / problem.effective_modulus
+    moduli = (problem.effective_modulus, problem.solid.shear_modulus)  # mode II, across it III
+    spacings = problem.interface.spacings
+    resolution = min(unit * g / h for g, h in zip(moduli, spacings, strict=False))
     if resolution < 15.0:
         # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
         # at 8, 16 and 32 nodes.
@@ -40,12 +43,14 @@ def _where_steepest(rows: Sample) -> str:
 
 def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
     """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
-    rates = run.rows[2]
-    longest = problem.nucleation_length_of(1.0) / (FEWEST_NODES * run.medium.spacing)
+    rates, interface = run.setting.nodes.weakening, problem.interface
+    modulus = problem.solid.shear_modulus if interface.is_plane else problem.effective_modulus
+    shortest = problem.nucleation_length_of(1.0) * modulus / problem.effective_modulus
+    longest = shortest / (FEWEST_NODES * interface.spacing)
     steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
     if steep.size:
         warn_accuracy(
-            f"{steep.size} nodes slipped, the first at x = {steep[0] * run.medium.spacing:.6g} m, "
+            f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
             " grid to resolve how they break; take more nodes, or infinite strength for barriers "
             "that never break"
@@ -55,8 +60,8 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
 def warn_if_reversed_before(run: Run, time: float) -> None:
     """Warn if the load went below minus the strength before anything slipped."""
     times, values = run.history
-    lowest = float(values[times <= time].min())
-    _warn_of_reverse(run, lowest * run.rows[4] + run.rows[5] < -run.rows[0], time, lowest)
+    lowest, nodes = float(values[times <= time].min()), run.setting.nodes
+    _warn_of_reverse(run, lowest * nodes.profile + nodes.initial < -nodes.strength, time, lowest)
 
 
 def warn_if_reversed(run: Run, state: State) -> bool:
@@ -78,10 +83,10 @@ def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: floa
     nodes = np.flatnonzero(below)
     if nodes.size:
         warn_accuracy(
-            f"the stress is below minus the strength at {nodes.size} nodes, the first at x = "
-            f"{nodes[0] * run.medium.spacing:.6g} m (up to t = {time:.6g} s, tau_0 = {load:.6g} "
-            "Pa): they would slip in reverse, which is not modelled, and are kept at rest; change "
-            "the sign of the load, or keep it above minus the strength"
+            f"the stress is below minus the strength at {nodes.size} nodes, the first at "
+            f"{run.medium.interface.describe_node(nodes[0])} (up to t = {time:.6g} s, tau_0 = "
+            f"{load:.6g} Pa): they would slip in reverse, which is not modelled, and are kept at "
+            "rest; change the sign of the load, or keep it above minus the strength"
         )
     return bool(nodes.size)
 
@@ -139,7 +144,7 @@ def check_finite(run: Run, state: State, reason: int) -> None:
     if reason == monitor.NOT_FINITE:
         node = int(state.watch[monitor.BAD_NODE])
         raise FloatingPointError(
-            f"the slip rate became non-finite at t = {state.time:.9g} s, x = "
-            f"{node * run.medium.spacing:.6g} m (node {node}), tau_0 = {state.load:.6g} Pa, after "
-            f"{state.steps} steps; the last finite state is kept"
+            f"the slip rate became non-finite at t = {state.time:.9g} s, "
+            f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "
+            f"{state.load:.6g} Pa, after {state.steps} steps; the last finite state is kept"
         )

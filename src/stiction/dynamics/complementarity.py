@@ -11,47 +11,41 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.dynamics.arrays import ImplicitTables, Setting
+from stiction.elasticity.compiled_transform import Transform, backward, forward
 from stiction.friction.kernels import line_at, strength_at
 
 
 @jit
-def _apply(symbol: Array, vector: Array) -> Any:
-    spectrum = np.fft.rfft(vector)
-    for j in range(spectrum.size):
-        spectrum[j] *= symbol[j]
-    return np.fft.irfft(spectrum, vector.size)
+def _apply(transform: Transform, symbol: Array, vector: Array, work: Array, out: Array) -> None:
+    """`out` = the circulant of a symbol times a vector."""
+    forward(transform, vector, work)
+    for q in range(work.size):
+        work[q] *= symbol[q]
+    backward(transform, work, out)
 
 
 @jit
-def _solve(
-    symbol: Array,
-    inverse: Array,
-    falling: Array,
-    state: Any,
-    driving: Array,
-    u: Array,
-    accuracy: float,
-) -> Any:
+def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
     """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
+    u, state, falling, driving = tables.increment, tables.state, tables.falling, tables.driving
+    product, residual, z = tables.product, tables.residual, tables.other
+    direction, work = tables.direction, tables.work
     n = u.size
-    product = _apply(symbol, u)
-    residual = np.empty(n)
+    _apply(transform, tables.symbol, u, work, product)
     worst = 0.0
     for i in range(n):
-        residual[i] = 0.0
+        residual[i] = direction[i] = 0.0
         if state[i] > 0:
             residual[i] = driving[i] - product[i] + falling[i] * u[i]
             worst = max(worst, abs(residual[i]))
     if not worst > accuracy:
         return worst <= accuracy
-    direction = np.zeros(n)
     gain_before = 1.0
     for iteration in range(400):
-        z = _apply(inverse, residual)
+        _apply(transform, tables.inverse, residual, work, z)
         gain = 0.0
         for i in range(n):
             if state[i] > 0:
@@ -59,7 +53,7 @@ def _solve(
         beta = gain / gain_before if iteration > 0 else 0.0
         for i in range(n):
             direction[i] = z[i] + beta * direction[i] if state[i] > 0 else 0.0
-        product = _apply(symbol, direction)
+        _apply(transform, tables.symbol, direction, work, product)
         curvature, stiff = 0.0, 0.0
         for i in range(n):
             if state[i] > 0:
@@ -83,14 +77,10 @@ def _solve(
 
 @jit
 def solve_increment(
-    symbol: Array,
-    inverse: Array,
-    law: Any,
-    rows: Array,
+    transform: Transform,
+    setting: Setting,
     slip: Array,
-    pushed: Array,
-    u: Array,
-    state: Any,
+    tables: ImplicitTables,
     accuracy: float,
     near: float,
 ) -> Any:
@@ -98,28 +88,22 @@ def solve_increment(
 
     Parameters
     ----------
-    symbol, inverse : (nodes//2 + 1,) arrays
-        Eigenvalues of M, Pa/m, and their inverses.
-    law : NamedTuple
-        ``friction.parameters``.
-    rows : (6, nodes) array
-        As in `Run`.
+    transform, setting
     slip : (nodes,) array
         Slip before the step, m.
-    pushed : (nodes,) array
-        Stress g after the step if nothing slipped in it, Pa.
-    u : (nodes,) array
-        First guess, and the increments found, m.
-    state : (nodes,) int array
-        0 stuck, 1 slipping; first guess, and as found.
+    tables : ImplicitTables
+        `symbol`, `inverse` and `pushed`, the stress after the step if nothing slipped in it, are
+        read; `increment` and `state` hold the first guess, and then what is found.
     accuracy : float
         Pa.
     near : float
         Distance (Pa) of the strength from the straight line it is taken for at which that will do.
     """
+    law, nodes = setting.law, setting.nodes
+    strength, floor, weakening = nodes.strength, nodes.residual, nodes.weakening
+    u, state, pushed = tables.increment, tables.state, tables.pushed
+    driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size
-    driving, falling = np.empty(n), np.empty(n)
-    strength, floor, weakening = rows[0], rows[1], rows[2]
     for i in range(n):
         limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
         if state[i] == 0 and pushed[i] > limit:
@@ -129,9 +113,9 @@ def solve_increment(
         start, falling[i] = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
         driving[i] = pushed[i] - start
     for _ in range(60):
-        if not _solve(symbol, inverse, falling, state, driving, u, accuracy):
+        if not _solve(transform, tables, accuracy):
             return False
-        product = _apply(symbol, u)
+        _apply(transform, tables.symbol, u, tables.work, product)
         changed = 0
         for i in range(n):
             if state[i] == 0:

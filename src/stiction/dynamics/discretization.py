@@ -1,4 +1,4 @@
-"""What all runs of one problem share: stiffness, kernel, tables of the explicit step."""
+"""What all runs of one problem share: stiffness, memory kernel, explicit time step."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics.courant_limit import courant_limit
-from stiction.dynamics.memory_layout import step_table
+from stiction._checks import check_memory
+from stiction.dynamics.arrays import Grid
+from stiction.dynamics.courant_limit import courant_limit, plane_limit
+from stiction.dynamics.memory_layout import places
+from stiction.elasticity.compiled_transform import make_transform
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.errors import InputError
 from stiction.friction.kernels import registered
+from stiction.interface import Interface
 from stiction.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -28,38 +32,28 @@ class Medium:
 
     Attributes
     ----------
-    nodes : int
-    spacing : float
-        dx, m.
-    impedance : float
-        Z = G/(2 c_s), Pa s/m.
+    interface : Interface
+    grid : Grid
+        Stiffness, impedance and memory kernel, as kernels take them.
     step : float
         Explicit time step, s.
     largest_step : float
         Limit of stability of the explicit step, s.
-    pace : (nodes//2,) array
-        k c_s, rad/s, of the modes j = 1..nodes//2.
-    stiffness : (2, nodes//2) array
-        G*|k|/2 and G|k|/2, Pa/m.
-    table, gain, fresh : arrays
-        Of the explicit step, see `layout.step_table`.
     shear_modulus, effective_modulus : float
         G and G*, Pa.
     """
 
-    nodes: int
-    spacing: float
-    impedance: float
+    interface: Interface
+    grid: Grid
     step: float
     largest_step: float
-    kernel: ExponentialSum
-    pace: Floats
-    stiffness: Floats
-    table: Floats
-    gain: Floats
-    fresh: Floats
     shear_modulus: float
     effective_modulus: float
+
+    @property
+    def impedance(self) -> float:
+        """Z = G/(2 c_s), Pa s/m."""
+        return self.grid.impedance
 
 
 def refused_laws(problem: Problem) -> list[str]:
@@ -98,13 +92,23 @@ def prepare_medium(
             f"solid.poisson_ratio: elastodynamics in mode II needs {valid}, got "
             f"{solid.poisson_ratio}"
         )
-    eta = solid.wave_speed_ratio
-    kernel = kernel_sum(mode, eta, tolerance, memory_range)
-    speed = solid.shear_wave_speed
-    limit = courant_limit(mode, eta, kernel) * interface.spacing / speed
+    eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
+    modes = ("II", "III") if interface.is_plane else (mode,)
+    kernels = [kernel_sum(each, eta, tolerance, memory_range) for each in modes]
+    check_memory(
+        "interface.nodes",
+        bytes_needed(interface, sum(kernel.poles.size for kernel in kernels)),
+        "take fewer nodes, or a larger kernel_tolerance",
+    )
+    if interface.is_plane:
+        dx, dy = interface.spacings
+        limit = plane_limit(eta, tolerance, memory_range, (dx, dy)) / speed
+    else:
+        limit = courant_limit(mode, eta, kernels[0]) * interface.spacing / speed
     if limit == 0.0:
+        error = max(kernel.error for kernel in kernels)
         raise InputError(
-            f"kernel_tolerance: with an error of {kernel.error:.2g} in the memory kernel waves grow"
+            f"kernel_tolerance: with an error of {error:.2g} in the memory kernel waves grow"
             f" at any time step; got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
         )
     step = courant * limit if time_step is None else time_step
@@ -114,24 +118,53 @@ def prepare_medium(
             f"and solid (c_s dt/dx = {limit * speed / interface.spacing:.3f}); use at most "
             f"{0.9 * limit:.6g} s"
         )
-    wavenumbers = interface.wavenumbers[1:]
-    pace = wavenumbers * speed
-    table, gain, fresh = step_table(kernel, pace, step)
-    stiffness = 0.5 * np.stack(
-        [problem.effective_modulus * wavenumbers, solid.shear_modulus * wavenumbers]
-    )
     return Medium(
-        nodes=interface.size,
-        spacing=interface.spacing,
-        impedance=solid.shear_modulus / (2.0 * speed),
+        interface=interface,
+        grid=_grid(problem, kernels),
         step=step,
         largest_step=limit,
-        kernel=kernel,
-        pace=pace,
-        stiffness=stiffness,
-        table=table,
-        gain=gain,
-        fresh=fresh,
         shear_modulus=solid.shear_modulus,
         effective_modulus=problem.effective_modulus,
     )
+
+
+def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
+    """Stiffness and memory on the modes of the interface.
+
+    On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle and Rice
+    1995): K = (k/2)(G* a + G b), and the memory is (G k/2)[a C_II + b C_III] * V.
+    """
+    solid, interface = problem.solid, problem.interface
+    k = interface.wavenumbers
+    slot, place, copies = places(k.shape)
+    share = interface.in_plane_share
+    if share is None:
+        modulus, pace, own = problem.effective_modulus * k, k[1:], np.ones(k.size - 1)
+    else:
+        modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
+        quarter = slice(0, interface.shape[0] // 2 + 1)  # kx >= 0
+        pace, own = k[quarter].ravel(), share[quarter].ravel()
+    return Grid(
+        transform=make_transform(interface.shape),
+        impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
+        cell=interface.cell,
+        stiffness=0.5 * np.stack([modulus.ravel(), solid.shear_modulus * k.ravel()]),
+        slot=slot,
+        place=place,
+        copies=copies,
+        pace=pace * solid.shear_wave_speed,
+        share=own,
+        poles=np.concatenate([kernel.poles for kernel in kernels]),
+        weights=np.concatenate([kernel.weights for kernel in kernels]),
+        split=kernels[0].poles.size,
+    )
+
+
+def bytes_needed(interface: Interface, pairs: int) -> float:
+    """Memory of one run at its largest, while it takes implicit steps; without frames.
+
+    Memory variables and tables (see `memory_layout`), and some forty arrays of one value a node.
+    """
+    modes = interface.wavenumbers.size
+    tables = 6 * modes / (2 if interface.is_plane else 1)
+    return 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)

@@ -8,220 +8,177 @@ import numpy as np
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.dynamics import monitor
+from stiction.dynamics.arrays import ExplicitTables, Fields, Grid, Setting
+from stiction.dynamics.finish import Taken, arrived, finish_step
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory_layout import advance_memory, pack
-from stiction.dynamics.monitor import (
-    ALL_SLID,
-    ARRIVAL,
-    AT_REST,
-    BAD_NODE,
-    BREAKABLE,
-    CALM_COUNT,
-    CALM_SLIP,
-    CALM_STEPS,
-    CALM_STRESS,
-    CALM_TOP,
-    DONE,
-    DROPPED,
-    EVENT_DROP,
-    EVENT_STOP,
-    EXPLICIT_ONLY,
-    EXPLICIT_STEPS,
-    FIRST_STRESS,
-    KINETIC,
-    LOAD,
-    NOT_FINITE,
-    REC_LOAD,
-    REC_MEAN_SLIP,
-    REC_MEAN_STRESS,
-    REC_STEP,
-    REC_TIME,
-    REC_TOP_RATE,
-    REC_WORK,
-    REST_STOP,
-    SLID,
-    SLID_STOP,
-    STEADY_STRESS,
-    STEP,
-    TIME,
-    TO_IMPLICIT,
-    TOP_RATE,
-    WORK,
-    observe,
-    settle,
-)
-from stiction.dynamics.scale import follow_scale
+from stiction.elasticity.compiled_transform import backward, forward
 from stiction.friction.kernels import strength_at
 
 
 @jit
-def _transfer(
-    slip_hat: Array,
-    rate_hat: Array,
-    step: float,
-    carried: Array,
-    fresh: Array,
-    stiffness: Array,
-    packed: Array,
-    out: Array,
+def _transfer(grid: Grid, slip_hat: Array, carried: Array, tables: ExplicitTables) -> None:
+    """Stress `tables.moved` along the interface if the rate, in `rate_hat`, acts for a step."""
+    rate_hat, packed, fresh, shared = tables.rate_hat, tables.packed, tables.fresh, tables.shared
+    place, step = grid.place, tables.step
+    static, dynamic = grid.stiffness[0], grid.stiffness[1]
+    pack(place, rate_hat, packed)
+    shared[0] = 0.0
+    for q in range(1, shared.size):
+        o = place[q]
+        g, b, c = static[q], fresh[q], dynamic[q]
+        slip = slip_hat[q] + step * rate_hat[q]
+        real = c * (carried[o] + b * packed[o]) - g * slip.real
+        imaginary = c * (carried[o + 64] + b * packed[o + 64]) - g * slip.imag
+        shared[q] = complex(real, imaginary)
+    backward(grid.transform, shared, tables.moved)
+
+
+@jit
+def _predict(
+    fields: Fields, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
-    """Stress transferred along the interface, in Fourier space, if the rate acts for a step."""
-    pack(rate_hat, packed)
-    out[0] = 0.0
-    for j in range(out.size - 1):
-        o = (j // 64) * 128 + j % 64
-        g, b = stiffness[0, j], fresh[j]
-        slip = slip_hat[j + 1] + step * rate_hat[j + 1]
-        real = stiffness[1, j] * (carried[o] + b * packed[o]) - g * slip.real
-        imaginary = stiffness[1, j] * (carried[o + 64] + b * packed[o + 64]) - g * slip.imag
-        out[j + 1] = complex(real, imaginary)
+    """Slip rate `tables.guess` at the end of the step if the present one acted all along."""
+    nodes, law = setting.nodes, setting.law
+    slip, rate, moved, guess = fields.slip, fields.rate, tables.moved, tables.guess
+    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    profile, initial, step = nodes.profile, nodes.initial, tables.step
+    for i in range(slip.size):
+        ahead = slip[i] + step * rate[i]
+        limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
+        guess[i] = max(moved[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
+
+
+@jit
+def _correct(
+    fields: Fields, setting: Setting, tables: ExplicitTables, load: float, impedance: float
+) -> Any:
+    """Slip and stress after the step, the rate in `tables.guess`; return (work, sum of V, slid)."""
+    nodes, law, step = setting.nodes, setting.law, tables.step
+    slip, rate, stress = fields.slip, fields.rate, fields.stress
+    moved, guess = tables.moved, tables.guess
+    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    critical, profile, initial = nodes.critical, nodes.profile, nodes.initial
+    work, total, slid = 0.0, 0.0, 0
+    mean_load = 0.5 * (load + fields.watch[monitor.LOAD])
+    for i in range(slip.size):
+        increment = 0.5 * step * (rate[i] + guess[i])
+        fresh_slip = slip[i] + increment
+        limit = strength_at(law, strength[i], residual[i], weakening[i], fresh_slip)
+        stuck = moved[i] + load * profile[i] + initial[i]
+        v = max(stuck - limit, 0.0) / impedance
+        work += increment * (mean_load * profile[i] + initial[i])
+        guess[i] = v
+        stress[i] = stuck - impedance * v
+        total += v
+        slip[i] = fresh_slip
+        if fresh_slip >= critical[i]:
+            slid += 1
+    return work, total, slid
+
+
+@jit
+def _arrive(
+    fields: Fields, critical: Array, half: float, tables: ExplicitTables, time: float
+) -> Any:
+    """Take over the new rate; return (largest rate, its node, sum of the slip)."""
+    slip, rate, arrival = fields.slip, fields.rate, fields.arrival
+    guess, step = tables.guess, tables.step
+    top, node, slip_sum = -1.0, 0, 0.0
+    for i in range(slip.size):
+        if guess[i] > top:
+            top, node = guess[i], i
+        # d_c = 0 where nothing weakens: there the first slip counts.
+        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
+            increment = 0.5 * step * (rate[i] + guess[i])
+            arrival[i] = arrived(slip[i], half * critical[i], increment, time, step)
+        slip_sum += slip[i]
+        rate[i] = guess[i]
+    return top, node, slip_sum
+
+
+@jit
+def _calm(watch: Array, setting: Setting, step: Taken, impedance: float, rise: float) -> Any:
+    """Count calm steps; whether there were enough of them in a row.
+
+    Waves make slip rates come and go; creep is slow, or as fast as it was.
+    """
+    control, scale = setting.control, watch[monitor.SCALE]
+    quiet = step.top < (
+        control[monitor.CALM_STRESS] * scale / impedance
+        + control[monitor.CALM_SLIP] * rise / step.size
+    )
+    before = watch[monitor.CALM_TOP]
+    steady = 0.5 * before <= step.top <= 2.0 * before
+    if quiet or (steady and step.top < control[monitor.STEADY_STRESS] * scale / impedance):
+        watch[monitor.CALM_STEPS] += 1.0
+    else:
+        watch[monitor.CALM_STEPS], watch[monitor.CALM_TOP] = 0.0, step.top
+    return watch[monitor.CALM_STEPS] >= control[monitor.CALM_COUNT]
 
 
 @jit
 def explicit_steps(
     count: int,
-    step: float,
-    slip: Array,
-    rate: Array,
-    stress: Array,
-    slip_hat: Array,
-    memory: Array,
-    carried: Array,
-    arrival: Array,
-    watch: Array,
-    table: Array,
-    fresh: Array,
-    stiffness: Array,
-    medium: Any,
-    law: Any,
-    rows: Array,
-    load_times: Array,
-    load_values: Array,
-    scale_loads: Array,
-    scales: Array,
-    control: Array,
+    fields: Fields,
+    grid: Grid,
+    setting: Setting,
+    tables: ExplicitTables,
     record: Array,
 ) -> Any:
     """Take up to `count` explicit steps in place; return (steps taken, reason).
 
     Parameters
     ----------
-    slip, rate, stress, arrival : (nodes,) arrays
-        m, m/s, Pa, and the time when half of the strength was lost (nan before), s; updated.
-    slip_hat : (nodes//2 + 1,) complex array
-    memory, carried, table : packed as in `layout`
-    fresh : (nodes//2,) array
-    stiffness : (2, nodes//2) array
-        G*|k|/2 and G|k|/2, Pa/m.
-    medium : (4,) array
-        Z = G/(2 c_s) (Pa s/m), dx (m), <p>, <tau_i>.
-    law : NamedTuple
-        ``friction.parameters``.
-    rows : (6, nodes) array
-        As in `Run`.
-    scale_loads, scales : arrays
-        Stress scale against the load, Pa.
-    control : array
-        Thresholds, see `track`.
+    fields : Fields
+        Updated; `memory` holds psi/B.
+    grid, setting
+    tables : ExplicitTables
+        Their room to work is overwritten.
     record : (>= count, columns) array, or with no rows to keep nothing.
     """
-    n = slip.size
-    impedance, spacing = medium[0], medium[1]
-    pairs = memory.size // (carried.size * 2)
-    packed = np.zeros(carried.size)
-    out = np.empty(slip_hat.size, np.complex128)
-    guess = np.empty(n)
-    strength, residual, weakening = rows[0], rows[1], rows[2]
-    critical, profile, initial = rows[3], rows[4], rows[5]
-    half = control[ARRIVAL]
-    keep = record.shape[0] > 0
-    load_before = watch[LOAD]
+    n, impedance, step = fields.slip.size, grid.impedance, tables.step
+    watch, control, rate_hat = fields.watch, setting.control, tables.rate_hat
+    slip_hat = fields.slip_hat
+    half = control[monitor.ARRIVAL]
     for taken in range(count):
-        time = watch[TIME] + step
-        load = load_at(load_times, load_values, time)
-        rate_hat = np.fft.rfft(rate)
-        _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
-        moved = np.fft.irfft(out, n)
-        for i in range(n):
-            ahead = slip[i] + step * rate[i]
-            limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
-            guess[i] = max(moved[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
-        guess_hat = np.fft.rfft(guess)
-        for j in range(rate_hat.size):
-            rate_hat[j] = 0.5 * (rate_hat[j] + guess_hat[j])
-        _transfer(slip_hat, rate_hat, step, carried, fresh, stiffness, packed, out)
-        moved = np.fft.irfft(out, n)
-        work, total, slid = 0.0, 0.0, 0
-        mean_load = 0.5 * (load + load_before)
-        for i in range(n):
-            increment = 0.5 * step * (rate[i] + guess[i])
-            fresh_slip = slip[i] + increment
-            limit = strength_at(law, strength[i], residual[i], weakening[i], fresh_slip)
-            stuck = moved[i] + load * profile[i] + initial[i]
-            v = max(stuck - limit, 0.0) / impedance
-            work += increment * (mean_load * profile[i] + initial[i])
-            guess[i] = v
-            stress[i] = stuck - impedance * v
-            total += v
-            slip[i] = fresh_slip
-            if fresh_slip >= critical[i]:
-                slid += 1
+        time = watch[monitor.TIME] + step
+        load = load_at(setting.load_times, setting.load_values, time)
+        forward(grid.transform, fields.rate, rate_hat)
+        _transfer(grid, slip_hat, fields.carried, tables)
+        _predict(fields, setting, tables, load, impedance)
+        forward(grid.transform, tables.guess, tables.shared)
+        for q in range(rate_hat.size):
+            rate_hat[q] = 0.5 * (rate_hat[q] + tables.shared[q])
+        _transfer(grid, slip_hat, fields.carried, tables)
+        work, total, slid = _correct(fields, setting, tables, load, impedance)
         if not np.isfinite(total):
             for i in range(n):
-                if not np.isfinite(guess[i]):
-                    watch[BAD_NODE] = i
+                if not np.isfinite(tables.guess[i]):
+                    watch[monitor.BAD_NODE] = i
                     break
-            watch[TIME] = time
-            return taken, NOT_FINITE
-        top, node, slip_sum = -1.0, 0, 0.0
-        for i in range(n):
-            if guess[i] > top:
-                top, node = guess[i], i
-            # d_c = 0 where nothing weakens: there the first slip counts.
-            if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
-                increment = 0.5 * step * (rate[i] + guess[i])
-                past = slip[i] - half * critical[i]
-                arrival[i] = time - step * min(1.0, past / max(increment, 1e-300))
-            slip_sum += slip[i]
-            rate[i] = guess[i]
-        for j in range(rate_hat.size):
-            slip_hat[j] += step * rate_hat[j]
-        advance_memory(memory, table, packed, carried, pairs)
+            watch[monitor.TIME] = time
+            return taken, monitor.NOT_FINITE
+        top, node, slip_sum = _arrive(fields, setting.nodes.critical, half, tables, time)
+        for q in range(rate_hat.size):
+            slip_hat[q] += step * rate_hat[q]
+        advance_memory(
+            fields.memory, tables.table, tables.packed, fields.carried, grid.poles.size, grid.copies
+        )
+        rise = abs(load - watch[monitor.LOAD])
+        watch[monitor.EXPLICIT_STEPS] += 1.0
         radiated = impedance * total / n
-        mean_stress = medium[3] + load * medium[2] - radiated
-        watch[TIME], watch[LOAD], watch[TOP_RATE], watch[SLID] = time, load, top, slid
-        watch[WORK] += work * spacing
-        watch[EXPLICIT_STEPS] += 1.0
-        watch[STEP] = step
-        rise = abs(load - load_before)
-        load_before = load
-        scale = follow_scale(watch, control, scale_loads, scales, load)
-        fall = observe(watch, time, load, mean_stress, radiated, node)
-        if slid >= control[BREAKABLE] and watch[KINETIC] == -np.inf:
-            watch[KINETIC] = mean_stress
-        if keep:
-            record[taken, REC_TIME], record[taken, REC_LOAD], record[taken, REC_MEAN_STRESS] = (
-                time,
-                load,
-                mean_stress,
-            )
-            record[taken, REC_MEAN_SLIP], record[taken, REC_TOP_RATE] = slip_sum / n, top
-            record[taken, REC_STEP], record[taken, REC_WORK] = step, watch[WORK]
-        if slid >= control[SLID_STOP]:
-            return taken + 1, ALL_SLID
-        if control[EVENT_STOP] > 0.0 and fall > watch[EVENT_DROP]:
-            return taken + 1, DROPPED
-        # Waves make slip rates come and go; creep is slow, or as fast as it was.
-        quiet = top < control[CALM_STRESS] * scale / impedance + control[CALM_SLIP] * rise / step
-        steady = 0.5 * watch[CALM_TOP] <= top <= 2.0 * watch[CALM_TOP]
-        if quiet or (steady and top < control[STEADY_STRESS] * scale / impedance):
-            watch[CALM_STEPS] += 1.0
-        else:
-            watch[CALM_STEPS], watch[CALM_TOP] = 0.0, top
-        if watch[CALM_STEPS] >= control[CALM_COUNT]:
-            settle(watch, mean_stress, radiated)
-            if control[REST_STOP] > 0.0 and watch[FIRST_STRESS] > -np.inf:
-                return taken + 1, AT_REST
-            if not control[EXPLICIT_ONLY] > 0.0:
-                return taken + 1, TO_IMPLICIT
-    return count, DONE
+        done = Taken(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
+        fall = finish_step(watch, setting, record, taken, done)
+        if slid >= control[monitor.SLID_STOP]:
+            return taken + 1, monitor.ALL_SLID
+        if control[monitor.EVENT_STOP] > 0.0 and fall > watch[monitor.EVENT_DROP]:
+            return taken + 1, monitor.DROPPED
+        if _calm(watch, setting, done, impedance, rise):
+            monitor.settle(watch, watch[monitor.MEAN_STRESS], radiated)
+            if control[monitor.REST_STOP] > 0.0 and watch[monitor.FIRST_STRESS] > -np.inf:
+                return taken + 1, monitor.AT_REST
+            if not control[monitor.EXPLICIT_ONLY] > 0.0:
+                return taken + 1, monitor.TO_IMPLICIT
+    return count, monitor.DONE

@@ -12,18 +12,20 @@ from stiction._checks import as_names
 from stiction.dynamics import monitor
 from stiction.dynamics.energies import fracture_energy, strain_energy
 from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.summary import per_area
 from stiction.errors import InputError, unknown_name
-from stiction.results import Variable
+from stiction.interface import Interface
+from stiction.results import Variable, along
 
 Floats = NDArray[np.float64]
 
-FIELDS: dict[str, Variable] = {
-    "slip": Variable("m", "slip", ("time", "x")),
-    "slip_rate": Variable("m/s", "slip rate", ("time", "x")),
-    "shear_stress": Variable("Pa", "shear stress on the interface", ("time", "x")),
-    "strength": Variable("Pa", "current strength", ("time", "x")),
+_FIELDS: dict[str, Variable] = {
+    "slip": Variable("m", "slip", ("time",)),
+    "slip_rate": Variable("m/s", "slip rate", ("time",)),
+    "shear_stress": Variable("Pa", "shear stress on the interface", ("time",)),
+    "strength": Variable("Pa", "current strength", ("time",)),
 }
-SCALARS: dict[str, Variable] = {
+_SCALARS: dict[str, Variable] = {
     "load": Variable("Pa", "load factor tau_0", ("time",)),
     "mean_stress": Variable("Pa", "mean shear stress on the interface", ("time",)),
     "mean_slip": Variable("m", "mean slip", ("time",)),
@@ -37,7 +39,7 @@ SCALARS: dict[str, Variable] = {
     "time_step": Variable("s", "size of the last step", ("time",)),
     "step_number": Variable("1", "steps taken so far", ("time",)),
 }
-STEPS: dict[str, Variable] = {
+_STEPS: dict[str, Variable] = {
     "step_time": Variable("s", "time after each step", ("step",)),
     "step_load": Variable("Pa", "load factor tau_0 after each step", ("step",)),
     "step_mean_stress": Variable("Pa", "mean shear stress after each step", ("step",)),
@@ -47,6 +49,16 @@ STEPS: dict[str, Variable] = {
     "step_work": Variable("J/m", "work of the load up to each step", ("step",)),
 }
 TIME = Variable("s", "time from zero load", ("time",))
+FIELDS, SCALARS, STEPS = tuple(_FIELDS), tuple(_SCALARS), tuple(_STEPS)
+"""Names of what frames hold, over time and the interface, over time, and over steps."""
+
+
+def frame_variables(interface: Interface) -> dict[str, Variable]:
+    """What all of them mean."""
+    fields = {name: along(interface, variable) for name, variable in _FIELDS.items()}
+    return fields | {
+        name: per_area(interface, variable) for name, variable in (_SCALARS | _STEPS).items()
+    }
 
 
 def check_variables(names: Sequence[str]) -> None:
@@ -80,14 +92,14 @@ class Frames:
 
     def add(self, state: State) -> None:
         """Keep a frame of the state as it is now."""
-        run, rows = self.run, self.run.rows
+        run, nodes = self.run, self.run.setting.nodes
         medium, watch = run.medium, state.watch
-        spacing = medium.spacing
-        dissipated = fracture_energy(run.friction, state.slip, rows)
-        fracture = float(dissipated.sum()) * spacing
+        cell = medium.interface.cell
+        dissipated = fracture_energy(run.friction, state.slip, nodes)
+        fracture = float(dissipated.sum()) * cell
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
-            strain = strain_energy(state.slip_hat, medium.stiffness[0], spacing)
-        friction = fracture + float((rows[1] * state.slip).sum()) * spacing
+            strain = strain_energy(state.slip_hat, medium.grid)
+        friction = fracture + float((nodes.residual * state.slip).sum()) * cell
         work = float(watch[monitor.WORK])
         frame: dict[str, Any] = {
             "time": state.time,
@@ -95,8 +107,8 @@ class Frames:
             "mean_stress": state.mean_stress,
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
-            "weakened_fraction": float(watch[monitor.SLID]) / medium.nodes,
-            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * spacing,
+            "weakened_fraction": float(watch[monitor.SLID]) / state.slip.size,
+            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
             "work": work,
             "strain_energy": strain,
             "fracture_energy": fracture,
@@ -110,7 +122,8 @@ class Frames:
             "shear_stress": state.stress,
             "strength": run.strength_after(state.slip),
         }
-        frame |= {name: fields[name].copy() for name in self.variables}
+        shape = medium.interface.shape
+        frame |= {name: fields[name].reshape(shape).copy() for name in self.variables}
         self._frames.append(frame)
 
     def take(self) -> dict[str, NDArray[Any]]:
@@ -120,8 +133,8 @@ class Frames:
             for name in ("time", *SCALARS, *self.variables)
         }
         if not self._frames:
-            n = self.run.medium.nodes
-            values |= {name: np.empty((0, n)) for name in self.variables}
+            shape = self.run.medium.interface.shape
+            values |= {name: np.empty((0, *shape)) for name in self.variables}
         if self.keep_steps:
             record = np.concatenate([np.empty((0, monitor.COLUMNS)), *self._records])
             values |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.dynamics import monitor
+from stiction.dynamics.arrays import ExplicitTables, Fields, ImplicitTables, Setting
 from stiction.dynamics.discretization import Medium
 from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import implicit_steps
+from stiction.dynamics.implicit_tables import make_tables
 from stiction.dynamics.loading import History, load_at
-from stiction.dynamics.memory_layout import LANES, blocks, carry_memory, scale_memory
-from stiction.dynamics.scale import follow_scale, stress_scale
+from stiction.dynamics.memory_layout import carry_memory, empty_memory, scale_memory, step_table
+from stiction.dynamics.scale import follow_scale
 from stiction.friction.kernels import strengths
 from stiction.friction.law import FrictionLaw
 
@@ -33,13 +33,13 @@ class State:
     Attributes
     ----------
     slip, rate, stress : (nodes,) arrays
-        m, m/s, Pa.
-    slip_hat : (nodes//2 + 1,) complex array
+        m, m/s, Pa; flat, also on a plane.
+    slip_hat : (modes,) complex array
         Real transform of the slip.
     past : (nodes,) array
         Mean slip rate in the last implicit step, m/s.
     memory : flat array
-        Memory variables as in `layout`: psi/B while explicit, psi while implicit.
+        Memory variables as in `memory_layout`: psi/B while explicit, psi while implicit.
     carried : flat array
         The memory's part of the next explicit step.
     arrival : (nodes,) array
@@ -65,6 +65,14 @@ class State:
     step: float
 
     @property
+    def fields(self) -> Fields:
+        """The arrays, as compiled steps take them."""
+        return Fields(
+            self.slip, self.rate, self.stress, self.slip_hat, self.past, self.memory, self.carried,
+            self.arrival, self.watch,
+        )  # fmt: skip
+
+    @property
     def time(self) -> float:
         """s."""
         return float(self.watch[monitor.TIME])
@@ -85,82 +93,87 @@ class State:
         return int(self.watch[monitor.EXPLICIT_STEPS] + self.watch[monitor.IMPLICIT_STEPS])
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(eq=False)
 class Run:
-    """One interface under one load history: what does not change in a run.
+    """One interface under one load history: what does not change in a run, and tables of steps.
 
     Attributes
     ----------
+    medium : Medium
     friction : FrictionLaw
-    rows : (6, nodes) array
-        tau_p (infinite where nothing breaks), tau_r (Pa), W at zero slip (Pa/m), the slip from
-        which on a node counts as at its residual strength (m), p, tau_i (Pa).
-    constants : (4,) array
-        Z, dx, <p>, <tau_i>.
+    setting : Setting
     steepest_rate : float
         Largest rate, Pa/m, at which a node that may break weakens at any slip.
     least_load : float
         Load below which nothing runs away: the mean strength of the weakest nodes that make up
         half a nucleation length, Pa. A few nodes of next to no strength do not count, nor do
         nodes that do not weaken.
+    tables : ExplicitTables, ImplicitTables or None
+        Of the kind of step that was taken last: one kind at a time is enough, and they are large.
     """
 
     medium: Medium
     friction: FrictionLaw
-    rows: Floats
-    constants: Floats
-    history: History
-    control: Floats
+    setting: Setting
     steepest_rate: float
     least_load: float
+    tables: ExplicitTables | ImplicitTables | None = None
+
+    @property
+    def control(self) -> Floats:
+        """Thresholds, see `monitor`."""
+        return self.setting.control
+
+    @property
+    def history(self) -> History:
+        """Times (s) and values (Pa) of the load."""
+        return self.setting.load_times, self.setting.load_values
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Static stress of a slip at a load, Pa: what an interface at rest carries."""
-        stress_hat = np.zeros_like(slip_hat)
-        stress_hat[1:] = -self.medium.stiffness[0] * slip_hat[1:]
-        shared: Floats = np.fft.irfft(stress_hat, self.medium.nodes)
-        return shared + load * self.rows[4] + self.rows[5]
+        grid, nodes = self.medium.grid, self.setting.nodes
+        interface = self.medium.interface
+        stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
+        shared: Floats = interface.inverse_transform(stress_hat).ravel()
+        return shared + load * nodes.profile + nodes.initial
 
     def scale_at(self, load: float) -> float:
         """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
-        return float(load_at(*self.scale, max(load, self.least_load)))
-
-    @functools.cached_property
-    def law(self) -> NamedTuple:
-        """The friction law as compiled kernels take it."""
-        return self.friction.parameters
+        setting = self.setting
+        return float(load_at(setting.scale_loads, setting.scales, max(load, self.least_load)))
 
     def strength_after(self, slip: Floats) -> Floats:
         """Strength after a slip (m), Pa."""
-        found: Floats = strengths(self.law, self.rows[0], self.rows[1], self.rows[2], slip)
+        nodes = self.setting.nodes
+        found: Floats = strengths(
+            self.setting.law, nodes.strength, nodes.residual, nodes.weakening, slip
+        )
         return found
 
-    @functools.cached_property
+    @property
     def first_load(self) -> float:
         """Load at which the first node reaches its strength, if nothing has slipped, Pa."""
-        return float(np.min((self.rows[0] - self.rows[5]) / self.rows[4]))
-
-    @functools.cached_property
-    def scale(self) -> History:
-        """Stress scale against the load, Pa, see `stress_scale`."""
-        return stress_scale(self.rows)
+        nodes = self.setting.nodes
+        return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
 
     def start(self, time: float, slip: Floats | None = None) -> State:
         """State of rest (or of an equilibrium with this slip) at a time, with an empty memory.
 
         Where the stress is above the strength by more than round-off, explicit steps come first.
         """
-        n, pairs = self.medium.nodes, self.medium.kernel.poles.size
-        count = blocks(n)
-        delta = np.zeros(n) if slip is None else np.array(slip, dtype=np.float64)
+        interface, nodes, setting = self.medium.interface, self.setting.nodes, self.setting
+        delta = np.zeros(interface.size)
+        if slip is not None:
+            delta = np.array(slip, dtype=np.float64).ravel()
+        memory, carried = empty_memory(self.medium.grid)
         watch = np.zeros(monitor.FIELDS)
         load = float(load_at(*self.history, time))
-        slip_hat = np.fft.rfft(delta)
+        slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
         stress = self.elastic_stress(slip_hat, load)
         limit = self.strength_after(delta)
         rate = np.maximum(stress - limit, 0.0) / self.medium.impedance
         # A node that has just reached its strength has not begun to slip: drop round-off.
-        rate[rate * self.medium.impedance < 1e-12 * self.rows[0]] = 0.0
+        rate[rate * self.medium.impedance < 1e-12 * nodes.strength] = 0.0
         stress = stress - self.medium.impedance * rate
         watch[monitor.TIME], watch[monitor.LOAD] = time, load
         watch[monitor.MEAN_STRESS] = watch[monitor.PEAK_STRESS] = stress.mean()
@@ -170,10 +183,11 @@ class Run:
         watch[monitor.PEAK_NODE] = int(np.argmax(stress - limit))
         watch[monitor.FIRST_STRESS] = watch[monitor.KINETIC] = -np.inf  # not yet
         watch[monitor.BAD_NODE] = -1.0
-        scale = follow_scale(watch, self.control, *self.scale, max(load, self.least_load))
+        least = max(load, self.least_load)
+        scale = follow_scale(watch, setting.control, setting.scale_loads, setting.scales, least)
         watch[monitor.TOP_RATE] = rate.max()
-        watch[monitor.SLID] = np.count_nonzero(delta >= self.rows[3])
-        half = self.control[monitor.ARRIVAL] * self.rows[3]
+        watch[monitor.SLID] = np.count_nonzero(delta >= nodes.critical)
+        half = self.control[monitor.ARRIVAL] * nodes.critical
         arrival = np.where((delta > 0.0) & (delta >= half), time, np.nan)
         size = self.control[monitor.SMALLEST_STEP]
         slope = self.slope(time)
@@ -184,8 +198,8 @@ class Run:
             stress=stress,
             slip_hat=slip_hat,
             past=rate.copy(),
-            memory=np.zeros(count * pairs * 4 * LANES),
-            carried=np.zeros(count * 2 * LANES),
+            memory=memory,
+            carried=carried,
             arrival=arrival,
             watch=watch,
             explicit=bool(
@@ -200,14 +214,6 @@ class Run:
         times, values = self.history
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
-
-    @functools.cached_property
-    def turns(self) -> Floats:
-        """Times at which the load begins to fall or to rise again, s."""
-        times, values = self.history
-        rising = np.sign(np.diff(values))
-        turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
-        return turned
 
     def ended(self, state: State) -> bool:
         """Whether the end time is reached, up to the rounding of a sum of many steps."""
@@ -225,26 +231,38 @@ class Run:
         )
 
     def _to_explicit(self, state: State) -> None:
-        pairs = self.medium.kernel.poles.size
-        scale_memory(state.memory, self.medium.gain, pairs, divide=True)
-        carry_memory(state.memory, self.medium.table, state.carried, pairs)
+        grid, tables = self.medium.grid, self._explicit_tables()
+        scale_memory(grid, state.memory, tables.step, divide=True)
+        carry_memory(state.memory, tables.table, state.carried, grid.poles.size, grid.copies)
         state.explicit = True
         state.watch[monitor.CALM_STEPS] = 0.0
         state.watch[monitor.CALM_TOP] = state.rate.max()
 
     def _to_implicit(self, state: State) -> None:
-        scale_memory(state.memory, self.medium.gain, self.medium.kernel.poles.size, divide=False)
+        scale_memory(self.medium.grid, state.memory, self.medium.step, divide=False)
         state.explicit = False
         state.past = state.rate.copy()
         state.watch[monitor.PAST_STEP] = 0.0  # the first implicit step is one of first order
         state.watch[monitor.RADIATED] = self.medium.impedance * state.rate.mean()
         state.step = 2.0 * float(self.control[monitor.SMALLEST_STEP])
 
+    def _explicit_tables(self) -> ExplicitTables:
+        if not isinstance(self.tables, ExplicitTables):
+            self.tables = None  # let go of the others before these are made
+            self.tables = step_table(self.medium.grid, self.medium.step)
+        return self.tables
+
+    def _implicit_tables(self) -> ImplicitTables:
+        if not isinstance(self.tables, ImplicitTables):
+            self.tables = None
+            self.tables = make_tables(self.medium.grid)
+        return self.tables
+
     def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
         The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
-        or NOT_FINITE of `track`. Rows of `record` are filled, one a step.
+        or NOT_FINITE of `monitor`. Rows of `record` are filled, one a step.
         """
         taken = 0
         while taken < count:
@@ -270,20 +288,14 @@ class Run:
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
         taken, reason = explicit_steps(
-            count, medium.step, state.slip, state.rate, state.stress, state.slip_hat,
-            state.memory, state.carried, state.arrival, state.watch, medium.table, medium.fresh,
-            medium.stiffness, self.constants, self.law, self.rows, *self.history, *self.scale,
-            self.control, record,
-        )  # fmt: skip
+            count, state.fields, medium.grid, self.setting, self._explicit_tables(), record
+        )
         return int(taken), int(reason)
 
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
-        medium = self.medium
         taken, size, reason = implicit_steps(
-            count, state.step, state.slip, state.rate, state.stress, state.slip_hat,
-            state.past, state.memory, state.arrival, state.watch, medium.kernel.poles,
-            medium.kernel.weights, medium.pace, medium.stiffness, self.constants, self.law,
-            self.rows, *self.history, self.turns, *self.scale, self.control, record,
+            count, state.step, state.fields, self.medium.grid, self.setting,
+            self._implicit_tables(), record,
         )  # fmt: skip
         state.step = float(size)
         return int(taken), int(reason)

@@ -34,6 +34,14 @@ def load_at(times: Array, values: Array, t: float) -> Any:
     return values[low] + slope * (t - times[low])
 
 
+def turns(history: History) -> Floats:
+    """Times at which the load begins to fall or to rise again, s."""
+    times, values = history
+    rising = np.sign(np.diff(values))
+    turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
+    return turned
+
+
 def uniform_rate(rate: float) -> History:
     """tau_0 = rate t, without end."""
     return np.array([0.0, 1.0]), np.array([0.0, rate])

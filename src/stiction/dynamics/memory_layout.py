@@ -1,9 +1,11 @@
 """How memory variables lie in memory: blocks of 64 modes, so that one pass stays in registers.
 
-Modes j = 1..n/2 (the mean has no memory) are padded to whole blocks. Fourier arrays are packed as
-[block][real, imaginary][64], memory variables as [block][pair][4][64] with the four rows real and
-imaginary part of the memory of the real signal, then of the imaginary signal. The constant row
-length lets the compiler vectorise without run-time checks of overlap.
+Tables have a slot for each wave vector that differs in what waves do: on a line k > 0, on a plane
+kx >= 0 and ky >= 0, because (kx, ky) and (-kx, ky), two copies, share |k| and the share of mode II.
+Slots are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier arrays as
+[block][copy][real, imaginary][64] and memory variables as [block][copy][pair][4][64] with the four
+rows real and imaginary part of the memory of the real signal, then of the imaginary signal. The
+constant row length lets the compiler vectorise without run-time checks of overlap.
 """
 
 from __future__ import annotations
@@ -15,126 +17,157 @@ from numpy.typing import NDArray
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.dynamics.arrays import ExplicitTables, Grid, Ints, Spectrum
 from stiction.dynamics.courant_limit import phi
-from stiction.elasticity.exponential_sum import ExponentialSum
 
 LANES = 64
 
 Floats = NDArray[np.float64]
 
 
-def blocks(nodes: int) -> int:
-    """Number of blocks of modes for so many nodes."""
-    return -(-(nodes // 2) // LANES)
+def places(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
+    """Slot and place of each mode of a transform of this shape, and copies a slot; see `Grid`."""
+    if len(half) == 1:
+        slot = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
+        copy, copies = np.zeros_like(slot), 1
+    else:
+        row = np.arange(half[0])
+        folded = np.minimum(row, half[0] - row)
+        slot = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
+        copy, copies = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
+    return slot, (slot // LANES * copies + copy) * (2 * LANES) + slot % LANES, copies
 
 
-def _packed(rows: list[Floats], count: int) -> Floats:
-    """Rows of shape (pairs, modes) as [block][pair][row][64], padded with zeros, flat."""
-    pairs, modes = rows[0].shape
-    table = np.zeros((count, pairs, len(rows), LANES))
-    for r, row in enumerate(rows):
-        padded = np.zeros((pairs, count * LANES))
-        padded[:, :modes] = row
-        table[:, :, r, :] = padded.reshape(pairs, count, LANES).transpose(1, 0, 2)
-    return table.ravel()
+def blocks(slots: int) -> int:
+    """Number of blocks for so many slots."""
+    return -(-slots // LANES)
 
 
-def step_table(kernel: ExponentialSum, pace: Floats, step: float) -> tuple[Floats, Floats, Floats]:
-    """Tables of one fixed explicit step.
+def rooms(count: int, size: int, kind: type) -> list[NDArray[Any]]:
+    """Arrays to work in, apart by what is no multiple of a page: stores then hold up no loads.
+
+    (Of addresses that are equal modulo 4096 bytes, processors take a load to depend on the store
+    before it; with grids of powers of two that would cost half a step.)
+    """
+    apart = size + 80
+    whole: NDArray[Any] = np.empty(count * apart, dtype=kind)
+    return [whole[i * apart : i * apart + size] for i in range(count)]
+
+
+def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
+    """Memory variables and the array carried from one explicit step to the next, all zero."""
+    count = blocks(grid.pace.size) * grid.copies * LANES
+    return np.zeros(count * grid.poles.size * 4), np.zeros(count * 2)
+
+
+def _weights(grid: Grid, some: slice) -> Spectrum:
+    """Weights of some slots, (pairs, slots)."""
+    in_plane = (np.arange(grid.poles.size) < grid.split)[:, None]
+    share = np.where(in_plane, grid.share[some], 1.0 - grid.share[some])
+    weights: Spectrum = grid.weights[:, None] * share
+    return weights
+
+
+def step_table(grid: Grid, step: float) -> ExplicitTables:
+    """Tables of one fixed explicit step h.
 
     Parameters
     ----------
-    kernel : ExponentialSum
-    pace : (n/2,) array
-        k c_s of the modes j = 1..n/2, rad/s.
+    grid : Grid
     step : float
         h, s.
 
     Returns
     -------
-    decay : flat array [block][pair][4][64]
-        E = exp(s k c_s h) and w E B, B = h phi(s k c_s h): the memory is kept as psi/B.
-    gain : flat array [block][pair][2][64]
-        B, to turn psi/B into psi and back, s.
-    fresh : (n/2,) array
-        Re sum_p w B: weight of the current slip rate, s.
+    ExplicitTables
+        `table`, flat [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h);
+        the memory is kept as psi/B. `fresh`, (modes,): Re sum_p w B, weight of the current slip
+        rate, s.
     """
-    z = np.multiply.outer(kernel.poles, pace * step)
-    decay, gain = np.exp(z), step * phi(z)
-    carry = kernel.weights[:, None] * decay * gain
-    count = -(-pace.size // LANES)
-    table = _packed([decay.real, decay.imag, carry.real, carry.imag], count)
-    fresh = np.sum((kernel.weights[:, None] * gain).real, axis=0)
-    return table, _packed([gain.real, gain.imag], count), fresh
+    pairs, count = grid.poles.size, blocks(grid.pace.size)
+    table = np.zeros((count, pairs, 4, LANES))
+    fresh = np.empty(grid.pace.size)
+    for block in range(count):  # one by one: their exponentials together would take more than it
+        some = slice(block * LANES, (block + 1) * LANES)
+        z = np.multiply.outer(grid.poles, grid.pace[some] * step)
+        decay, gain, weights = np.exp(z), step * phi(z), _weights(grid, some)
+        carry = weights * decay * gain
+        rows = (decay.real, decay.imag, carry.real, carry.imag)
+        for row, values in enumerate(rows):
+            table[block, :, row, : values.shape[1]] = values
+        fresh[some] = np.sum((weights * gain).real, axis=0)
+    modes, nodes = grid.slot.size, int(np.prod(grid.transform.shape))
+    packed = np.zeros(count * grid.copies * 2 * LANES)
+    spectra, fields = rooms(2, modes, complex), rooms(2, nodes, float)
+    return ExplicitTables(step, table.ravel(), fresh[grid.slot], packed, *spectra, *fields)
 
 
 @jit
-def pack(spectrum: Array, packed: Array) -> None:
-    """Modes 1.. of a real transform into packed order."""
-    modes = spectrum.size - 1
-    for j in range(modes):
-        o = (j // 64) * 128 + j % 64
-        packed[o] = spectrum[j + 1].real
-        packed[o + 64] = spectrum[j + 1].imag
+def pack(place: Array, spectrum: Array, packed: Array) -> None:
+    """All modes of a transform but the mean into packed order."""
+    for q in range(1, spectrum.size):
+        o = place[q]
+        packed[o] = spectrum[q].real
+        packed[o + 64] = spectrum[q].imag
 
 
 @jit
-def advance_memory(memory: Array, table: Array, rate: Array, carried: Array, pairs: int) -> None:
+def advance_memory(
+    memory: Array, table: Array, rate: Array, carried: Array, pairs: int, copies: int
+) -> None:
     """y <- E y + V and carried = Re sum w E B y, for all modes and pairs: the one pass."""
-    for block in range(rate.size // 128):
-        so = block * 128
-        for j in range(128):
-            carried[so + j] = 0.0
-        for p in range(pairs):
-            o = (block * pairs + p) * 256
-            for j in range(64):
-                er, ei = table[o + j], table[o + 64 + j]
-                cr, ci = table[o + 128 + j], table[o + 192 + j]
-                yr, yi = memory[o + j], memory[o + 64 + j]
-                ar = er * yr - ei * yi + rate[so + j]
-                ai = er * yi + ei * yr
-                memory[o + j] = ar
-                memory[o + 64 + j] = ai
-                carried[so + j] += cr * ar - ci * ai
-                yr, yi = memory[o + 128 + j], memory[o + 192 + j]
-                ar = er * yr - ei * yi + rate[so + 64 + j]
-                ai = er * yi + ei * yr
-                memory[o + 128 + j] = ar
-                memory[o + 192 + j] = ai
-                carried[so + 64 + j] += cr * ar - ci * ai
+    for own in range(table.size // (256 * pairs)):
+        for copy in range(copies):
+            block = own * copies + copy
+            # Views that begin at zero: the compiler then knows that no index is negative.
+            v, c = rate[block * 128 :][:128], carried[block * 128 :][:128]
+            for j in range(128):
+                c[j] = 0.0
+            for p in range(pairs):
+                y = memory[(block * pairs + p) * 256 :][:256]
+                e = table[(own * pairs + p) * 256 :][:256]
+                for j in range(64):
+                    er, ei = e[j], e[64 + j]
+                    cr, ci = e[128 + j], e[192 + j]
+                    yr, yi = y[j], y[64 + j]
+                    ar = er * yr - ei * yi + v[j]
+                    ai = er * yi + ei * yr
+                    y[j] = ar
+                    y[64 + j] = ai
+                    c[j] += cr * ar - ci * ai
+                    yr, yi = y[128 + j], y[192 + j]
+                    ar = er * yr - ei * yi + v[64 + j]
+                    ai = er * yi + ei * yr
+                    y[128 + j] = ar
+                    y[192 + j] = ai
+                    c[64 + j] += cr * ar - ci * ai
 
 
 @jit
-def carry_memory(memory: Array, table: Array, carried: Array, pairs: int) -> Any:
+def carry_memory(memory: Array, table: Array, carried: Array, pairs: int, copies: int) -> Any:
     """carried = Re sum w E B y without advancing: where an explicit phase begins."""
     for block in range(carried.size // 128):
-        so = block * 128
+        c = carried[block * 128 :][:128]
         for j in range(128):
-            carried[so + j] = 0.0
+            c[j] = 0.0
         for p in range(pairs):
-            o = (block * pairs + p) * 256
+            y = memory[(block * pairs + p) * 256 :][:256]
+            e = table[(block // copies * pairs + p) * 256 :][:256]
             for j in range(64):
-                cr, ci = table[o + 128 + j], table[o + 192 + j]
-                carried[so + j] += cr * memory[o + j] - ci * memory[o + 64 + j]
-                carried[so + 64 + j] += cr * memory[o + 128 + j] - ci * memory[o + 192 + j]
+                cr, ci = e[128 + j], e[192 + j]
+                c[j] += cr * y[j] - ci * y[64 + j]
+                c[64 + j] += cr * y[128 + j] - ci * y[192 + j]
 
 
-def scale_memory(memory: Floats, gain: Floats, pairs: int, *, divide: bool) -> None:
+def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
     """psi = B y, or y = psi/B with `divide`, in place: at the switch between kinds of step."""
-    b = gain.reshape(-1, pairs, 2, LANES)
-    factor = b[:, :, 0] + 1j * b[:, :, 1]
-    factor = np.where(factor == 0.0, 1.0, factor)  # padding
-    y = memory.reshape(-1, pairs, 4, LANES)
-    for row in (0, 2):
-        value = y[:, :, row] + 1j * y[:, :, row + 1]
-        value = value / factor if divide else value * factor
-        y[:, :, row], y[:, :, row + 1] = value.real, value.imag
-
-
-def present_memory(memory: Floats, weights: NDArray[np.complex128], pairs: int) -> Floats:
-    """Re sum w psi in packed order: the memory's part of the stress now, m."""
-    y = memory.reshape(-1, pairs, 4, LANES)
-    w = weights[None, :, None]
-    real = np.sum(w.real * y[:, :, 0] - w.imag * y[:, :, 1], axis=1)
-    imaginary = np.sum(w.real * y[:, :, 2] - w.imag * y[:, :, 3], axis=1)
-    return np.stack([real, imaginary], axis=1).ravel()
+    count = blocks(grid.pace.size)
+    y = memory.reshape(count, grid.copies, grid.poles.size, 4, LANES)
+    for block in range(count):
+        pace = grid.pace[block * LANES : (block + 1) * LANES]
+        factor = step * phi(np.multiply.outer(grid.poles, pace * step))
+        part = y[block, ..., : pace.size]
+        for row in (0, 2):
+            value = part[:, :, row] + 1j * part[:, :, row + 1]
+            value = value / factor if divide else value * factor
+            part[:, :, row], part[:, :, row + 1] = value.real, value.imag

@@ -11,19 +11,20 @@ from pydantic import BeforeValidator, Field
 
 from stiction._model import Count, Positive, _number, model
 from stiction.dynamics import monitor
+from stiction.dynamics.arrays import Nodes, Setting
 from stiction.dynamics.checks import (
     SLOWEST,
     check_finite,
     check_pace,
-    resolves_steps,
     warn_if_coarse,
     warn_if_reversed_before,
     warn_if_unresolved,
 )
 from stiction.dynamics.discretization import Medium, prepare_medium, refused_laws
-from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
-from stiction.dynamics.integrator import Run, State
-from stiction.dynamics.loading import History, first_reach, uniform_rate
+from stiction.dynamics.integrator import Run
+from stiction.dynamics.loading import History, first_reach, turns, uniform_rate
+from stiction.dynamics.scale import stress_scale
+from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.law import FrictionLaw
 from stiction.problem import SMALLEST_EIGENVALUE, Problem
@@ -40,20 +41,6 @@ _STEADY_STRESS = 1e-2  # Z V of creep, likewise
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
-_MORE: dict[str, Variable] = {
-    "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
-    "onset_time": Variable("s", "time from zero load when the mean stress was largest"),
-    "kinetic_stress": Variable("Pa", "mean stress when all that can break had broken"),
-    "stress_drop": Variable("Pa", "critical stress less kinetic stress"),
-    "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
-    "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
-    "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
-    "arrested_events": Variable("1", "instabilities that stopped before the whole interface slid"),
-    "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
-    "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
-    "implicit_steps": Variable("1", "implicit steps taken"),
-    "explicit_steps": Variable("1", "explicit steps taken"),
-}
 Stop = Literal["sliding", "onset", "rest"]
 # Not known yet when a run stops at its onset.
 _LATER = (
@@ -154,18 +141,19 @@ class Rupture:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """About how long a sample takes on one core, s."""
-        return 0.1 * (problem.interface.size / 1024) ** 2
+        shape = problem.interface.shape
+        if len(shape) == 1:
+            return 0.1 * (shape[0] / 1024) ** 2
+        # Steps as the longer side has nodes, each as dear as the plane has nodes.
+        return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        reasons = refused_laws(problem)
-        if problem.interface.is_plane:
-            reasons.append("it does not take interfaces of two dimensions")
-        return reasons
+        return refused_laws(problem)
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        return onset_variables(problem.interface) | _MORE
+        return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
         """Kernel and tables for a problem."""
@@ -213,7 +201,7 @@ class Rupture:
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
         if self.stop == "onset":
-            found |= dict.fromkeys(_LATER, np.nan)
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
         return found
 
 
@@ -230,16 +218,18 @@ def make_run(
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     finite = np.isfinite(strength)
     critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
-    table = np.stack([strength, residual, weakening, critical, rows.load_profile, initial])
+    every = (strength, residual, weakening, critical, rows.load_profile, initial)
+    nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in every))
+    scale = stress_scale(nodes)
     control = np.zeros(monitor.CONTROLS)
     control[monitor.BREAKABLE] = np.count_nonzero(finite)
     set_stop(control, method.stop)
     # Calm: for as long as shear waves need to cross the interface, nothing slips faster than a
     # crack of half its length does when the load alone drives it, or nothing faster than before.
     control[monitor.CALM_STRESS], control[monitor.STEADY_STRESS] = _CALM_STRESS, _STEADY_STRESS
-    length = medium.nodes * medium.spacing
-    control[monitor.CALM_SLIP] = length / medium.effective_modulus
-    crossing = 2.0 * np.pi / medium.pace[0] / medium.step
+    interface, pace = medium.interface, medium.grid.pace
+    control[monitor.CALM_SLIP] = max(interface.lengths) / medium.effective_modulus
+    crossing = 2.0 * np.pi / pace[pace > 0.0].min() / medium.step
     control[monitor.CALM_COUNT] = max(_CALM_STEPS, np.ceil(crossing))
     control[monitor.SLIP_STEP] = method.slip_step
     control[monitor.SMALL_DROP] = _SMALL_DROP
@@ -255,17 +245,28 @@ def make_run(
     control[monitor.ARRIVAL] = friction.slip_at(0.5) / friction.reach
     control[monitor.CURVED] = 0.0 if friction.linear else 1.0
     control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
-    constants = np.array(
-        [medium.impedance, medium.spacing, float(rows.load_profile.mean()), float(initial.mean())]
-    )
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
-    half = SMALLEST_EIGENVALUE * medium.effective_modulus / steepest  # of h_n
+    # Half a nucleation length: of a line, or on a plane along x times along y.
+    moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
+    half = np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli])
     weakens = finite & (critical > 0.0)
     loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
-    weakest = round(min(max(half / medium.spacing, 1.0), loads.size))
+    weakest = round(min(max(half / interface.cell, 1.0), loads.size))
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
-    return Run(medium, friction, table, constants, history, control, steepest, least)
+    setting = Setting(
+        law=friction.parameters,
+        nodes=nodes,
+        mean_profile=float(nodes.profile.mean()),
+        mean_initial=float(nodes.initial.mean()),
+        load_times=history[0],
+        load_values=history[1],
+        turns=turns(history),
+        scale_loads=scale[0],
+        scales=scale[1],
+        control=control,
+    )
+    return Run(medium, friction, setting, steepest, least)
 
 
 def set_stop(control: Floats, stop: str) -> None:
@@ -278,49 +279,3 @@ def set_stop(control: Floats, stop: str) -> None:
 def first_slip(run: Run) -> float:
     """When the first node reaches its strength, s."""
     return first_reach(run.history, run.first_load)
-
-
-def front_speed(problem: Problem, run: Run, state: State, lengths: float) -> Floats:
-    """Apparent speed of the front, m/s, over a window in units of the shortest h_n, (nodes,)."""
-    shortest = problem.nucleation_length_of(run.steepest_rate)
-    if not resolves_steps(run, state.time):
-        return np.full(run.medium.nodes, np.nan)
-    window = min(max(lengths * shortest, 8.0 * run.medium.spacing), 0.25 * problem.interface.extent)
-    return rupture_speed(state.arrival, run.medium.spacing, window)
-
-
-def _of_finite(statistic: Callable[[Floats], Any], values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(statistic(finite)) if finite.size else np.nan
-
-
-def summary(problem: Problem, run: Run, state: State) -> dict[str, float]:
-    """The scalars of a finished run."""
-    medium, watch, rows = run.medium, state.watch, run.rows
-    peak = float(watch[monitor.PEAK_STRESS])
-    first = float(watch[monitor.FIRST_STRESS])
-    far, near = (front_speed(problem, run, state, lengths) for lengths in (2.0, 0.5))
-    kinetic = float(watch[monitor.KINETIC])
-    kinetic = kinetic if np.isfinite(kinetic) else np.nan
-    dissipated = fracture_energy(run.friction, state.slip, rows)
-    return {
-        "critical_load": (peak - run.constants[3]) / run.constants[2],
-        "critical_stress": peak,
-        "first_instability": first if np.isfinite(first) else peak,
-        "critical_position": float(watch[monitor.PEAK_NODE]) * medium.spacing,
-        "applied_load": float(watch[monitor.PEAK_LOAD]),
-        "onset_time": float(watch[monitor.PEAK_TIME]),
-        "kinetic_stress": kinetic,
-        "stress_drop": peak - kinetic,
-        "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.spacing,
-        "radiated_energy": radiated_energy(
-            run.friction, float(watch[monitor.WORK]), state.slip, state.slip_hat, rows,
-            medium.stiffness[0], medium.spacing,
-        ),
-        "fracture_energy": float(dissipated.sum()) * medium.spacing,
-        "arrested_events": int(watch[monitor.ARRESTED]),
-        "rupture_speed": _of_finite(np.max, far),
-        "median_rupture_speed": _of_finite(np.median, near),
-        "implicit_steps": int(watch[monitor.IMPLICIT_STEPS]),
-        "explicit_steps": int(watch[monitor.EXPLICIT_STEPS]),
-    }  # fmt: skip

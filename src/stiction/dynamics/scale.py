@@ -5,23 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._jit import jit
 from stiction._typing import Array
+from stiction.dynamics import monitor
+from stiction.dynamics.arrays import Nodes
 from stiction.dynamics.loading import History, load_at
-from stiction.dynamics.monitor import (
-    EVENT_DROP,
-    EVENT_DROP_SIZE,
-    PEAK_WIDTH,
-    PEAK_WIDTH_SIZE,
-    SCALE,
-)
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
 
 
-def stress_scale(rows: NDArray[np.float64]) -> History:
+def stress_scale(nodes: Nodes) -> History:
     """The stress scale as a function of the load: (loads, scales), Pa, straight between them.
 
     The mean over nodes of tau_p - tau_r, no node counting for more than `REACH` times
@@ -31,10 +25,10 @@ def stress_scale(rows: NDArray[np.float64]) -> History:
 
     Parameters
     ----------
-    rows : (6, nodes) array
-        As in `Run`.
+    nodes : Nodes
     """
-    strength, residual, profile, initial = rows[0], rows[1], rows[4], rows[5]
+    strength, residual = nodes.strength, nodes.residual
+    profile, initial = nodes.profile, nodes.initial
     begin = (residual - initial) / profile
     end = begin + (strength - residual) / (REACH * profile)
     slope = REACH * profile / profile.size
@@ -50,8 +44,8 @@ def stress_scale(rows: NDArray[np.float64]) -> History:
 @jit
 def follow_scale(watch: Array, control: Array, loads: Array, scales: Array, load: float) -> Any:
     """The stress scale of the largest load so far, Pa; sizes of events follow it."""
-    scale = max(watch[SCALE], load_at(loads, scales, load))
-    watch[SCALE] = scale
-    watch[EVENT_DROP] = control[EVENT_DROP_SIZE] * scale
-    watch[PEAK_WIDTH] = control[PEAK_WIDTH_SIZE] * scale
+    scale = max(watch[monitor.SCALE], load_at(loads, scales, load))
+    watch[monitor.SCALE] = scale
+    watch[monitor.EVENT_DROP] = control[monitor.EVENT_DROP_SIZE] * scale
+    watch[monitor.PEAK_WIDTH] = control[monitor.PEAK_WIDTH_SIZE] * scale
     return scale

@@ -31,18 +31,17 @@ from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
     first_slip,
-    front_speed,
     make_run,
     set_stop,
-    summary,
 )
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
+from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profiles import at_nodes
-from stiction.results import Variable
+from stiction.results import DIRECTION, Variable, along, coordinate
 from stiction.sample import named_profiles
 
 Stop = Literal["sliding", "onset", "rest", "time"]
@@ -51,9 +50,9 @@ _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they 
 _NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
 
 _ALONG: dict[str, Variable] = {
-    "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
-    "arrival_time": Variable("s", "when half of the strength was lost", ("x",)),
-    "front_speed": Variable("m/s", "apparent speed of the rupture front", ("x",)),
+    "peak_strength": Variable("Pa", "peak strength tau_p", ()),
+    "arrival_time": Variable("s", "when half of the strength was lost", ()),
+    "front_speed": Variable("m/s", "apparent speed of the rupture front", ()),
 }
 
 
@@ -159,14 +158,14 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
         check_pace(run, time)
         warn_if_reversed_before(run, time)
         return run.start(time)
-    nodes = run.medium.nodes
+    shape = run.medium.interface.shape
     try:
         start = real_array(slip)
     except TypeError:
         start = np.full(1, np.nan)
-    if start.shape != (nodes,) or not (np.all(np.isfinite(start)) and np.all(start >= 0.0)):
+    if start.shape != shape or not (np.all(np.isfinite(start)) and np.all(start >= 0.0)):
         raise InputError(
-            f"initial_slip: must be ({nodes},) numbers in m, finite and nowhere negative, got "
+            f"initial_slip: must be {shape} numbers in m, finite and nowhere negative, got "
             f"{describe(slip)}"
         )
     time = first_reach(run.history, float(load), "initial_load")
@@ -298,11 +297,10 @@ def simulate_rupture(
         if restart is not None:
             stream.drop_after(state.steps)
     frames = Frames(run, variables, steps=steps)
-    x = problem.interface.x
 
     def flush() -> None:
         if stream is not None and frames.pending:
-            stream.append(chunk_dataset(frames.take(), x, attributes), state.steps)
+            stream.append(chunk_dataset(frames.take(), problem.interface, attributes), state.steps)
 
     if restart is None:
         frames.add(state)
@@ -361,7 +359,7 @@ def simulate_rupture(
         dataset.attrs["stopped"] = reason
         dataset.attrs["store"] = str(stream.folder)
     else:
-        dataset = chunk_dataset(frames.take(), x, attributes)
+        dataset = chunk_dataset(frames.take(), problem.interface, attributes)
     result = _complete(dataset, problem, method, run, state)
     return result if measured is None else with_gaps(problem, result, measured)
 
@@ -392,16 +390,16 @@ def _complete(
     dataset: xr.Dataset, problem: Problem, method: Rupture, run: Run, state: State
 ) -> xr.Dataset:
     """Add what belongs to the run as a whole."""
-    speed = front_speed(problem, run, state, 0.5)
-    along: dict[str, NDArray[Any]] = {
-        "peak_strength": run.rows[0],
+    fields: dict[str, NDArray[Any]] = {
+        "peak_strength": run.setting.nodes.strength,
         "arrival_time": state.arrival,
-        "front_speed": speed,
+        "front_speed": front_speed(problem, run, state),
     }
-    for name, values in along.items():
-        variable = _ALONG[name]
+    interface = problem.interface
+    for name, values in fields.items():
+        variable = along(interface, _ALONG[name])
         attrs = {"units": variable.units, "long_name": variable.long_name}
-        dataset[name] = (variable.dims, values, attrs)
+        dataset[name] = (variable.dims, values.reshape(interface.shape), attrs)
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         scalars = summary(problem, run, state)
     for name, value in scalars.items():
@@ -409,5 +407,9 @@ def _complete(
         label = {"units": variable.units, "long_name": variable.long_name}
         # Energies and moment are already there over 'time'; their last value is the total.
         if name not in dataset:
-            dataset[name] = ((), value, label)
+            dataset[name] = (variable.dims[1:], value, label)
+    if interface.is_plane:
+        names, what = coordinate(interface, DIRECTION)
+        dataset = dataset.assign_coords({DIRECTION: (DIRECTION, names)})
+        dataset[DIRECTION].attrs["long_name"] = what.long_name
     return dataset

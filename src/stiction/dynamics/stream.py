@@ -8,28 +8,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._checks import as_names, as_path, check_flag
-from stiction.dynamics.frames import FIELDS, SCALARS, STEPS, TIME
+from stiction.dynamics.frames import FIELDS, STEPS, TIME, frame_variables
 from stiction.errors import InputError
-from stiction.results import Variable, to_dataset
+from stiction.interface import Interface
+from stiction.results import coordinate, to_dataset
 
 FORMAT = 2
-POSITION = Variable("m", "position along the interface", ("x",))
 _MANIFEST = "rupture.json"
 
 
 def chunk_dataset(
-    values: Mapping[str, NDArray[Any]], x: NDArray[np.float64], attributes: Mapping[str, Any]
+    values: Mapping[str, NDArray[Any]], interface: Interface, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
     """Frames as a labelled dataset."""
     data = {name: value for name, value in values.items() if name != "time"}
-    variables = {**FIELDS, **SCALARS, **STEPS}
-    coordinates = {"time": (values["time"], TIME), "x": (x, POSITION)}
-    return to_dataset(data, variables, coordinates, attributes)
+    places = {dim: coordinate(interface, dim) for dim in interface.dims}
+    coordinates = {"time": (values["time"], TIME), **places}
+    return to_dataset(data, frame_variables(interface), coordinates, attributes)
 
 
 def _replace(path: Path, write: Any) -> None:
@@ -127,7 +126,7 @@ def open_rupture(
     folder : path
         As given to `simulate_rupture` as `store`.
     variables : sequence of str, optional
-        Fields over ('time', 'x') to load; all that were stored if left out.
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were stored if left out.
     steps : bool
         Load the record of every step too.
 
@@ -165,7 +164,7 @@ def open_rupture(
         names = [v for v in STEPS if v in parts[0]]
         framed = framed.merge(
             xr.concat(
-                [p[names].drop_vars(("time", "x"), errors="ignore") for p in parts],
+                [p[names].drop_vars(("time", "x", "y"), errors="ignore") for p in parts],
                 dim="step",
                 join="override",
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.ensemble.files import Arrays, decode, digest, encode
-from stiction.ensemble.same import identity
+from stiction.ensemble.manifest import identity
 from stiction.ensemble.scheduler import Span
 from stiction.ensemble.work import Outcome
 from stiction.results import Variable
@@ -133,6 +133,34 @@ class Table:
     def done(self) -> NDArray[np.int64]:
         """Its samples in stretches, as in `Chunk.done`."""
         return _stretches(self.values["point"], self.values["sample"])
+
+    def at(self, samples: Callable[[Rows, Rows], NDArray[np.bool_]]) -> Table:
+        """The rows of some samples, told by their points and numbers."""
+        point, sample, wide_point, wide_sample = self.rows
+        narrow, wide = samples(point, sample), samples(wide_point, wide_sample)
+        values = {
+            name: value[narrow if value.shape[0] == point.size else wide]
+            for name, value in self.values.items()
+            if name not in ROWS
+        }
+        rows = (point[narrow], sample[narrow], wide_point[wide], wide_sample[wide])
+        return replace(self, values=dict(zip(ROWS, rows, strict=True)) | values)
+
+    @property
+    def narrow(self) -> Arrays:
+        """The columns with one row a sample, but for those that say which."""
+        rows = self.values["point"].size
+        return {
+            name: value
+            for name, value in self.values.items()
+            if name not in ROWS and value.shape[0] == rows
+        }
+
+    @property
+    def keys(self) -> list[tuple[int, int]]:
+        """Point and sample of each row."""
+        point, sample = self.rows[:2]
+        return list(zip(point.tolist(), sample.tolist(), strict=True))
 
     @property
     def rows(self) -> tuple[Rows, Rows, Rows, Rows]:

@@ -31,6 +31,7 @@ from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
 from stiction.evaluation import Method, check_method
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.random.coefficients import in_stress, mean_in_stress
 from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField, warn_if_inaccurate
 from stiction.random.random_interface import RandomInterface, as_random_interface
@@ -56,6 +57,8 @@ def make_plan(
     interface = None
     try:
         interface = as_random_interface(random)
+        if isinstance(problem, Problem):
+            interface = in_stress(problem, interface)
     except InputError as error:
         problems += error.problems
     number = whole(seed)
@@ -179,11 +182,15 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        for field, interface in pairs:
-            warn_if_inaccurate(field, interface)
-        for problem, random in dict.fromkeys((plan.problem, plan.random) for plan in plans):
-            warn_of_units(problem, random.strength.mean)
-            check_residual(problem, random.properties)
+        with Meter("checking the fields", len(pairs) + len(plans), unit="fields") as meter:
+            for field, interface in pairs:
+                warn_if_inaccurate(field, interface)
+                meter.advance()
+            for plan in plans:
+                problem, fields = plan.problem, plan.random.properties
+                warn_of_units(problem, mean_in_stress(problem, fields, "strength"))
+                check_residual(problem, fields)
+                meter.advance()
     found_warnings = list(dict.fromkeys((str(w.message), w.category) for w in caught))
     for text, category in found_warnings[:FEW]:
         warn_user(text, category)

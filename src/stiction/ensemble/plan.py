@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from stiction._typing import Array
 from stiction.evaluation import Method, Values, accepted, solve, variables_of
 from stiction.problem import Problem
+from stiction.random.coefficients import profiles_in_stress
 from stiction.random.draws import block_of
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, along
@@ -68,9 +69,10 @@ class Plan:
 
     def profiles(self, first: int, samples: int) -> dict[str, Array]:
         """The random profiles of samples first .. first + samples - 1, by name."""
-        return self.random.profiles(
+        found = self.random.profiles(
             self.problem.interface, samples=samples, seed=self.seed, first=first
         )
+        return profiles_in_stress(self.problem, self.random, found)
 
     def wide_rows(self, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of these samples keep their wide variables."""

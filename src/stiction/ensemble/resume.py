@@ -8,10 +8,11 @@ from concurrent.futures import Executor
 
 from stiction._progress import Meter, Show
 from stiction.ensemble.monte_carlo import method_name
+from stiction.ensemble.part import Part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.scheduler import share_out, usable_cores
-from stiction.ensemble.store import Store
+from stiction.ensemble.store_writer import StoreWriter
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
 
@@ -21,7 +22,7 @@ HOPELESS = 16
 
 
 def run_stored(
-    store: Store,
+    store: StoreWriter,
     plans: Sequence[Plan],
     samples: int,
     *,
@@ -31,8 +32,9 @@ def run_stored(
     progress: Show = True,
     retry: bool = False,
     time_limit: float | None = None,
+    part: Part | None = None,
 ) -> list[Failure]:
-    """Compute what is missing in a store, and store it as it is done, about once a second.
+    """Compute what is missing in a store, or in a part, and store it about once a second.
 
     Samples that fail are listed in the store and the others go on, unless all fail from the
     start. When the seconds of `time_limit` are over, it ends; what is missing stays missing.
@@ -51,7 +53,7 @@ def run_stored(
     WorkerError
         If workers are lost.
     """
-    spans = store.missing(len(plans), samples, first, retry=retry)
+    spans = store.missing(len(plans), samples, first, retry=retry, part=part)
     to_do = sum(span.samples for span in spans)
     variables = variables_in(plans)
     alive = {point for chunk in store.chunks for point in chunk.done[:, 0].tolist()}

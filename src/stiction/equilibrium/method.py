@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from stiction._model import Real, model
+from stiction._model import Real, _count, model
 from stiction.equilibrium.pieces import pieces_of, refused
 from stiction.equilibrium.plane_solver import PlaneSolver
 from stiction.equilibrium.solver import Solver
@@ -16,6 +16,7 @@ from stiction.problem import Problem
 from stiction.results import Variable, along, onset_variables, position
 from stiction.sample import Sample as Samples
 
+Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
 BOUNDS = {
@@ -35,6 +36,13 @@ AREA = Variable("m2", "area of the patch that becomes unstable first")
 JUMPS = {
     "arrested_events": Variable("1", "number of instabilities that came to rest"),
     "residual_reached": Variable("1", "whether a node was at its residual strength before sliding"),
+}
+_OF_EVENT = ("sample", "event")
+EVENTS = {
+    "event_stress": Variable("Pa", "mean stress at each arrested event", _OF_EVENT),
+    "event_position": Variable("m", "centre of the slip added by the event", _OF_EVENT),
+    "event_length": Variable("m", "length of the patch that slipped", _OF_EVENT),
+    "event_moment": Variable("N", "shear modulus times slip added, per unit depth", _OF_EVENT),
 }
 SLIDING_POSITION = Variable("m", "position of the patch that runs along the whole interface")
 SLIP = Variable("m", "slip at the first instability")
@@ -73,6 +81,10 @@ class Equilibrium:
         that the interface slides, instead of until a length at which no fracture energy stops a
         rupture (Griffith). Takes 5 to 50 % longer; of 5,250 samples it changed none. On planes
         it is always done.
+    events : int
+        Of lines: also return the first so many arrested events of each sample over 'event', nan
+        where there are fewer: a sequence, since stress and slip are carried on from one to the
+        next. `equilibrium_events` has all of them.
     gap : float
         Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are always
         solved to round-off.
@@ -110,9 +122,11 @@ class Equilibrium:
     slip: bool = False
     discretization_error: bool = False
     prove_sliding: bool = False
+    events: Number = 0
     gap: Gap = 1e-6
     wavenumbers: Literal["spectral", "lattice"] = "spectral"
     type: Literal["equilibrium"] = "equilibrium"
+    first_stage: ClassVar[str] = "local_criterion"
 
     @property
     def chunk_size(self) -> int:
@@ -143,6 +157,10 @@ class Equilibrium:
                     "on a plane it takes strength that falls linearly with slip only; use"
                     " st.SlipWeakening(...)"
                 )
+            if self.events:
+                reasons.append(
+                    "events are kept of lines only; use st.equilibrium_events(...) for planes"
+                )
         elif self.wavenumbers != "spectral":
             reasons.append(
                 "wavenumbers is a choice for planes only; leave wavenumbers = 'spectral'"
@@ -162,6 +180,8 @@ class Equilibrium:
         else:
             variables |= PATCHES | LENGTH
         variables |= JUMPS | {"sliding_position": position(interface, SLIDING_POSITION)}
+        if self.events:
+            variables |= EVENTS
         if self.slip:
             variables["slip"] = along(problem.interface, SLIP)
         if self.sensitivity:
@@ -186,5 +206,6 @@ class Equilibrium:
                 self.wavenumbers,
             )  # fmt: skip
         return Solver(
-            problem, self.sensitivity, self.slip, self.discretization_error, self.prove_sliding
-        )
+            problem, self.sensitivity, self.slip, self.discretization_error, self.prove_sliding,
+            events=self.events,
+        )  # fmt: skip

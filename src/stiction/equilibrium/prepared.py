@@ -71,7 +71,7 @@ class Setting:
         column = stiffness_column(self.nodes, problem.interface.extent, self.modulus)
         self.grid = Grid(column, coupling_strip(column))
         self.wide_column = np.tile(column, 3)
-        profile = np.broadcast_to(problem.load.profile, problem.interface.shape)
+        profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
         self.profile = np.array(profile[nodes], dtype=np.float64)
         uniform = rate is not None and np.ptp(rate) == 0.0
         self.usual_rate = float(np.max(rate)) if uniform else np.nan

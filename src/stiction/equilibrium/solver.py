@@ -59,6 +59,8 @@ class Solver:
         Whether to follow jumps until no balance of forces is left.
     nodes : slice
         Nodes of the problem that the rows have.
+    events : int
+        How many arrested events to return of each row.
     """
 
     def __init__(
@@ -69,10 +71,12 @@ class Solver:
         discretization_error: bool = False,
         prove_sliding: bool = False,
         nodes: slice = slice(None),
+        events: int = 0,
     ) -> None:
         self.setting = Setting(problem, nodes, prove_sliding)
         self.sensitivity = sensitivity
         self.slip = slip
+        self.events = events
         self.halves: list[Solver] = []
         if discretization_error:
             discretization.check(problem)
@@ -159,6 +163,8 @@ class Solver:
             "residual_reached": residual,
             "sliding_position": sliding_at,
         }
+        if self.events:
+            values |= self._sequences(rows, events)
         if self.slip:
             values["slip"] = slips
         if self.sensitivity:
@@ -249,6 +255,23 @@ class Solver:
         # Of a piece that starts from share tau_p + (1 - share) tau_r; the floor's share is 0.
         moving = sample.critical > 0.0
         multiplier[moving] *= sample.pieces.starts[piece[moving]]
+
+    def _sequences(
+        self, rows: Samples, events: dict[int, list[Event]]
+    ) -> dict[str, NDArray[np.float64]]:
+        """The first arrested events of each row, (rows, events) each, nan where there are none."""
+        names = ("event_stress", "event_position", "event_length", "event_moment")
+        table = np.full((len(names), rows.samples, self.events), np.nan)
+        spacing, modulus = self.setting.spacing, self.setting.problem.solid.shear_modulus
+        initial = rows.initial_stress.mean(axis=rows.axes)
+        for row, several in events.items():
+            for i, event in enumerate(several[: self.events]):
+                table[:, row, i] = (
+                    initial[row] + event.load * rows.load_profile.mean(),
+                    event.position * spacing, event.length * spacing,
+                    modulus * event.total_slip * spacing,
+                )  # fmt: skip
+        return dict(zip(names, table, strict=True))
 
     @staticmethod
     def _check(gap: Array, load: Array) -> None:

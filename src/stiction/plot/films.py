@@ -1,74 +1,18 @@
-"""A film of a rupture: stress and strength above, slip rate below."""
+"""Films of ruptures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FFMpegWriter
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from PIL import Image
 
 from stiction._checks import as_path, check_count
-from stiction.errors import InputError
 from stiction.plot.axes import MEGA, MICRO, MILLI
-from stiction.plot.ruptures import Floats, need, shown_strength
+from stiction.plot.film_writer import check_film_name, write_film
+from stiction.plot.plane_films import plane_film
+from stiction.plot.ruptures import need, shown_strength
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
-
-
-def _pictures(times: Floats, count: int) -> NDArray[np.intp]:
-    """Frames spread evenly over what was kept: steps are short where things happen fast."""
-    return np.unique(np.linspace(0, times.size - 1, min(count, times.size)).round().astype(int))
-
-
-def _write_gif(
-    path: Path, figure: Figure, moving: list[Any], show: Any, shown: Any, rate: int
-) -> None:
-    """Draw the pictures one by one; only the moving parts are drawn again."""
-    canvas = FigureCanvasAgg(figure)
-    for part in moving:
-        part.set_animated(True)
-    canvas.draw()
-    background = canvas.copy_from_bbox(figure.bbox)
-
-    def pictures() -> Iterator[Image.Image]:
-        for i in shown:
-            show(i)
-            canvas.restore_region(background)
-            for part in moving:
-                figure.draw_artist(part)
-            yield Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
-
-    # One palette for all pictures keeps the still parts still.
-    images = [picture.quantize(64, dither=Image.Dither.NONE) for picture in pictures()]
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0
-    )
-
-
-def _write_mp4(path: Path, figure: Figure, show: Any, shown: Any, rate: int) -> None:
-    writer = FFMpegWriter(fps=rate)
-    with writer.saving(figure, str(path), figure.dpi):
-        for i in shown:
-            show(i)
-            writer.grab_frame()
-
-
-def can_write_mp4() -> bool:
-    """Whether the program ffmpeg is there (or where matplotlib's `animation.ffmpeg_path` says)."""
-    return bool(FFMpegWriter.isAvailable())
-
-
-def _check_name(path: Path) -> None:
-    if path.suffix not in (".gif", ".mp4"):
-        raise InputError(f"film: the name must end in .gif or .mp4, got {path.name!r}")
-    if path.suffix == ".mp4" and not can_write_mp4():
-        raise InputError(f"film: {path.name!r} needs the program ffmpeg; use a .gif instead")
 
 
 def film(
@@ -79,6 +23,8 @@ def film(
     rate: int = 20,
 ) -> Path:
     """Write a film of a rupture: stress and strength above, slip rate below.
+
+    Of a plane it shows slip rate and shear stress side by side.
 
     Parameters
     ----------
@@ -99,13 +45,15 @@ def film(
     Raises
     ------
     InputError
-        If a variable was not kept, the run is of a plane, or the file type is not known.
+        If a variable was not kept, or the file type is not known.
     """
     need(run, "slip_rate", "shear_stress", "peak_strength")
     check_count("pictures", pictures, 1)
     check_count("rate", rate, 1)
     target = as_path("path", path)
-    _check_name(target)
+    check_film_name(target)
+    if "y" in run.dims:
+        return plane_film(run, target, pictures=pictures, rate=rate)
     x = run["x"].values * MILLI
     times, onset = run["time"].values, float(run["onset_time"])
     stress = run["shear_stress"].values * MEGA
@@ -137,11 +85,7 @@ def film(
                 rf"$\langle\tau\rangle$ = {mean[i]:.3f} MPa"
             )
 
-        figure.canvas.draw()
-        figure.set_layout_engine("none")  # the panels must not move between pictures
-        shown = _pictures(times, pictures)
-        if target.suffix == ".gif":
-            _write_gif(target, figure, [line, moving, clock], show, shown, rate)
-        else:
-            _write_mp4(target, figure, show, shown, rate)
-    return target
+        moving_parts = [line, moving, clock]
+        return write_film(
+            target, figure, moving_parts, show, times.size, pictures=pictures, rate=rate
+        )

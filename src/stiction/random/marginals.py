@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.special import ndtr
 from stiction._model import Positive, Real, _number, model
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
+from stiction.random.families import FAMILIES
 
 
 @model(kw_only=True)
@@ -54,7 +55,13 @@ class Beta:
     @property
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
+        return _frozen_beta(self.alpha, self.beta, self.low, self.high)
+
+
+@lru_cache(maxsize=64)
+def _frozen_beta(alpha: float, beta: float, low: float, high: float) -> Any:
+    """Kept, because to freeze a distribution takes scipy a millisecond, and a sweep has many."""
+    return scipy.stats.beta(alpha, beta, low, high - low)
 
 
 @dataclass(frozen=True)
@@ -105,9 +112,9 @@ def _parameter_names(family: Any) -> list[str]:
 
 
 def _scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
-    names = _continuous_names()
+    names = [*_continuous_names(), *FAMILIES]
     if name not in names:
-        valid = ["beta", "lognorm", "weibull_min", "gamma", "truncnorm", "uniform", "norm"]
+        valid = ["beta", *FAMILIES, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
         text = unknown_name("type", name, names).split(" (valid:")[0]
         raise InputError(f"{text} (valid: {', '.join(valid)} and scipy.stats' other continuous)")
     known = _parameter_names(getattr(scipy.stats, name))
@@ -155,7 +162,7 @@ def _frozen(family: Any) -> Any:
 
 
 def _marginal(value: Any) -> Any:
-    if isinstance(value, Beta | ScipyMarginal | PythonMarginal):
+    if isinstance(value, (Beta, ScipyMarginal, PythonMarginal, *FAMILIES.values())):
         return value
     if isinstance(value, dict):
         given = dict(value)
@@ -164,14 +171,16 @@ def _marginal(value: Any) -> Any:
             raise InputError("type: missing; name a distribution, such as type = 'beta'")
         if name == "beta" and not {"a", "b"} & set(given):
             return Beta(**given)
+        if name in FAMILIES and not (name == "gamma" and {"a", "loc", "scale"} & set(given)):
+            return FAMILIES[name](**given)
         return _scipy_marginal(str(name), given)
     family = getattr(value, "dist", None)
     if isinstance(value, scipy.stats.rv_continuous):
         return _marginal(_frozen(value))
     if not isinstance(family, scipy.stats.rv_continuous):
         raise InputError(
-            "must be st.Beta(...) or a frozen continuous scipy.stats distribution such as"
-            f" scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
+            "must be st.Beta(...), st.Lognormal(...) or a frozen continuous scipy.stats"
+            f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
     name = str(getattr(family, "name", ""))
     if type(family) is not type(getattr(scipy.stats, name, None)):
@@ -185,9 +194,10 @@ def _serialise(value: Any) -> Any:
     if isinstance(value, PythonMarginal):
         name = type(value.distribution.dist).__name__
         raise ValueError(f"marginal is the Python distribution {name!r}; use one that scipy names")
-    if isinstance(value, Beta):
-        keys = ("alpha", "beta", "low", "high", "type")
-        return {key: getattr(value, key) for key in keys}
+    if isinstance(value, (Beta, *FAMILIES.values())):
+        own: Any = value
+        known = {field.name: getattr(own, field.name) for field in fields(own)}
+        return {name: one for name, one in known.items() if one is not None}
     return {"type": value.type, **dict(value.parameters)}
 
 
@@ -198,14 +208,15 @@ Marginal: TypeAlias = Annotated[
     WithJsonSchema(
         {
             "type": "object",
-            "description": "type = 'beta' with alpha, beta, low, high; or the name of a continuous"
+            "description": "type = 'beta' with alpha, beta, low, high; 'lognormal', 'weibull',"
+            " 'gamma' or 'truncated_normal' with mean, cov and low; or the name of a continuous"
             " scipy.stats distribution with its shapes, loc and scale",
             "properties": {"type": {"type": "string"}},
             "required": ["type"],
         }
     ),
 ]
-"""`Beta`, or any frozen continuous `scipy.stats` distribution."""
+"""`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""
 
 
 def quantile_of_normal(distribution: Any, z: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
+from stiction.random.coefficients import pressures, support_in_stress
 from stiction.random.random_field import RandomField
 
 WORTH_SAYING = 1e-6
@@ -28,7 +29,10 @@ def share_below_residual(problem: Problem, fields: Mapping[str, RandomField]) ->
     if "residual_strength" in fields:
         middles = (np.arange(QUANTILES) + 0.5) / QUANTILES
         residual = fields["residual_strength"].marginal.distribution.ppf(middles)
-    return float(np.mean(fields["strength"].marginal.distribution.cdf(residual)))
+    strength = fields["strength"]
+    if strength.of is not None:
+        residual = np.ravel(residual)[:, None] / pressures(problem, fields)
+    return float(np.mean(strength.marginal.distribution.cdf(residual)))
 
 
 def check_residual(problem: Problem, fields: Mapping[str, RandomField]) -> None:
@@ -62,7 +66,7 @@ def check_residual(problem: Problem, fields: Mapping[str, RandomField]) -> None:
         given = np.asarray(problem.friction.residual_strength)
         values = dict.fromkeys((float(given.min()), float(given.max())))
         residual = "the residual strength, " + " to ".join(f"{v:g}" for v in values) + " Pa"
-    low, high = fields["strength"].marginal.distribution.support()
+    low, high = support_in_stress(problem, fields, "strength")
     said = (
         f"strength: {100.0 * share:.3g} % of its marginal, which reaches from {low:g} to"
         f" {high:g} Pa, lies at or below {residual}"

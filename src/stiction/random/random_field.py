@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pydantic
@@ -45,6 +45,9 @@ class RandomField:
     anisotropy : float, optional
         On a plane, the correlation length along y over that along x, which is that of the
         spectrum; 1 if left out.
+    of : {"friction_coefficient"}, optional
+        The field holds friction coefficients: times the normal pressure at a point they are the
+        strength there (or another stress, where the field stands for one).
 
     Raises
     ------
@@ -76,6 +79,7 @@ class RandomField:
     spectrum: Spectrum
     mean_mode: Flag = False
     anisotropy: Positive | None = None
+    of: Literal["friction_coefficient"] | None = None
 
     @model_validator(mode="after")
     def _tabulated_marginal(self) -> RandomField:

@@ -23,6 +23,8 @@ from stiction.random.random_field import RandomField, check_counts, warn_if_inac
 from stiction.sample import PROFILES
 
 NAMES = tuple(PROFILES)
+COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
+"""What may be given as friction coefficients."""
 DEFINITE = 1e-12
 """Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
 
@@ -134,7 +136,8 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa.
+        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which the
+        normal pressure at each point turns into strength. So may be the other stresses.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Pa.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
@@ -187,7 +190,11 @@ class RandomInterface:
 
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
-        problems = []
+        problems = [
+            f"{name}: of = 'friction_coefficient' is for stresses; leave it out"
+            for name, field in self.properties.items()
+            if field.of is not None and name not in COEFFICIENTS
+        ]
         scales = [name for name in SCALES if getattr(self, name) is not None]
         if len(scales) > 1:
             problems.append(f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}")

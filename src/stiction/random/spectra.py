@@ -146,6 +146,14 @@ class _ScaledSpectrum(_Spectrum):
     _default_power: ClassVar[float] = 0.9997
 
     @property
+    def efolding_length(self) -> float:
+        """Distance at which the correlation of z first falls to 1/e, m, on an infinite line."""
+        # Searched for once a shape: a sweep may hold a hundred thousand lengths.
+        shape: Any = self
+        unit = dataclasses.replace(shape, correlation_length=1.0)
+        return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
+
+    @property
     def cutoff(self) -> float:
         """Wavenumber above which the spectrum is truncated, rad/m."""
         if self.truncation is not None:

@@ -20,11 +20,11 @@ from stiction.reliability.algorithms import advice, ran_out, short_of
 from stiction.reliability.design import (
     TailRequest,
     check_probability,
-    check_sampling,
     stress_interval,
     subset_tail,
 )
-from stiction.reliability.estimate import budget_of, check_target
+from stiction.reliability.effort import budget_of, refused_chains
+from stiction.reliability.estimate import check_target
 from stiction.reliability.limit_state import (
     Event,
     LimitState,
@@ -170,7 +170,7 @@ def failure_curve(
         workers,
         meter=meter,
         problems=problems,
-        check=check_sampling,
+        check=lambda state: refused_chains(state, max_evaluations),
     )
     request = TailRequest(
         state, float(smallest), target_cov, int(seed), budget_of(state, max_evaluations)

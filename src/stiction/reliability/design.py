@@ -13,7 +13,6 @@ from stiction._brief import brief_html
 from stiction._checks import is_real
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
-from stiction.criterion.method import LocalCriterion
 from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -28,21 +27,22 @@ from stiction.reliability.algorithms import (
     ran_out,
     short_of,
 )
+from stiction.reliability.effort import budget_of, first_stage, no_first_stage, refused_chains
 from stiction.reliability.estimate import (
     ALIKE,
     FREQUENT,
-    budget_of,
     check_algorithm,
     check_target,
-    usable_first_stage,
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state
 from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
-from stiction.reliability.result import above_bound, say
+from stiction.reliability.result import above_bound, as_coefficient, say
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import Bridge, agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
 
+TYPICAL = 200
+"""Plain samples whose median is the typical stress: to 2 % where it scatters by 20 %."""
 PILOT = 500
 """Plain samples by which 'auto' judges the first stage."""
 DEEPER = 0.3
@@ -75,6 +75,10 @@ class DesignStress:
         Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the result is not to be trusted; empty if it is.
+    typical_stress : float
+        Median stress at onset of 200 plain samples, Pa: what every second joint holds.
+    normal_pressure : float
+        Mean over the interface, Pa; NaN if the problem has none.
     """
 
     stress: float
@@ -90,6 +94,18 @@ class DesignStress:
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
+    typical_stress: float = math.nan
+    normal_pressure: float = math.nan
+
+    @property
+    def safety_factor(self) -> float:
+        """`typical_stress` over `stress`: by how much a joint that holds on average is reduced."""
+        return self.typical_stress / self.stress
+
+    @property
+    def friction_coefficient(self) -> float:
+        """`stress` over the mean normal pressure; NaN without one."""
+        return self.stress / self.normal_pressure
 
     _repr_html_ = brief_html
 
@@ -102,8 +118,9 @@ class DesignStress:
         low, high = self.interval
         return (
             f"{self.stress / 1e6:.7g} MPa ({100 * self.confidence:g} %: {low / 1e6:.7g} to"
-            f" {high / 1e6:.7g}){above_bound(self.stress, self.lower_bound)}, at"
-            f" P = {self.probability:g}; {self.algorithm}, {self.evaluations} evaluations"
+            f" {high / 1e6:.7g}){as_coefficient(self.friction_coefficient)}"
+            f"{above_bound(self.stress, self.lower_bound)}, at P = {self.probability:g};"
+            f" {self.algorithm}, {self.evaluations} evaluations"
             f"{', cut short' if self.cut_short else ''}"
         )
 
@@ -192,7 +209,7 @@ def subset_tail(request: TailRequest) -> Tail[Descent]:
 
 def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
     state = request.state
-    cheap = state.by(LocalCriterion())
+    cheap = state.by(first_stage(state))
 
     def make(samples: int, number: int, left: int) -> Bridge:
         return bridge(
@@ -211,13 +228,14 @@ def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
 
 def _chosen(state: LimitState, probability: float, seed: int, budget: int) -> tuple[str, str, int]:
     """Algorithm, reason, and the evaluations it took to choose."""
-    if probability >= FREQUENT or usable_first_stage(state) is not None:
+    if probability >= FREQUENT or no_first_stage(state) is not None:
         return "subset", "the method itself goes down the tail", 0
     draws = state.draws(seed, 0, min(PILOT, budget // 5))
-    share = agreement(state.by(LocalCriterion())(draws), state(draws))
-    seen = f"of {draws.shape[0]} plain samples the local criterion picks {share:.0%} of the weakest"
+    share = agreement(state.by(first_stage(state))(draws), state(draws))
+    label = first_stage(state).label
+    seen = f"of {draws.shape[0]} plain samples the {label} picks {share:.0%} of the weakest"
     if share >= ALIKE:
-        return "two_level", f"{seen}, at a tenth of the cost of equilibrium", draws.shape[0]
+        return "two_level", f"{seen}, at a tenth of the cost", draws.shape[0]
     return "subset", f"{seen} only", draws.shape[0]
 
 
@@ -360,8 +378,8 @@ def design_stress(
         meter=meter,
         problems=problems,
         check=lambda state: (
-            check_sampling(state)
-            or check_algorithm(state, algorithm, ("auto", "subset", "two_level"))
+            refused_chains(state, max_evaluations)
+            or check_algorithm(state, algorithm, ("auto", "subset", "two_level"), max_evaluations)
         ),
     )
     request = TailRequest(
@@ -369,7 +387,12 @@ def design_stress(
     )
     with meter:
         meter.expect(request.budget, at_most=True)
-        return _sampled(request, algorithm, confidence)
+        found = _sampled(request, algorithm, confidence)
+        try:
+            typical = float(np.median(state(state.draws(int(seed), 0, TYPICAL))))
+        except TimeUp:
+            typical = math.nan
+    return replace(found, typical_stress=typical, normal_pressure=state.pressure)
 
 
 def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignStress:
@@ -402,13 +425,3 @@ def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignS
             cut_short=True,
             warnings=say([text]),
         )
-
-
-def check_sampling(state: LimitState) -> list[str]:
-    """Refuse a method too slow for thousands of samples."""
-    if state.method.type != "rupture":
-        return []
-    return [
-        "method: rupture simulations take too long for subset simulation; use st.Equilibrium(), or"
-        " st.monte_carlo(...) and the quantiles of its critical_stress"
-    ]

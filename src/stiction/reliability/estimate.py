@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +11,6 @@ from stiction._checks import is_finite, is_real, is_whole
 from stiction._model import describe
 from stiction._progress import Meter, Show, TimeUp, check_time_limit
 from stiction._typing import Array
-from stiction.criterion.method import LocalCriterion
 from stiction.errors import unknown_name
 from stiction.evaluation import Method
 from stiction.problem import Problem
@@ -25,6 +25,7 @@ from stiction.reliability.algorithms import (
     counted,
     unknown,
 )
+from stiction.reliability.effort import budget_of, first_stage, no_first_stage, too_slow
 from stiction.reliability.limit_state import (
     Event,
     LimitState,
@@ -37,9 +38,8 @@ from stiction.reliability.two_level import agreement
 Algorithm = Literal["auto", "plain", "subset", "importance", "two_level"]
 ALGORITHMS = ("auto", "plain", "subset", "importance", "two_level")
 
-BUDGET = {"local_criterion": 2_000_000, "equilibrium": 200_000, "rupture": 1_000}
-"""Most evaluations if the user does not say: up to a minute, for rupture a few."""
-PILOT = {"rupture": 100}
+PILOT = 1_000
+"""Plain samples that tell which algorithm to take."""
 ALIKE = 0.9
 """Share of the weakest plain samples that the local criterion must pick to lead to the rarest."""
 FREQUENT = 0.01
@@ -73,35 +73,24 @@ def check_stress(name: str, value: Any) -> list[str]:
     return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
 
 
-def usable_first_stage(state: LimitState) -> str | None:
-    """Why two levels are not possible, or None if they are."""
-    if state.method.type != "equilibrium":
-        return f"two levels join the local criterion to equilibrium, not to {state.method.type!r}"
-    reason = state.no_single_length()
-    return None if reason is None else f"the local criterion does not hold: {reason}"
-
-
-def check_algorithm(state: LimitState, algorithm: str, valid: tuple[str, ...]) -> list[str]:
+def check_algorithm(
+    state: LimitState, algorithm: str, valid: tuple[str, ...], max_evaluations: int | None
+) -> list[str]:
     """Why an algorithm cannot be used here; no texts if it can."""
     if not isinstance(algorithm, str):
         return [f"algorithm: must be one of {', '.join(valid)}, got {describe(algorithm)}"]
     if algorithm not in valid:
         return [unknown_name("algorithm", algorithm, valid)]
-    if state.method.type == "rupture" and algorithm not in ("auto", "plain"):
-        return [f"algorithm: {algorithm!r} would take days by rupture; use 'plain' or 'auto'"]
-    reason = None
+    if algorithm in ("auto", "plain"):
+        return []
+    reason = too_slow(state, max_evaluations)
+    if reason is not None:
+        return [f"algorithm: {reason}"]
     if algorithm == "two_level":
-        reason = usable_first_stage(state)
+        reason = no_first_stage(state)
     elif algorithm == "importance":
         reason = state.not_alike_everywhere()
     return [] if reason is None else [f"algorithm: {algorithm!r} is not possible: {reason}"]
-
-
-def budget_of(state: LimitState, max_evaluations: int | None) -> int:
-    """Evaluations allowed."""
-    if max_evaluations is not None:
-        return int(max_evaluations)
-    return BUDGET.get(state.method.type, 200_000)
 
 
 def _exact(request: Request, probability: float, reason: str) -> FailureProbability:
@@ -129,23 +118,24 @@ def _chosen(request: Request, draws: Array, values: Array) -> tuple[str, str]:
     seen = f"{pilot.failures} failure{plural} among {pilot.samples} plain samples"
     if pilot.probability >= FREQUENT:
         return "plain", f"{seen}: frequent enough to count"
-    if usable_first_stage(state) is None:
-        share = agreement(state.by(LocalCriterion())(draws), values)
+    if no_first_stage(state) is None:
+        share = agreement(state.by(first_stage(state))(draws), values)
         if share >= ALIKE:
             text = (
-                f"{seen}: rare; the local criterion resembles equilibrium, at a tenth of its cost"
+                f"{seen}: rare; the {first_stage(state).label} resembles it, at a tenth of its cost"
             )
             return "two_level", text
-        seen += f"; the local criterion picks only {share:.0%} of the weakest of them"
+        seen += f"; the {first_stage(state).label} picks only {share:.0%} of the weakest of them"
     return "subset", f"{seen}: rare, and subset simulation does not need to know where"
 
 
 def failure_probability(
     problem: Problem,
     random: RandomInterface | RandomField,
-    stress: float,
+    stress: float | None = None,
     *,
     method: Method,
+    friction_coefficient: float | None = None,
     algorithm: Algorithm = "auto",
     target_cov: float = 0.1,
     seed: int = 0,
@@ -163,10 +153,13 @@ def failure_probability(
     problem : Problem
     random : RandomInterface or RandomField
         What is random; a field alone is the peak strength, Pa.
-    stress : float
+    stress : float, optional
         Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
         How the onset is found. `Rupture` goes with plain Monte Carlo only.
+    friction_coefficient : float, optional
+        Instead of `stress`: mean shear stress over mean normal pressure that it must hold. Where
+        the pressure is random, each sample's own pressure counts.
     algorithm : {"auto", "plain", "subset", "importance", "two_level"}
         Plain Monte Carlo; subset simulation; importance sampling around the most likely weak spot
         at a random place (where the interface is alike everywhere); subset simulation by the local
@@ -227,7 +220,14 @@ def failure_probability(
     True
     """
     problems = check_target(target_cov, confidence, max_evaluations)
-    problems += check_stress("stress", stress) + check_time_limit(time_limit)
+    problems += check_time_limit(time_limit)
+    if (stress is None) == (friction_coefficient is None):
+        problems.append("stress: give either stress (Pa) or friction_coefficient")
+    elif stress is not None:
+        problems += check_stress("stress", stress)
+    elif not (is_finite(friction_coefficient) and float(friction_coefficient or 0.0) > 0.0):
+        given = describe(friction_coefficient)
+        problems.append(f"friction_coefficient: must be a positive number, got {given}")
     meter = Meter("failure_probability", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
@@ -237,29 +237,32 @@ def failure_probability(
         event,
         workers,
         meter=meter,
+        per_pressure=friction_coefficient is not None,
         problems=problems,
-        check=lambda state: check_algorithm(state, algorithm, ALGORITHMS),
+        check=lambda state: check_algorithm(state, algorithm, ALGORITHMS, max_evaluations),
     )
     budget = budget_of(state, max_evaluations)
-    pilot = min(PILOT.get(state.method.type, 1_000), max(budget // 5, 50))
-    request = Request(state, float(stress), float(target_cov), int(seed), budget, confidence, pilot)
+    pilot = min(PILOT, max(budget // 5, 50))
+    limit = float(stress if stress is not None else (friction_coefficient or 0.0) * state.pressure)
+    request = Request(state, limit, float(target_cov), int(seed), budget, confidence, pilot)
     low, high = state.bounds
-    if stress <= low:
+    if limit <= low:
         text = f"no interface slides at or below {low:g} Pa, where nothing slips"
-        return _exact(request, 0.0, text)
-    if stress >= high:
+        return replace(_exact(request, 0.0, text), normal_pressure=state.pressure)
+    if limit >= high:
         text = f"no interface holds more than the greatest strength, {high:g} Pa"
-        return _exact(request, 1.0, text)
+        return replace(_exact(request, 1.0, text), normal_pressure=state.pressure)
     with meter:
         meter.expect(budget, at_most=True)
-        return _sampled(request, algorithm)
+        found = _sampled(request, algorithm, too_slow(state, max_evaluations))
+        return replace(found, normal_pressure=state.pressure)
 
 
-def _sampled(request: Request, algorithm: str) -> FailureProbability:
+def _sampled(request: Request, algorithm: str, slow: str | None) -> FailureProbability:
     """The answer by an algorithm, as far as there is time."""
     state, reason = request.state, "as asked"
-    if algorithm == "auto" and state.method.type == "rupture":
-        algorithm, reason = "plain", "a rupture simulation takes too long for long chains"
+    if algorithm == "auto" and slow is not None:
+        algorithm, reason = "plain", slow
     if algorithm == "auto":
         draws, values = state.draws(request.seed, 0, request.pilot), np.empty(0)
         try:
@@ -278,7 +281,7 @@ def _sampled(request: Request, algorithm: str) -> FailureProbability:
         if algorithm == "importance":
             return by_importance(request, reason)
         if algorithm == "two_level":
-            return by_two_levels(request, state.by(LocalCriterion()), reason)
+            return by_two_levels(request, state.by(first_stage(state)), reason)
         return by_subset(request, reason)
     except TimeUp as up:
         return unknown(request, reason, request.spent + up.spent)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._checks import is_whole
+from stiction._checks import is_whole, numbers
 from stiction._model import describe
 from stiction._progress import SILENT, Meter, Portions, TimeUp
 from stiction._typing import Array
@@ -23,6 +24,12 @@ from stiction.errors import InputError
 from stiction.friction.law import SCALES
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
+from stiction.random.coefficients import (
+    coefficients_of,
+    mean_in_stress,
+    profiles_in_stress,
+    support_in_stress,
+)
 from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
@@ -35,7 +42,7 @@ PIECE = 16
 
 @dataclass(frozen=True)
 class LimitState:
-    """Stress at onset as a function of standard normal draws.
+    """Stress at onset as a function of standard normal draws; see `stiction.limit_state`.
 
     Attributes
     ----------
@@ -44,6 +51,9 @@ class LimitState:
     method : LocalCriterion, Equilibrium or Rupture
     event : {"critical_stress", "first_instability"}
         Which of the method's stresses.
+    per_pressure : bool
+        Whether stresses are taken per normal pressure: where that is random, each is multiplied by
+        the mean pressure over that of its sample, so that one number stands for a coefficient.
     workers : int
         Threads. Rows do not depend on their batch, so the numbers do not depend on this.
     meter : Meter
@@ -55,6 +65,7 @@ class LimitState:
     method: Any
     event: Event = "critical_stress"
     workers: int = 1
+    per_pressure: bool = False
     meter: Meter = dataclasses.field(default=SILENT, compare=False, repr=False)
 
     @cached_property
@@ -71,6 +82,16 @@ class LimitState:
         solver: Callable[..., Any] = self.method.prepare(self.problem)
         return solver
 
+    @property
+    def random_pressure(self) -> bool:
+        """Whether stresses are divided by a pressure that differs between samples."""
+        return self.per_pressure and "normal_pressure" in self.random.names
+
+    @property
+    def pressure(self) -> float:
+        """Mean normal pressure, Pa; NaN if there is none."""
+        return mean_pressure(self.problem, self.random)
+
     def by(self, method: Any) -> LimitState:
         """The same by another method."""
         return replace(self, method=method)
@@ -84,7 +105,8 @@ class LimitState:
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Sampled profiles by name, each of shape (samples, *shape)."""
-        return self.random.from_draws(self.problem.interface, draws)
+        found = self.random.from_draws(self.problem.interface, draws)
+        return profiles_in_stress(self.problem, self.random, found)
 
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
@@ -92,18 +114,35 @@ class LimitState:
 
     def _stress(self, draws: Array) -> Array:
         # Rounding may leave a stress a hair below the bound.
-        found = self.onset(self.profiles(draws))[self.event]
+        profiles = self.profiles(draws)
+        found = self.onset(profiles)[self.event]
+        if self.random_pressure:
+            pressure = profiles["normal_pressure"]
+            found = found * self.pressure / pressure.reshape(pressure.shape[0], -1).mean(axis=1)
         result: Array = np.maximum(found, self.bounds[0])
         return result
 
     def __call__(self, draws: Array) -> Array:
-        """Stress at onset, Pa, of draws (samples, dimension); shape (samples,).
+        """Stress at onset, Pa.
+
+        Parameters
+        ----------
+        draws : (samples, dimension) or (dimension,) array
+
+        Returns
+        -------
+        (samples,) array, or a number
 
         Raises
         ------
+        InputError
+            If the draws are not finite numbers of this shape.
         TimeUp
             With the stresses of the first draws, if the time allowed is over before the last.
         """
+        draws = self._checked(draws)
+        if draws.ndim == 1:
+            return self(draws[None, :])[0]
         found = np.empty(draws.shape[0])
         for rows in self._portions(draws.shape[0]):
             if self.meter.over:
@@ -111,6 +150,16 @@ class LimitState:
             found[rows] = self._shared_out(draws[rows])
             self.meter.advance(rows.stop - rows.start)
         return found
+
+    def _checked(self, draws: Any) -> Array:
+        given = numbers("draws", draws)
+        if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
+            raise InputError(
+                f"draws: must have shape (samples, {self.dimension}), got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            raise InputError("draws: must be finite")
+        return given
 
     def _shared_out(self, draws: Array) -> Array:
         fewest = 1 if self._portions.slow else PIECE
@@ -129,15 +178,16 @@ class LimitState:
         every node; and the mean stress of an interface whose slip sums to no net force is at most
         the mean of its strength. Both hold for every method and every sample.
         """
+        if self.random_pressure:  # the stress per pressure has no other bounds
+            return 0.0, math.inf
         fields = self.random.properties
-        low, high = (float(end) for end in fields["strength"].marginal.distribution.support())
+        low, high = support_in_stress(self.problem, fields, "strength")
         load = self.problem.load
-        profile = np.asarray(load.profile, dtype=np.float64)
+        profile = np.asarray(self.problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(load.initial_stress, dtype=np.float64)
         most: Any = least
         if "initial_stress" in fields:
-            ends = fields["initial_stress"].marginal.distribution.support()
-            least, most = (float(end) for end in ends)
+            least, most = support_in_stress(self.problem, fields, "initial_stress")
         lowest_load = float(np.min((low - most) / profile))
         shape = self.problem.interface.shape
         mean = float(np.mean(np.broadcast_to(profile, shape)))
@@ -169,9 +219,11 @@ class LimitState:
         """Why a shifted sample would not slide at the same stress, or None if it would."""
         if len(self.random.names) > 1:
             return "more than the strength is random"
+        if coefficients_of(self.random):
+            return "the normal pressure, and so the strength, varies along the interface"
         load, friction = self.problem.load, self.problem.friction
         parts = {
-            "the load profile": load.profile,
+            "the load profile": self.problem.load_profile,
             "the initial stress": load.initial_stress,
             "the residual strength": friction.residual_strength,
             "the residual ratio": friction.residual_ratio,
@@ -183,6 +235,67 @@ class LimitState:
         return self.no_single_length()
 
 
+def limit_state(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    method: Any,
+    *,
+    event: Event = "critical_stress",
+    workers: int | None = None,
+) -> LimitState:
+    """Stress at onset as a function of standard normal draws, for other reliability codes.
+
+    Failure below a stress s is ``limit_state(draws) < s``.
+
+    Parameters
+    ----------
+    problem : Problem
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa.
+    method : LocalCriterion, Equilibrium or Rupture
+    event : {"critical_stress", "first_instability"}
+        Which stress.
+    workers : int, optional
+        Threads; all cores by default.
+
+    Returns
+    -------
+    LimitState
+        Call it with independent standard normal draws of shape (samples, `dimension`) for the
+        stresses, Pa, of shape (samples,). Its `draws(seed, first, samples)` are those of the
+        samples of `monte_carlo`, and `profiles(draws)` the profiles.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> stress = st.limit_state(problem, strength, st.LocalCriterion())
+    >>> draws = stress.draws(seed=0, first=0, samples=3)
+    >>> draws.shape == (3, stress.dimension)
+    True
+    >>> ensemble = st.monte_carlo(
+    ...     problem, strength, method=st.LocalCriterion(), samples=3, seed=0
+    ... )
+    >>> bool((stress(draws) == ensemble.critical_stress.values).all())
+    True
+    """
+    return make_limit_state(problem, random, method, 0, event, workers)
+
+
+def mean_pressure(problem: Problem, random: RandomInterface) -> float:
+    """Mean normal pressure, Pa; NaN if there is none."""
+    if "normal_pressure" in random.names:
+        return random.properties["normal_pressure"].mean
+    given = problem.load.normal_pressure
+    return math.nan if given is None else float(np.mean(given))
+
+
 def make_limit_state(
     problem: Problem,
     random: RandomInterface | RandomField,
@@ -192,6 +305,7 @@ def make_limit_state(
     workers: int | None,
     *,
     meter: Meter = SILENT,
+    per_pressure: bool = False,
     problems: Sequence[str] = (),
     check: Callable[[LimitState], list[str]] | None = None,
 ) -> LimitState:
@@ -203,6 +317,8 @@ def make_limit_state(
         As in `failure_probability`.
     meter : Meter
         Told of every sample; says when the time is over.
+    per_pressure : bool
+        See `LimitState`.
     problems : sequence of str
         What is wrong with other arguments; reported with the rest.
     check : callable, optional
@@ -219,13 +335,15 @@ def make_limit_state(
         interface = make_plan(problem, random, method, seed).random
         first = isinstance(event, str) and event == "first_instability"
         kind: Event = "first_instability" if first else "critical_stress"
-        state = LimitState(problem, interface, method, kind)
+        state = LimitState(problem, interface, method, kind, per_pressure=per_pressure)
+        if per_pressure and not state.pressure > 0.0:
+            found.append("friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)")
         found += check(state) if check else []
     except InputError as error:
         found += error.problems
     if found or state is None:
         raise InputError(found)
     state.random.warn_if_inaccurate(problem.interface)
-    warn_of_units(problem, state.random.strength.mean)
+    warn_of_units(problem, mean_in_stress(problem, state.random.properties, "strength"))
     check_residual(problem, state.random.properties)
     return replace(state, workers=usable_cores() if workers is None else int(workers), meter=meter)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -58,6 +59,8 @@ class FailureProbability:
         Whether `time_limit` ended it before `target_cov` was reached.
     warnings : tuple of str
         Why the estimate is not to be trusted; empty if it is.
+    normal_pressure : float
+        Mean over the interface, Pa; NaN if the problem has none.
     """
 
     probability: float
@@ -75,6 +78,12 @@ class FailureProbability:
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
+    normal_pressure: float = math.nan
+
+    @property
+    def friction_coefficient(self) -> float:
+        """`stress` over the mean normal pressure; NaN without one."""
+        return self.stress / self.normal_pressure
 
     _repr_html_ = brief_html
 
@@ -88,10 +97,16 @@ class FailureProbability:
         return (
             f"P = {self.probability:.3g} ({100 * self.confidence:g} %: {low:.3g} to {high:.3g},"
             f" c.o.v. {self.coefficient_of_variation:.2g}) below {self.stress / 1e6:.6g} MPa"
+            f"{as_coefficient(self.friction_coefficient)}"
             f"{above_bound(self.stress, self.lower_bound)};"
             f" {self.algorithm}, {self.evaluations} evaluations"
             f"{', cut short' if self.cut_short else ''}"
         )
+
+
+def as_coefficient(value: float) -> str:
+    """A coefficient in words; nothing where there is none."""
+    return f" (friction coefficient {value:.4g})" if math.isfinite(value) else ""
 
 
 def bounded(lowest: float) -> bool:

@@ -18,6 +18,7 @@ from stiction.errors import InputError
 from stiction.evaluation import Method
 from stiction.interface import Interface
 from stiction.problem import Problem
+from stiction.random.coefficients import in_stress
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
@@ -77,7 +78,7 @@ def longer(problem: Problem, ratio: int) -> Problem:
     """
     load, friction = problem.load, problem.friction
     parts = {
-        "load.profile": load.profile,
+        "load.profile": problem.load_profile,
         "load.initial_stress": load.initial_stress,
         "load.normal_pressure": load.normal_pressure,
         "friction.weakening_rate": friction.weakening_rate,
@@ -159,7 +160,7 @@ def tail_study(
     InputError
         If something varies along the interface, or the spectrum has no correlation length.
     """
-    random = as_random_interface(random)
+    random = in_stress(problem, as_random_interface(random))
     strength = random.strength
     if isinstance(strength.spectrum, CustomSpectrum):
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")

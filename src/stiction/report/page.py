@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,10 @@ from stiction.report.text import mathematics
 
 LONGEST = 60
 """Rows of a table that are shown; a longer one is thinned, and the file has them all."""
+
+
+OF_THE_PAPER = 7
+"""Figures up to this number are the paper's own."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,11 @@ class ShownFigure:
     tables: tuple[Table, ...]
 
     @property
+    def of_the_paper(self) -> bool:
+        """Whether the paper has it; what goes beyond is folded."""
+        return self.number.isdigit() and int(self.number) <= OF_THE_PAPER
+
+    @property
     def image(self) -> str:
         """The picture as a data URI."""
         return "data:image/png;base64," + base64.b64encode(self.png).decode("ascii")
@@ -50,6 +60,8 @@ class ShownClaim:
     where, says, printed, comment : str
     computed : tuple of str
     verdict : str
+    rule : str
+        What the verdict follows from.
     """
 
     where: str
@@ -58,6 +70,7 @@ class ShownClaim:
     computed: tuple[str, ...]
     verdict: str
     comment: str
+    rule: str
 
     @property
     def kind(self) -> str:
@@ -72,6 +85,15 @@ def thinned(table: Table) -> tuple[list[list[str]], int]:
     return cells[::step], step
 
 
+def exceptions_among(claims: Sequence[ShownClaim]) -> list[tuple[str, int]]:
+    """How many of some claims have which verdict, those that hold left out."""
+    counts = Counter(claim.verdict for claim in claims)
+    return [(verdict, count) for verdict, count in counts.items() if verdict not in _FINE]
+
+
+_FINE = ("holds", "true by construction")
+
+
 def render(
     *,
     title: str,
@@ -79,9 +101,10 @@ def render(
     headline: Sequence[tuple[str, int]],
     points: Sequence[str],
     exceptions: Sequence[tuple[str, Sequence[str]]],
-    key_table: Table | None,
+    key_tables: Sequence[Table],
     figures: Sequence[ShownFigure],
     claims: Sequence[tuple[str, Sequence[ShownClaim]]],
+    limits: Table,
     parameters: Sequence[tuple[str, str]],
     notes: Sequence[str],
     provenance: Sequence[tuple[str, str]],
@@ -96,10 +119,12 @@ def render(
         What a busy reader should know.
     exceptions : sequence of (heading, texts)
         What does not hold as it stands.
-    key_table : Table, optional
-        The results in one table.
+    key_tables : sequence of Table
+        The results in a few tables.
     figures : sequence of ShownFigure
     claims : sequence of (subject, claims)
+    limits : Table
+        What the words of the paper are taken to mean.
     parameters, provenance : sequences of (name, value)
     notes : sequence of str
         On accuracy.
@@ -113,15 +138,17 @@ def render(
     )
     environment.filters["mathematics"] = mathematics
     environment.filters["thinned"] = thinned
+    environment.filters["exceptions"] = exceptions_among
     content: dict[str, Any] = {
         "title": title,
         "lead": lead,
         "headline": headline,
         "points": points,
         "exceptions": exceptions,
-        "key_table": key_table,
+        "key_tables": key_tables,
         "figures": figures,
         "claims": claims,
+        "limits": limits,
         "parameters": parameters,
         "notes": notes,
         "provenance": provenance,

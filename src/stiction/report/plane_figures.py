@@ -81,7 +81,7 @@ def patches_figure(problem: Problem, tau_p: Array, results: Mapping[str, xr.Data
     parts[0].colorbar(drawn, ax=axes, label=r"strength $\tau_p$ (MPa)", **maps.BAR)
     parts[0].legend(loc="outside lower center", ncols=1)
     first = float(exact["first_instability"][0]) - float(np.mean(problem.load.initial_stress))
-    loads = first / float(np.mean(problem.load.profile)) * np.array(SHARES)
+    loads = first / float(np.mean(problem.load_profile)) * np.array(SHARES)
     growth_figure(parts[1], problem, equilibrium_path(problem, tau_p, loads))
     return figure
 

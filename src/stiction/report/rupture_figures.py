@@ -32,6 +32,7 @@ from stiction.plot.style import (
     paper_style,
 )
 from stiction.problem import Problem
+from stiction.report.plane_rupture_figures import plane_front_figure, plane_rupture_figure
 
 
 def _nucleation_arrow(axes: Axes, problem: Problem, run: xr.Dataset, height: float) -> None:
@@ -50,7 +51,7 @@ def _nucleation_arrow(axes: Axes, problem: Problem, run: xr.Dataset, height: flo
     # Beside the arrow, on the side where there is room.
     right = centre + half < 0.9 * problem.interface.extent * MILLI
     at, align = (centre + 1.3 * half, "left") if right else (centre - 1.3 * half, "right")
-    axes.text(at, height, "$h_n$", color=ACCENT, ha=align, va="center")
+    axes.text(at, height, r"$h_\mathrm{n}$", color=ACCENT, ha=align, va="center")
 
 
 def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
@@ -67,7 +68,8 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
     -------
     matplotlib.figure.Figure
         (a) peak strength with the nucleation length; (b) slip rate around the onset; (c) over the
-        whole run, with (d) the mean stress beside it.
+        whole run, with (d) the mean stress beside it. Of a plane: (a) peak strength with the front
+        at equal intervals of time, (b) the mean stress, and below the slip rate at six moments.
 
     Raises
     ------
@@ -75,6 +77,8 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         If a variable was not kept.
     """
     need(run, "slip_rate", "step_time", "peak_strength")
+    if problem.interface.is_plane:
+        return plane_rupture_figure(run, problem)
     x, times = run["x"].values, run["time"].values
     rate = run["slip_rate"].values
     onset = float(run["onset_time"])
@@ -93,7 +97,7 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
         lowest, highest = np.nanmin(strength), np.nanmax(strength)
         height = highest + 0.04 * (highest - lowest)
         _nucleation_arrow(top, problem, run, height)
-        top.set_ylabel(r"$\tau_p$ (MPa)")
+        top.set_ylabel(r"$\tau_\mathrm{p}$ (MPa)")
         top.set_ylim(lowest - 0.05, height + 0.25 * (highest - lowest))
 
         near = near_onset(problem, times, onset)
@@ -143,9 +147,12 @@ def front_figure(run: xr.Dataset, problem: Problem) -> Figure:
     -------
     matplotlib.figure.Figure
         (a) time at which each node had half of its critical slip; (b) apparent speed of the
-        front. Patches that grow ahead of it can make it look faster than c_d.
+        front. Patches that grow ahead of it can make it look faster than c_d. Of a plane: both
+        along x and along y through the critical position.
     """
     need(run, "arrival_time", "front_speed", "onset_time")
+    if problem.interface.is_plane:
+        return plane_front_figure(run, problem)
     x = run["x"].values * MILLI
     arrival = (run["arrival_time"].values - float(run["onset_time"])) * MICRO
     with paper_style():

@@ -60,7 +60,12 @@ def count_into(values: Array, low: float, high: float, counts: NDArray[np.int64]
         counts[min(max(cell, 0), cells - 1)] += 1
 
 
-def density(values: Any, *, bounds: tuple[float | None, float | None] = (None, None)) -> Density:
+def density(
+    values: Any,
+    *,
+    bounds: tuple[float | None, float | None] = (None, None),
+    smoothing: float = 1.0,
+) -> Density:
     """Density of independent values, smoothed without crossing the bounds.
 
     Parameters
@@ -69,6 +74,9 @@ def density(values: Any, *, bounds: tuple[float | None, float | None] = (None, N
     bounds : (float or None, float or None)
         Lower and upper bound of the distribution where it has them, in the unit of the values:
         for strength those of its marginal.
+    smoothing : float
+        Factor on the bandwidth, positive: more than one where a curve shall not show what the
+        sample cannot tell.
 
     Returns
     -------
@@ -102,7 +110,7 @@ def density(values: Any, *, bounds: tuple[float | None, float | None] = (None, N
     low, high = _ends(sample, bounds)
     counts = np.zeros(CELLS, dtype=np.int64)
     count_into(sample, low, high, counts)
-    return density_of_counts(counts, low, high, effective=sample.size)
+    return density_of_counts(counts, low, high, effective=sample.size, smoothing=smoothing)
 
 
 def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:
@@ -134,7 +142,9 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     )
 
 
-def density_of_counts(counts: Any, low: float, high: float, *, effective: float) -> Density:
+def density_of_counts(
+    counts: Any, low: float, high: float, *, effective: float, smoothing: float = 1.0
+) -> Density:
     """The same from counts in equal cells of [low, high], where values do not fit into memory.
 
     Parameters
@@ -146,6 +156,8 @@ def density_of_counts(counts: Any, low: float, high: float, *, effective: float)
     effective : float
         How many independent values the counts are worth; fewer than their number where
         neighbouring points of one field were counted.
+    smoothing : float
+        Factor on the bandwidth.
 
     Returns
     -------
@@ -158,7 +170,9 @@ def density_of_counts(counts: Any, low: float, high: float, *, effective: float)
         raise InputError("counts: must be a (cells,) array with values in it, low < high")
     cells = counts.size
     cosine = scipy.fft.dct(counts / total, type=2)  # a_k, k = 0..cells-1
-    time = _diffusion_time(cosine, float(effective), cells)
+    if not (is_real(smoothing) and smoothing > 0.0):
+        raise InputError(f"smoothing: must be a positive number, got {describe(smoothing)}")
+    time = _diffusion_time(cosine, float(effective), cells) * smoothing**2
     k = np.arange(cells)
     smooth = scipy.fft.idct(cosine * np.exp(-0.5 * (k * math.pi) ** 2 * time), type=2) * cells
     width = high - low

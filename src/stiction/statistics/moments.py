@@ -276,12 +276,15 @@ def _uniform_load(problem: Problem, strength: RandomField) -> tuple[float, float
     problems = [
         f"load.{name}: varies along the interface, so tau_n is not stationary; sample it with"
         " st.monte_carlo instead"
-        for name in ("profile", "initial_stress")
-        if np.ptp(getattr(problem.load, name)) > 0.0
+        for name, value in (
+            ("profile", problem.load_profile),
+            ("initial_stress", problem.load.initial_stress),
+        )
+        if np.ptp(value) > 0.0
     ]
     if problems:
         raise InputError(problems)
-    return float(np.max(problem.load.profile)), float(np.max(problem.load.initial_stress))
+    return float(np.max(problem.load_profile)), float(np.max(problem.load.initial_stress))
 
 
 def _strength_correlation(strength: RandomField, lags: Array) -> Array:

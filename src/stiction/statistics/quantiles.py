@@ -13,7 +13,7 @@ from stiction._brief import brief, brief_html
 from stiction._checks import is_real, numbers
 from stiction._model import describe
 from stiction.errors import InputError
-from stiction.statistics.estimates import as_sample
+from stiction.statistics.estimates import Estimate, as_sample
 
 Array = NDArray[np.float64]
 
@@ -104,3 +104,43 @@ def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Qua
         upper=padded[np.clip(high, 0, n + 1)],
         confidence=float(confidence),
     )
+
+
+def quantile_distance(values: Any, low: float, high: float) -> Estimate:
+    """Distance of two quantiles of independent values, with its standard error.
+
+    Parameters
+    ----------
+    values : (samples,) array
+    low, high : float
+        Probabilities, 0 < low < high < 1: 0.25 and 0.75 for the quartile range.
+
+    Returns
+    -------
+    Estimate, in the unit of the values
+
+    Notes
+    -----
+    Error by the influence function (1{x > q_p} - (1 - p))/f(q_p) of a quantile, the density f from
+    the order statistics N^(-1/5)/5 to either side.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than 16 values, or the probabilities are not in order.
+    """
+    if not (is_real(low) and is_real(high) and 0.0 < low < high < 1.0):
+        given = f"{describe(low)} and {describe(high)}"
+        raise InputError(f"low, high: must be 0 < low < high < 1, got {given}")
+    sample = as_sample(values, 16)
+    reach = 0.2 * sample.size**-0.2
+
+    def influence(p: float) -> tuple[float, Array]:
+        ends = np.clip((p - reach, p + reach), 0.0, 1.0)
+        below, middle, above = np.quantile(sample, (ends[0], p, ends[1]))
+        density = (ends[1] - ends[0]) / max(float(above - below), np.finfo(float).tiny)
+        return float(middle), ((sample > middle) - (1.0 - p)) / density
+
+    first, second = influence(low), influence(high)
+    error = float((second[1] - first[1]).std(ddof=1)) / sample.size**0.5
+    return Estimate(second[0] - first[0], error)

@@ -35,10 +35,12 @@ from stiction._model import (
     to_plain,
     whole,
 )
-from stiction._progress import Show
+from stiction._progress import Meter, Show
+from stiction.dotted_keys import part_with_values
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
 from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
+from stiction.ensemble.part import as_part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.errors import InputError, unknown_name
@@ -51,7 +53,6 @@ from stiction.study.sweep import (
     Sweep,
     grid_axes,
     name_point,
-    part_with_values,
     points_of,
     unknown_keys,
 )
@@ -188,6 +189,16 @@ class Study:
         if (info.context or {}).get("trusted"):
             return self
         self._check_points()
+        ensemble = self.ensemble
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
+        if problems:
+            raise InputError([f"ensemble.{text}" for text in problems])
+        if ensemble.keep:
+            self._check_kept()
+        return self
+
+    def _check_kept(self) -> None:
+        ensemble = self.ensemble
         some = differing_in(self.plans, "method", "problem.load", "problem.interface", "random")
         nodes = {plan.problem.interface.shape for plan in some}
         if len(nodes) > 1 and any(plan.wide for plan in some):
@@ -195,26 +206,23 @@ class Study:
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
-        ensemble = self.ensemble
-        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
-        if problems:
-            raise InputError([f"ensemble.{text}" for text in problems])
         size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
         try:
             check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
-        return self
 
     def _check_points(self) -> None:
         """Make every plan once; what is wrong is said once, with the points where it is."""
         problems: dict[str, list[int]] = {}
-        for number in range(len(self.plans)):
-            try:
-                self.plans[number]
-            except InputError as error:
-                for text in error.problems:
-                    problems.setdefault(text, []).append(number)
+        with Meter("checking the sweep", len(self.plans), unit="points") as meter:
+            for number in range(len(self.plans)):
+                try:
+                    self.plans[number]
+                except InputError as error:
+                    for text in error.problems:
+                        problems.setdefault(text, []).append(number)
+                meter.advance()
         if problems and not self.sweep:
             raise InputError(problems)
         if problems:
@@ -274,6 +282,7 @@ class Study:
         retry: bool = False,
         time_limit: float | None = None,
         lock: bool = True,
+        part: tuple[int, int] | str | None = None,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -291,6 +300,10 @@ class Study:
         lock : bool
             Keep other runs out of the folder while this one writes; False for file systems that
             have no locks.
+        part : (int, int) or str, optional
+            Compute one part of so many only, such as (3, 100) or "3/100", into a folder of its own
+            beside `out`, for jobs that know nothing of each other; `stiction.merge_parts` joins
+            them to the same numbers as one run.
 
         Returns
         -------
@@ -307,6 +320,8 @@ class Study:
         """
         check_flag("retry", retry)
         check_progress(progress)
+        if part is not None and out is None:
+            raise InputError("part: a part is stored; say where with out=")
         if out is not None:
             from stiction.stored_run import run_into
 
@@ -319,6 +334,7 @@ class Study:
                 retry=retry,
                 time_limit=time_limit,
                 lock=lock,
+                part=None if part is None else as_part(part),
             )
             return stored.dataset()
         return run_plans(

@@ -18,19 +18,16 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction._checks import is_whole
 from stiction._model import _models_in, describe, to_plain
+from stiction.dotted_keys import CORRELATION
 from stiction.ensemble.assemble import GridAxis
 from stiction.errors import InputError, unknown_name
 from stiction.placed import Placed, is_profile, placed_profile
-from stiction.random.marginals import ScipyMarginal
-from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable
 
 MOST_POINTS = 100_000
 _FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
 _FIXED_TABLES = ("title", "sweep", "cluster", "ensemble.keep_limit")
 _RANGE = ("start", "stop", "count", "spacing")
-CORRELATION = "correlation"
-"""Table of `RandomInterface` whose keys are names of properties, and its values pure numbers."""
 _UNITS = {
     "length": "m",
     "correlation_length": "m",
@@ -248,82 +245,6 @@ def _text(value: Any) -> str:
         return f"{value:g}"
     kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
     return str(kind) if kind else describe(value)
-
-
-def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a model object with dotted keys replaced, all of them at once.
-
-    Raises
-    ------
-    InputError
-        If a key does not exist (the nearest valid one is named) or a value does not fit.
-    """
-    tree: dict[str, Any] = {}
-    for key, value in values.items():
-        *folders, last = key.split(".")
-        table = tree
-        for name in folders:
-            table = table.setdefault(name, {})
-        table[last] = _Leaf(value)
-    return _replaced(owner, tree, "")
-
-
-def part_with_values(owner: Any, name: str, values: Mapping[str, Any]) -> Any:
-    """One field of a model object with dotted keys below it (or itself) replaced.
-
-    The other fields are not validated again, and need not fit.
-
-    Raises
-    ------
-    InputError
-    """
-    if name in values:
-        return getattr(with_values(owner, values), name)
-    inner = {key.removeprefix(f"{name}."): value for key, value in values.items()}
-    try:
-        return with_values(getattr(owner, name), inner)
-    except InputError as error:
-        raise InputError([f"{name}.{text}" for text in error.problems]) from None
-
-
-class _Leaf(NamedTuple):
-    value: Any
-
-
-def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
-    if isinstance(owner, ScipyMarginal):
-        changes = {name: leaf.value for name, leaf in tree.items() if isinstance(leaf, _Leaf)}
-        return {"type": owner.type, **dict(owner.parameters), **changes}
-    if not dataclasses.is_dataclass(owner):
-        raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
-    names = [field.name for field in dataclasses.fields(owner) if field.init]
-    unknown = [unknown_name(path or "sweep", name, names) for name in tree if name not in names]
-    if unknown:
-        raise InputError(unknown)
-    changes = {}
-    for name, branch in tree.items():
-        inner = f"{path}.{name}" if path else name
-        if isinstance(branch, _Leaf):
-            changes[name] = branch.value
-        elif name == CORRELATION and isinstance(owner, RandomInterface):
-            changes[name] = _joined(owner.correlation or {}, branch)
-        else:
-            changes[name] = _replaced(getattr(owner, name), branch, inner)
-    try:
-        return dataclasses.replace(owner, **changes)
-    except InputError as error:
-        kind = f"{type(owner).__name__}."
-        texts = (text.removeprefix(kind) for text in error.problems)
-        raise InputError([f"{path}.{text}" if path else text for text in texts]) from None
-
-
-def _joined(owner: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
-    """A nested mapping with the leaves of the tree put into it."""
-    result = dict(owner)
-    for name, branch in tree.items():
-        leaf = isinstance(branch, _Leaf)
-        result[name] = branch.value if leaf else _joined(result.get(name, {}), branch)
-    return result
 
 
 def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:

@@ -6,8 +6,27 @@ import numpy as np
 
 from stiction._typing import Array
 from stiction.papers.albertini2020.data import Data
+from stiction.problem import Problem
 from stiction.statistics.control_variates import Combined, combined_mean
-from stiction.statistics.estimates import Estimate, pooled_moments
+from stiction.statistics.estimates import Estimate, pooled_moments, standard_deviation
+from stiction.statistics.quantiles import quantile_distance
+
+SCATTER = {
+    "lower": "median less lower quartile",
+    "quartiles": "quartile range",
+    "deviation": "standard deviation",
+}
+"""Measures of how much tau_cr varies; the paper plots the first."""
+
+
+def scatter(data: Data, ratio: float) -> dict[str, Estimate]:
+    """The three measures of the scatter of tau_cr in the Monte Carlo study, Pa."""
+    stress = data.at(ratio)["critical_stress"].values
+    return {
+        "lower": quantile_distance(stress, 0.25, 0.5),
+        "quartiles": quantile_distance(stress, 0.25, 0.75),
+        "deviation": standard_deviation(stress),
+    }
 
 
 def nucleation_moments(data: Data, ratio: float) -> tuple[Estimate, Estimate, Estimate]:
@@ -22,6 +41,14 @@ def variance_ratio(data: Data, ratio: float) -> Estimate:
     own = data.setting.field(ratio).standard_deviation / data.setting.mean
     value = (deviation.value / own) ** 2
     return Estimate(value, 2.0 * value * deviation.error / deviation.value)
+
+
+def apart(problem: Problem, one: Array, other: Array) -> Array:
+    """Whether two positions are more than h_n/2 from each other, the shorter way round."""
+    gap = np.abs(one - other)
+    gap = np.minimum(gap, problem.interface.extent - gap)
+    result: Array = gap > 0.5 * problem.nucleation_length
+    return result
 
 
 def overprediction(data: Data, ratio: float) -> Array:
@@ -40,10 +67,7 @@ def misplaced(data: Data, ratio: float, *, printed: bool = False) -> Array:
     problem = data.setting.problem
     study = data["interaction"].sel(correlation_ratio=ratio)
     local = study["printed_critical_position"] if printed else data.at(ratio)["critical_position"]
-    gap = np.abs(local.values - study["critical_position"].values)
-    gap = np.minimum(gap, problem.interface.extent - gap)
-    result: Array = gap > 0.5 * problem.nucleation_length
-    return result
+    return apart(problem, local.values, study["critical_position"].values)
 
 
 def shift_of(data: Data, ratio: float, prediction: str) -> Array:
@@ -62,10 +86,8 @@ def displaced(data: Data, ratio: float, prediction: str) -> Array:
     """Whether a prediction puts the onset of a rupture more than h_n/2 from where it began."""
     problem = data.setting.problem
     runs = data["ruptures"].sel(correlation_ratio=ratio)
-    gap = np.abs(runs[f"{prediction}_critical_position"].values - runs["critical_position"].values)
-    gap = np.minimum(gap, problem.interface.extent - gap)
-    result: Array = gap > 0.5 * problem.nucleation_length
-    return result
+    predicted = runs[f"{prediction}_critical_position"].values
+    return apart(problem, predicted, runs["critical_position"].values)
 
 
 def dynamic_mean(data: Data, ratio: float) -> Combined:
@@ -118,3 +140,25 @@ def release_rate(data: Data, stress: float, length: Array | float) -> Array:
     half = 0.5 * np.asarray(length) * problem.nucleation_length
     result: Array = np.pi * half * drop**2 / (2.0 * problem.effective_modulus)
     return result
+
+
+def variation(data: Data, ratio: float) -> Estimate:
+    """Coefficient of variation of tau_cr in the Monte Carlo study; that of mu_s at any pressure."""
+    stress = data.at(ratio)["critical_stress"].values
+    found = standard_deviation(stress)
+    return found.scaled(1.0 / float(stress.mean()))
+
+
+def required_width(data: Data, factor: float, wanted: float) -> tuple[float, float]:
+    """Coefficient of variation of the strength at which tau_cr has the wanted one, and its own.
+
+    The local criterion is linear in the strength: w times the deviations of tau_p from its mean
+    give w times those of tau_cr. `factor` is L over the setting's.
+    """
+    study = data["size"].sel(length_factor=factor)
+    mean, spread = float(study["mean"]), float(study["standard_deviation"])
+    unit = data.setting.mean
+    # w spread = wanted (unit + w (mean - unit))
+    width = wanted * unit / (spread + wanted * (unit - mean))
+    own = data.setting.field(data.ratios[1]).standard_deviation / unit
+    return width * own, own

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import platform
-import time
+import re
 from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from stiction import __version__
 from stiction.papers.albertini2020.claims import SUBJECTS, Claim, Finding, Verdict
 from stiction.papers.albertini2020.claims.claim import rounded
-from stiction.papers.albertini2020.claims.rules import kilopascal, megapascal
+from stiction.papers.albertini2020.claims.limits import LIMITS
+from stiction.papers.albertini2020.claims.rules import EachReading
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import (
+    SCATTER,
     displaced,
     fidelity,
     misplaced,
     overprediction,
+    scatter,
     shift_of,
+    variation,
 )
+from stiction.papers.albertini2020.provenance import parameters, provenance
+from stiction.papers.albertini2020.studies.modulus import READINGS
 from stiction.report.page import ShownClaim, ShownFigure, render
 from stiction.report.tables import Table
 from stiction.statistics.control_variates import combined_mean
@@ -35,7 +37,6 @@ SOURCE = (
     " when its local strength is random. This page computes their study again and holds their"
     " statements against the results."
 )
-_PACKAGES = ("numpy", "scipy", "numba", "rocket-fft", "xarray", "netCDF4", "pydantic", "matplotlib")
 Judged = Sequence[tuple[Claim, Finding]]
 
 
@@ -53,15 +54,33 @@ def assemble(
         headline=_tally(findings),
         points=_points(data, findings),
         exceptions=_exceptions(findings),
-        key_table=_key_table(data),
+        key_tables=[
+            table
+            for table in (_key_table(data), _scatter_table(data), _reading_table(findings))
+            if table is not None
+        ],
         figures=figures,
         claims=_claims(findings),
-        parameters=_parameters(data),
-        notes=[
-            f"{text} ({count} times)" if count > 1 else text for text, count in warnings.items()
-        ],
-        provenance=_provenance(data, seconds),
+        limits=limits_table(),
+        parameters=parameters(data),
+        notes=_notes(warnings),
+        provenance=provenance(data, seconds),
     )
+
+
+def _notes(warnings: Mapping[str, int]) -> list[str]:
+    """Each warning once, with the studies in which it came up; without the code it suggests."""
+    studies: dict[str, dict[str, int]] = {}
+    for text, count in warnings.items():
+        study, _, words = text.partition(": ")
+        # What to write in a script instead is for scripts.
+        words = re.sub(r" ?\([a-z_.]+ ?>=[^)]*\)", "", words)
+        words = re.split(r"; [A-Z]\w+\(", words)[0].rstrip(".")
+        # Numbers differ from study to study; one of them will do.
+        key = re.sub(r"\d[\d.,e+-]*", "#", words)
+        kept = next((k for k in studies if re.sub(r"\d[\d.,e+-]*", "#", k) == key), words)
+        studies.setdefault(kept, {})[study] = count
+    return [f"{words} ({', '.join(where)})." for words, where in studies.items()]
 
 
 def claims_table(findings: Judged) -> Table:
@@ -69,7 +88,7 @@ def claims_table(findings: Judged) -> Table:
     return Table.of(
         "claims",
         "Claims",
-        ("claim", "where", "what it says", "printed", "computed", "verdict", "comment"),
+        ("claim", "where", "what it says", "printed", "computed", "verdict", "rule", "comment"),
         (
             (
                 claim.name,
@@ -78,11 +97,23 @@ def claims_table(findings: Judged) -> Table:
                 claim.printed,
                 "; ".join(quantity.text for quantity in finding.computed),
                 str(finding.verdict),
+                claim.rule.text,
                 finding.comment,
             )
             for claim, finding in findings
         ),
     )
+
+
+def limits_table() -> Table:
+    """What the words of the paper are taken to mean, with the reason."""
+    return Table.of(
+        "limits",
+        "What words are taken to mean",
+        ("word", "limit", "reason"),
+        ((each.word, f"{each.value:g} {each.unit}".strip(), each.reason)
+         for each in LIMITS.values()),
+    )  # fmt: skip
 
 
 def _tally(findings: Judged) -> list[tuple[str, int]]:
@@ -175,17 +206,53 @@ def _exceptions(findings: Judged) -> list[tuple[str, list[str]]]:
     for verdict, heading in (
         (Verdict.FAILS, "What does not hold"),
         (Verdict.CORRECTED, "What holds with a correction"),
+        (Verdict.UNDECIDABLE, "What the text leaves open"),
         (Verdict.OPEN, "What these samples cannot decide"),
     ):
         texts = []
         for claim, finding in findings:
             if finding.verdict is not verdict:
                 continue
-            comment = f": {finding.comment}" if finding.comment else ""
-            texts.append(f"{claim.says.rstrip('.')} ({claim.where}){comment}.")
+            says = claim.says.rstrip(".")
+            comment = f" Computed: {finding.comment.rstrip('.')}." if finding.comment else ""
+            texts.append(f"The paper says: {says} ({claim.where}).{comment}")
         if texts:
             groups.append((heading, texts))
     return groups
+
+
+def _scatter_table(data: Data) -> Table | None:
+    """Three measures of how much tau_cr varies, and the coefficient of variation of mu_s."""
+    if "monte_carlo" not in data.studies:
+        return None
+    rows = []
+    for ratio in data.ratios:
+        found = [rounded(each.scaled(1e-3)) for each in scatter(data, ratio).values()]
+        rows.append((f"{ratio:g}", *found, rounded(variation(data, ratio).scaled(100.0))))
+    return Table.of(
+        "scatter",
+        "How much the critical stress varies (kPa): the paper plots the first",
+        ("xi_0/h_n", *SCATTER.values(), "coefficient of variation (%)"),
+        rows,
+    )
+
+
+def _reading_table(findings: Judged) -> Table | None:
+    """The verdict under each reading of the modulus."""
+    rows = [
+        (claim.says, *(str(verdict) for verdict in finding.by_reading), str(finding.verdict))
+        for claim, finding in findings
+        if isinstance(claim.rule, EachReading)
+    ]
+    if not rows:
+        return None
+    columns = [f"({key}) {text}" for key, text in READINGS.items()]
+    return Table.of(
+        "modulus",
+        "Which modulus: what each reading of the text makes of the printed results",
+        ("the paper says", *columns, "together"),
+        rows,
+    )
 
 
 def _key_table(data: Data) -> Table | None:
@@ -206,8 +273,8 @@ def _key_table(data: Data) -> Table | None:
             (
                 f"{ratio:g}",
                 label,
-                rounded(megapascal(mean(stress))),
-                rounded(kilopascal(standard_deviation(stress))),
+                rounded(mean(stress).scaled(1e-6)),
+                rounded(standard_deviation(stress).scaled(1e-3)),
                 *(f"{value * 1e-6:.4f}" for value in q.value),
                 f"{float(np.mean(stress)) / data.setting.mean:.4f}",
             )
@@ -242,100 +309,7 @@ def _claims(findings: Judged) -> list[tuple[str, list[ShownClaim]]]:
                 tuple(quantity.text for quantity in finding.computed),
                 str(finding.verdict),
                 finding.comment,
+                claim.rule.text,
             )
         )
     return [(SUBJECTS.get(key, key), members) for key, members in groups.items() if members]
-
-
-def _parameters(data: Data) -> list[tuple[str, str]]:
-    setting = data.setting
-    problem = setting.problem
-    solid, interface = problem.solid, problem.interface
-    rate = float(np.max(problem.friction.weakening_rate))
-    length = problem.nucleation_length
-    deviation = setting.field(data.ratios[0]).standard_deviation
-    return [
-        (
-            "Solid",
-            f"G = {solid.shear_modulus:g} Pa, nu = {solid.poisson_ratio:g},"
-            f" rho = {solid.density:g} kg/m^3, plane {solid.plane}",
-        ),
-        ("Effective modulus", f"G* = {problem.effective_modulus:.6g} Pa (mode {problem.mode})"),
-        ("Interface", f"L = {interface.length:g} m, {interface.size} nodes"),
-        (
-            "Friction",
-            f"W = {rate:g} Pa/m, residual strength"
-            f" {float(np.mean(problem.friction.residual_strength)):g} Pa",
-        ),
-        (
-            "Nucleation length",
-            f"h_n = {length * 1e3:.4g} mm, L/h_n ="
-            f" {interface.extent / length:.4g},"
-            f" {length / interface.spacing:.1f} nodes",
-        ),
-        (
-            "Strength",
-            f"{_marginal(setting.marginal)}; mean {setting.mean * 1e-6:.6g} MPa,"
-            f" standard deviation {deviation * 1e-6:.4g} MPa",
-        ),
-        (
-            "Spectrum",
-            f"(k^2 + lambda^2)^-{setting.exponent:g}, truncated at"
-            f" {setting.truncation:g} lambda, {'with' if setting.mean_mode else 'without'} the mean"
-            " mode",
-        ),
-        ("Correlation lengths", "xi_0/h_n = " + ", ".join(f"{ratio:g}" for ratio in data.ratios)),
-        ("Samples", f"{data.samples:,} at each correlation length, seed {data.seed}"),
-        ("Ruptures", _rupture_counts(data)),
-    ]
-
-
-def _rupture_counts(data: Data) -> str:
-    parts = []
-    if "ruptures" in data.studies:
-        study = data["ruptures"]
-        ratios = ", ".join(f"{ratio:g}" for ratio in data.setting.simulated_ratios)
-        parts.append(
-            f"{study.sizes['sample']} at each of xi_0/h_n = {ratios}, at"
-            f" {study.attrs['loading_rate']:g} Pa/s"
-        )
-    if "dynamic" in data.studies:
-        parts.append(f"{data['dynamic'].sizes['sample']:,} at each correlation length")
-    return "; ".join(parts) or "none"
-
-
-def _marginal(marginal: Any) -> str:
-    if hasattr(marginal, "alpha"):
-        return (
-            f"Beta({marginal.alpha:g}, {marginal.beta:g}) on"
-            f" [{marginal.low * 1e-6:g}, {marginal.high * 1e-6:g}] MPa"
-        )
-    given = ", ".join(f"{key} = {value:g}" for key, value in marginal.parameters)
-    return f"{marginal.type} with {given}"
-
-
-def _provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
-    versions = []
-    for package in _PACKAGES:
-        try:
-            versions.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            continue
-    times = ", ".join(
-        f"{dataset.attrs['title']} {dataset.attrs['seconds']:.1f} s"
-        for dataset in data.studies.values()
-    )
-    return [
-        ("Computed", time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())),
-        ("stiction", __version__),
-        ("Python", f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
-        ("Packages", ", ".join(versions)),
-        ("Time taken", f"{seconds:.1f} s before this page was written"),
-        ("Studies", times or "none"),
-        ("Results", "results.nc (one group a study), tables/*.csv, figures/*.png and *.pdf"),
-        (
-            "Local criterion",
-            "local criterion of Uenishi and Rice (2003), exact eigenfunction, minimum"
-            " between the nodes",
-        ),
-    ]

@@ -13,15 +13,42 @@ const buttons = document.querySelectorAll(".filter button");
 buttons.forEach((button) => {
   button.addEventListener("click", () => {
     buttons.forEach((other) => other.setAttribute("aria-pressed", String(other === button)));
-    document.querySelectorAll(".claims").forEach((table) => {
+    document.querySelectorAll(".subject").forEach((subject) => {
       let shown = 0;
-      table.querySelectorAll("tbody tr").forEach((row) => {
+      subject.querySelectorAll("tbody tr").forEach((row) => {
         row.hidden = Boolean(button.dataset.show) && !row.classList.contains(button.dataset.show);
         shown += row.hidden ? 0 : 1;
       });
-      table.hidden = shown === 0;
-      table.previousElementSibling.hidden = shown === 0;
+      subject.hidden = shown === 0;
+      subject.open = Boolean(button.dataset.show) && shown > 0;
     });
+  });
+});
+// A link to a figure or a subject opens it.
+const reveal = () => {
+  const target = location.hash && document.querySelector(location.hash);
+  if (target) target.querySelectorAll("details.figure").forEach((each) => { each.open = true; });
+};
+window.addEventListener("hashchange", reveal);
+reveal();
+const markWide = () => document.querySelectorAll(".frame").forEach((frame) => {
+  const inner = frame.querySelector(".scroll");
+  frame.classList.toggle("wide", inner.scrollWidth > inner.clientWidth + 2);
+});
+document.querySelectorAll("details").forEach((each) => each.addEventListener("toggle", markWide));
+window.addEventListener("resize", markWide);
+markWide();
+// Paper has no clicks: what belongs there is opened, and closed again afterwards.
+window.addEventListener("beforeprint", () => {
+  document.querySelectorAll("details.printed:not([open])").forEach((each) => {
+    each.open = true;
+    each.dataset.closed = "";
+  });
+});
+window.addEventListener("afterprint", () => {
+  document.querySelectorAll("details[data-closed]").forEach((each) => {
+    each.open = false;
+    delete each.dataset.closed;
   });
 });
 // A click on a column's head sorts by it, numbers as numbers.

@@ -1,19 +1,22 @@
 """The paper's statements, each with a rule that judges it by what was computed.
 
-A claim is a function from data to `Finding` under the decorator `claim`, which says where the
-paper makes it and what it says, in our own words. To add one, write the function in the module of
-its subject; to add a subject, write the module and import it here.
+A claim is a function from data to `Measured` under the decorator `claim`, which says where the
+paper makes it, what it says, in our own words, and which rule judges the numbers. To add one,
+write the function in the module of its subject; to add a subject, write the module and import it
+here.
 """
 
 from __future__ import annotations
 
 from stiction.papers.albertini2020.claims import (  # importing them registers their claims
-    interaction,
+    arrest,
+    modulus,
     nucleation,
     onset,
     parameters,
-    rupture,
-    simulation,
+    patches,
+    prediction,
+    size,
     what_if,
 )
 from stiction.papers.albertini2020.claims.claim import (
@@ -21,26 +24,30 @@ from stiction.papers.albertini2020.claims.claim import (
     SUBJECTS,
     Claim,
     Finding,
+    Measured,
     Quantity,
-    Verdict,
     claim,
     judged,
 )
+from stiction.papers.albertini2020.claims.rules import Verdict
 
 __all__ = [
     "SUBJECTS",
     "CLAIMS",
     "Claim",
     "Finding",
+    "Measured",
     "Quantity",
     "Verdict",
+    "arrest",
     "claim",
-    "interaction",
     "judged",
+    "modulus",
     "nucleation",
     "onset",
     "parameters",
-    "rupture",
-    "simulation",
+    "patches",
+    "prediction",
+    "size",
     "what_if",
 ]

@@ -1,23 +1,15 @@
-"""A claim: where the paper makes it, what it says, and a rule that judges what was computed."""
+"""A claim: where the paper makes it, what it says, what is measured, and the rule that judges."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
+from stiction.papers.albertini2020.claims.rules import EachReading, Rule, Verdict
 from stiction.papers.albertini2020.data import Data
 from stiction.statistics.estimates import Estimate
-
-
-class Verdict(StrEnum):
-    """What became of a claim."""
-
-    HOLDS = "holds"
-    CORRECTED = "holds with a correction"
-    FAILS = "does not hold"
-    OPEN = "undecided"
 
 
 @dataclass(frozen=True)
@@ -45,6 +37,27 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Measured:
+    """What was measured for a claim.
+
+    Attributes
+    ----------
+    judged : sequence of Quantity, or one for each part of an `All` or each reading
+        What the rule is given.
+    beside : sequence of Quantity
+        What else should be known.
+    comment : str
+    comments : mapping of Verdict to str
+        What to say instead, by verdict.
+    """
+
+    judged: Any
+    beside: Sequence[Quantity] = ()
+    comment: str = ""
+    comments: Mapping[Verdict, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Finding:
     """What was computed for a claim, and the verdict.
 
@@ -54,14 +67,17 @@ class Finding:
     verdict : Verdict
     comment : str
         The correction, or what else should be known.
+    by_reading : tuple of Verdict
+        Under each reading of the text, where it leaves several.
     """
 
     computed: tuple[Quantity, ...]
     verdict: Verdict
     comment: str = ""
+    by_reading: tuple[Verdict, ...] = ()
 
 
-Judge = Callable[[Data], Finding]
+Measure = Callable[[Data], Measured]
 
 
 @dataclass(frozen=True)
@@ -80,8 +96,9 @@ class Claim:
         The printed value, if there is one.
     needs : tuple of str
         Names of the studies that it is judged by.
-    judge : callable
-        From data to finding.
+    rule : Rule
+    measure : callable
+        From data to what the rule judges.
     """
 
     name: str
@@ -89,12 +106,40 @@ class Claim:
     says: str
     printed: str
     needs: tuple[str, ...]
-    judge: Judge
+    rule: Rule
+    measure: Measure
 
     @property
     def subject(self) -> str:
         """What it is about: the module that it stands in."""
-        return self.judge.__module__.rpartition(".")[2]
+        return self.measure.__module__.rpartition(".")[2]
+
+    def judge(self, data: Data) -> Finding:
+        """Measure, and apply the rule."""
+        found = self.measure(data)
+        numbers = _numbers(found.judged)
+        verdict = self.rule(numbers)
+        by_reading: tuple[Verdict, ...] = ()
+        if isinstance(self.rule, EachReading):
+            by_reading = tuple(self.rule.of_each(numbers))
+        computed = tuple(dict.fromkeys((*_flat(found.judged), *found.beside)))
+        comment = found.comments.get(verdict, found.comment)
+        return Finding(computed, verdict, comment, by_reading)
+
+
+def _numbers(judged: Any) -> Any:
+    """Estimates in place of quantities, however they are nested."""
+    if isinstance(judged, Quantity):
+        return judged.estimate
+    return [_numbers(each) for each in judged]
+
+
+def _flat(judged: Any) -> Iterator[Quantity]:
+    if isinstance(judged, Quantity):
+        yield judged
+        return
+    for each in judged:
+        yield from _flat(each)
 
 
 CLAIMS: dict[str, Claim] = {}
@@ -104,25 +149,27 @@ SUBJECTS = {
     "parameters": "Parameters and theory",
     "nucleation": "Nucleation stress",
     "onset": "Critical stress and position of onset",
-    "interaction": "Theory against exact equilibrium",
-    "simulation": "Theory against elastodynamic simulation",
-    "rupture": "Nucleation and run-away propagation",
+    "prediction": "Theory against exact equilibrium and elastodynamics",
+    "modulus": "Which modulus",
+    "patches": "Slip patches and how they interact",
+    "arrest": "Run-away, arrest and what drives it",
+    "size": "Size of the scatter and of the interface",
     "what_if": "What if",
 }
 """Titles of the subjects, by module, in the order in which they are shown."""
 
 
 def claim(
-    *, where: str, says: str, printed: str = "", needs: tuple[str, ...] = ()
-) -> Callable[[Judge], Judge]:
-    """Decorator that makes a function from data to finding a claim; its name is the function's."""
+    *, where: str, says: str, rule: Rule, printed: str = "", needs: tuple[str, ...] = ()
+) -> Callable[[Measure], Measure]:
+    """Decorator that makes a function from data to `Measured` a claim of the function's name."""
 
-    def register(judge: Judge) -> Judge:
-        name = judge.__name__.replace("_", "-")
+    def register(measure: Measure) -> Measure:
+        name = measure.__name__.replace("_", "-")
         if name in CLAIMS:
             raise ValueError(f"two claims are called {name}")
-        CLAIMS[name] = Claim(name, where, says, printed, needs, judge)
-        return judge
+        CLAIMS[name] = Claim(name, where, says, printed, needs, rule, measure)
+        return measure
 
     return register
 
@@ -138,14 +185,16 @@ def judged(data: Data, claims: Iterable[Claim] | None = None) -> list[tuple[Clai
 
 
 def rounded(estimate: Estimate) -> str:
-    """'0.6947 ± 0.0002': the error to one or two digits, the value to the same place."""
+    """'0.6947 +- 0.0002': the error to one or two digits, the value to the same place."""
     value, error = estimate.value, estimate.error
     if not math.isfinite(value):
         return str(value)
     if not error > 0.0 or not math.isfinite(error):
-        return f"{value:.6g}"
+        return f"{value:.5g}" if abs(value) < 1e5 else f"{value:,.0f}"
     place = math.floor(math.log10(error))
     if error / 10.0**place < 2.95:  # a leading 1 or 2 deserves a second digit
         place -= 1
     digits = max(-place, 0)
+    if digits > 6:
+        return f"{value:.2g} \N{PLUS-MINUS SIGN} {error:.1g}"
     return f"{value:.{digits}f} \N{PLUS-MINUS SIGN} {error:.{digits}f}"

@@ -10,15 +10,19 @@ from collections.abc import Iterable
 
 from stiction.errors import InputError, unknown_name
 from stiction.papers.albertini2020.figures import (
+    driving,
     energy,
     fidelity,
     growth,
     interaction,
     mapping,
+    mechanism,
     monte_carlo,
     prediction,
     problem,
     rupture,
+    sequence,
+    size,
     statistics,
     variance,
 )
@@ -36,6 +40,10 @@ FIGURES: dict[str, Figure] = by_name(
     energy,
     growth,
     fidelity,
+    driving,
+    mechanism,
+    size,
+    sequence,
 )
 
 

@@ -24,17 +24,18 @@ def caption(data: Data) -> str:
     events = data["arrest"]
     typical = float(data["ruptures"]["median_rupture_speed"].median())
     fast = typical > data.setting.problem.solid.shear_wave_speed
-    count = int(np.unique(events["number"].values).size)
+    count = events.sizes["event"]
     return (
         "Not in the paper: (a) static energy release rate of a crack under the stress drop"
         " tau_cr - tau_r against its length, over the largest fracture energy Gamma_max; the shade"
         " spans 5 to 95 % of samples, dots mark the length from which nothing arrests the crack."
-        " (b) Longest arrested patch by equilibrium in samples whose first instability comes to"
-        f" rest ({count} of them run again): filled where the rupture comes to rest with inertia,"
-        " too, open where inertia carries it through. (c) Speed of the front in each rupture of"
-        " Figure 4, its median over the interface (filled) and its largest over two nucleation"
-        " lengths (open; patches that grow ahead of the front add to it), against the Rayleigh,"
-        " shear and dilatational wave speeds."
+        " (b) Longest arrested patch by equilibrium in the samples whose first instability comes to"
+        f" rest, {count} of them, each run again with inertia: filled where it comes to rest with"
+        " inertia, too, open where inertia carries it through. (c) Speed of the front in each"
+        " rupture of Figure 4, its median over the interface (filled) and its largest over two"
+        " nucleation lengths (open), against the Rayleigh, shear and dilatational wave speeds."
+        " These are apparent speeds: patches that grow ahead of the front and are swallowed add to"
+        " them, so that they may exceed c_d, which no disturbance does."
         f"{' The ruptures are supershear.' if fast else ''}"
     )
 
@@ -109,6 +110,9 @@ def _speeds(axes: Axes, data: Data) -> None:
     axes.set_ylim(0, 1.1 * float(np.nanmax(runs["rupture_speed"].values)) / unit)
     axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$")
     axes.set_ylabel(r"front speed$\,/c_\mathrm{s}$")
+    axes.plot([], [], "o", color=INK, markersize=2.8, label="median")
+    axes.plot([], [], "o", color=INK, markerfacecolor="white", markersize=2.8, label="largest")
+    axes.legend(loc="upper left", handlelength=1.0)
 
 
 def _rate(axes: Axes, data: Data) -> None:
@@ -157,6 +161,9 @@ def _lengths(axes: Axes, data: Data) -> None:
     axes.set_ylim(0, max(1.15 * float(length.max(initial=0.0)), 3.5))
     axes.set_xlabel(r"correlation length $\xi_0/h_\mathrm{n}$")
     axes.set_ylabel(r"arrested patch$\,/h_\mathrm{n}$")
+    axes.plot([], [], "o", color=INK, markersize=4.5, label="with inertia, too")
+    axes.plot([], [], "o", color=INK, markerfacecolor="white", markersize=4.5, label="without only")
+    axes.legend(loc="upper left", handlelength=1.0)
     if not length.size:
         axes.text(
             0.5, 0.5, "no arrested event\nin these samples", transform=axes.transAxes, ha="center",

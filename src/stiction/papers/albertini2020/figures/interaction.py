@@ -186,6 +186,7 @@ def _positions(axes: Axes, data: Data) -> None:
         )
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
+    axes.legend(title=r"$\xi_0/h_\mathrm{n}$", title_fontsize=7.5, handlelength=1.0)
     axes.set_xlabel(r"$x_\mathrm{cr}/L$, exact")
     axes.set_ylabel(r"$x_\mathrm{cr}/L$, local")
 

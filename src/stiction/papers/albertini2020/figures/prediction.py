@@ -31,10 +31,10 @@ def caption(data: Data) -> str:
         "(a) Strength of the rupture in Figure 3 (thin) and its nucleation stress (thick); the dot"
         " is the predicted onset, the cross the simulated one. (b) Critical stress by the local"
         f" criterion against elastodynamics, {runs.sizes['sample']} ruptures at each of"
-        f" xi_0/h_n = {ratios}, loaded at {runs.attrs['loading_rate']:g} Pa/s; pale: with the"
-        " printed modulus G/(1-nu); crosses: exact equilibrium. (c) Position of onset by the local"
-        " criterion against elastodynamics; rings mark those more than h_n/2 off. (d) Error of"
-        " each prediction of the critical stress, one dot a rupture, with its mean."
+        f" xi_0/h_n = {ratios}, loaded at {runs.attrs['loading_rate']:g} Pa/s. (c) Position of"
+        " onset predicted with the printed modulus against elastodynamics; rings mark those more"
+        " than h_n/2 off, as counted in the table. (d) Error of each prediction of the critical"
+        " stress, one dot a rupture, with its mean."
     )
 
 
@@ -122,15 +122,27 @@ def _stress(axes: Axes, data: Data) -> None:
                         "exact_first_instability")
         )  # fmt: skip
         axes.plot(found, printed, **style, marker=marker(i), alpha=0.22, markeredgewidth=0)
-        axes.plot(
-            found, local, **style, marker=marker(i), markerfacecolor="none", label=f"{ratio:g}"
-        )
+        axes.plot(found, local, **style, marker=marker(i), markerfacecolor="none")
         axes.plot(found, exact, **{**style, "markersize": 2.6}, marker="x", markeredgewidth=0.7)
         everything += [found, printed]
     _diagonal(axes, np.concatenate(everything))
     axes.set_xlabel(r"$\tau_\mathrm{cr}/\langle\tau_\mathrm{p}\rangle$, simulated")
     axes.set_ylabel(r"$\tau_\mathrm{cr}/\langle\tau_\mathrm{p}\rangle$, predicted")
-    axes.legend(title=r"$\xi_0/h_\mathrm{n}$", title_fontsize=7.5, loc="upper left", handlelength=1)
+    handles = [
+        axes.plot([], [], marker(i), color=color(i), markerfacecolor="none", label=f"{ratio:g}")[0]
+        for i, ratio in enumerate(data.setting.simulated_ratios)
+    ]
+    kinds: tuple[tuple[str, dict[str, Any]], ...] = (
+        ("plane state's $G^*$", {"marker": "o", "markerfacecolor": "none", "color": INK}),
+        ("printed $G^*$", {"marker": "o", "color": INK, "alpha": 0.3, "markeredgewidth": 0}),
+        ("equilibrium", {"marker": "x", "color": INK, "markersize": 3}),
+    )
+    for label, style in kinds:
+        handles += axes.plot([], [], linestyle="none", label=label, **style)
+    axes.legend(
+        handles=handles, title=r"$\xi_0/h_\mathrm{n}$; by", title_fontsize=6.5, fontsize=6.2,
+        loc="upper left", handlelength=1, labelspacing=0.25, borderaxespad=0.0,
+    )  # fmt: skip
 
 
 def _diagonal(axes: Axes, values: np.ndarray) -> None:
@@ -148,8 +160,8 @@ def _place(axes: Axes, data: Data) -> None:
     for i, ratio in enumerate(data.setting.simulated_ratios):
         at = data["ruptures"].sel(correlation_ratio=ratio)
         found = at["critical_position"].values / length
-        local = at["local_critical_position"].values / length
-        wrong = displaced(data, ratio, "local")
+        local = at["printed_critical_position"].values / length
+        wrong = displaced(data, ratio, "printed")
         axes.plot(
             found, local, linestyle="none", marker=marker(i), color=color(i), markersize=3.4,
             markerfacecolor="none",

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiction.papers.albertini2020.data import Data
+from stiction.papers.albertini2020.derived import dynamic_mean
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, color, new_figure, panel
 from stiction.report.tables import Table
 from stiction.statistics.estimates import mean
@@ -23,19 +24,19 @@ PROBABILITIES = (0.25, 0.5, 0.75)
 
 
 _DYNAMIC = (
-    " Bars with caps in (b): mean of the elastodynamic ruptures of Figure 4 with two standard"
-    " errors to either side."
+    " Diamonds in (b): mean of the elastodynamic ruptures of Figure 4 with two standard errors to"
+    " either side; dashes: the same with exact equilibrium of all samples as control variate, known"
+    " to a hundredth of that; the inset enlarges the shortest lengths."
 )
 
 
 def caption(data: Data) -> str:
     """What is seen."""
-    exact = "interaction" in data.studies
     return (
         "Mean, median and quartiles of (a) the nucleation stress at a point and (b) the critical"
         " stress, against the correlation length. Filled symbols and lines: Monte Carlo study,"
         f" {data.samples:,} samples each. Thin lines in (b): side study over a wider range at fixed"
-        f" interface length.{' Diamonds: means by exact equilibrium.' if exact else ''}"
+        " interface length."
         f"{_DYNAMIC if 'ruptures' in data.studies else ''}"
         " Squares at the left edge: limit of vanishing correlation length."
         " Bars at the right edge: quartiles and median in the limit of long correlation with the"
@@ -128,21 +129,10 @@ def draw(data: Data) -> Figure:
     weakest = data.relative(data["window"]["weakest_quantile_value"].values[1:4])
     _long_limit(critical, weakest, 2, r"$\min\tau_\mathrm{p}$")
     _short_side(critical, data)
-    if "interaction" in data.studies:
-        exact = data["interaction"]["critical_stress"].mean("sample").values
-        critical.plot(
-            data.ratios,
-            data.relative(exact),
-            "D",
-            color=INK,
-            markerfacecolor="white",
-            markersize=3.6,
-            label="exact mean",
-            zorder=6,
-        )
     if "ruptures" in data.studies:
         _dynamic(critical, data)
-    critical.legend(loc="upper right")
+        _inset(critical, data)
+    critical.legend(loc="upper right", fontsize=6.2, labelspacing=0.25)
     for axes in (nucleation, critical):
         if np.isfinite(setting.bounds[0]):
             _bound(axes, setting.bounds[0] / setting.mean)
@@ -152,26 +142,43 @@ def draw(data: Data) -> Figure:
     return figure
 
 
-def _dynamic(axes: Axes, data: Data) -> None:
-    """Means over the ruptures, beside those of the Monte Carlo study."""
-    runs = data["ruptures"]
-    ratios = data.setting.simulated_ratios
-    found = [
+def _dynamic(axes: Axes, data: Data, label: str = "simulations, mean") -> None:
+    """Means over the ruptures, and with equilibrium of all samples as control variate."""
+    runs, ratios = data["ruptures"], data.setting.simulated_ratios
+    plain = [
         mean(data.relative(runs["critical_stress"].sel(correlation_ratio=ratio).values))
         for ratio in ratios
     ]
     axes.errorbar(
-        [1.07 * ratio for ratio in ratios],
-        [each.value for each in found],
-        [2.0 * each.error for each in found],
-        fmt="_",
-        color=ACCENT,
-        markersize=4,
-        capsize=2.5,
-        linewidth=1.0,
-        label="dynamic mean",
-        zorder=7,
-    )
+        ratios, [each.value for each in plain], [2.0 * each.error for each in plain], fmt="D",
+        color=INK, markerfacecolor="white", markersize=3.6, capsize=2.0, linewidth=0.8, label=label,
+        zorder=6,
+    )  # fmt: skip
+    known = [ratio for ratio in ratios if ratio in data.ratios]
+    if "interaction" not in data.studies or runs.sizes["sample"] < 3 or not known:
+        return
+    best = [dynamic_mean(data, ratio).estimate for ratio in known]
+    axes.plot(
+        known, data.relative(np.array([each.value for each in best])), "_", color=ACCENT,
+        markersize=8, markeredgewidth=1.4, label="with control variates", zorder=7,
+    )  # fmt: skip
+
+
+def _inset(axes: Axes, data: Data) -> None:
+    """Enlarged means: how much lower simulations are at the shortest correlation length."""
+    ratios = np.array(data.ratios)
+    inset = axes.inset_axes((0.40, 0.30, 0.56, 0.34))
+    means = data.relative(np.array([_numbers(data, r, "critical_stress")[0] for r in ratios]))
+    inset.plot(ratios, means, color=color(2), marker="o", markersize=2.6, linewidth=0.9)
+    _dynamic(inset, data)
+    inset.set_xscale("log")
+    inset.set_xlim(0.2, 0.65)
+    shown = means[(ratios >= 0.2) & (ratios <= 0.65)]
+    if shown.size:
+        inset.set_ylim(shown.min() - 0.012, shown.max() + 0.012)
+    inset.set_xticks([0.25, 0.5], ["0.25", "0.5"])
+    inset.minorticks_off()
+    inset.tick_params(labelsize=6.0, length=2)
 
 
 _ZERO, _INFINITY = 0.6, 1.6

@@ -10,6 +10,7 @@ import xarray as xr
 from stiction.equilibrium.method import Equilibrium
 from stiction.papers.albertini2020.setting import Setting
 from stiction.papers.albertini2020.studies.context import Context, work
+from stiction.papers.albertini2020.studies.ruptures import METHOD
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
@@ -18,6 +19,9 @@ name = "disorder"
 title = "More disorder: wide strength range, random load, random residual strength"
 
 MOST = 250
+WIDE = ("twice the range", "four times the range")
+RUNS = 16
+"""Ruptures of each of them."""
 _EVENTS = 10  # cost of a sample with arrested events, in samples without
 
 
@@ -35,7 +39,7 @@ def widened(setting: Setting, factor: float) -> Beta:
     return Beta(alpha=1.5, beta=3.0, low=low, high=low + factor * setting.mean)
 
 
-def _noise(setting: Setting, ratio: float, deviation: float, centre: float) -> RandomField:
+def noise(setting: Setting, ratio: float, deviation: float, centre: float) -> RandomField:
     """A symmetric field between bounds sqrt(5) standard deviations apart from its centre."""
     half = np.sqrt(5.0) * deviation
     return setting.field(
@@ -58,13 +62,14 @@ def _cases(context: Context) -> dict[str, RandomInterface]:
             strength=setting.field(ratio, marginal=widened(setting, 4.0))
         ),
         "random load": RandomInterface(
-            strength=own, initial_stress=_noise(setting, ratio, 0.05 * unit, 0.0)
+            strength=own, initial_stress=noise(setting, ratio, 0.05 * unit, 0.0)
         ),
     }
     if spread > 0.0:
         for label, factor in (("random stress drop", 1.0), ("more random stress drop", 2.0)):
-            noise = _noise(setting, 4.0 * ratio, factor * spread, residual + 2.3 * factor * spread)
-            cases[label] = RandomInterface(strength=own, residual_strength=noise)
+            deviation = factor * spread
+            level = noise(setting, 4.0 * ratio, deviation, residual + 2.3 * deviation)
+            cases[label] = RandomInterface(strength=own, residual_strength=level)
     return cases
 
 
@@ -74,7 +79,8 @@ def _count(context: Context) -> int:
 
 def cost(context: Context) -> int:
     """Every case."""
-    return len(_cases(context)) * work(Equilibrium(), _count(context)) * _EVENTS
+    static = len(_cases(context)) * work(Equilibrium(), _count(context)) * _EVENTS
+    return static + len(WIDE) * work(METHOD, RUNS)
 
 
 def compute(context: Context) -> xr.Dataset:
@@ -88,5 +94,12 @@ def compute(context: Context) -> xr.Dataset:
         )
         parts.append(found[["first_instability", "critical_stress", "arrested_events"]])
     dataset = xr.concat(parts, dim="case", combine_attrs="drop").assign_coords(case=list(cases))
+    # With inertia, where arrests are common enough to be counted among few runs.
+    runs = [
+        context.monte_carlo(context.setting.problem, cases[case], METHOD, RUNS)["arrested_events"]
+        for case in WIDE
+    ]
+    dataset["dynamic_arrests"] = (("wide", "run"), np.array([each.values for each in runs]))
+    dataset = dataset.assign_coords(wide=list(WIDE))
     dataset.attrs["correlation_ratio"] = ratio_of(context)
     return dataset

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.statistics.estimates import Estimate, mean, skewness, standard_deviation
-from stiction.statistics.quantiles import quantiles
+from stiction.statistics.quantiles import quantile_distance, quantiles
 
 PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOMENTS = {"mean": mean, "standard_deviation": standard_deviation, "skewness": skewness}
@@ -25,6 +25,8 @@ def summarise(values: Any) -> xr.Dataset:
     q = quantiles(values, PROBABILITIES)
     for name in ("value", "lower", "upper"):
         numbers[f"quantile_{name}"] = ("probability", getattr(q, name))
+    spread = quantile_distance(values, 0.25, 0.5)
+    numbers["lower_spread"], numbers["lower_spread_error"] = spread.value, spread.error
     numbers["smallest"] = float(np.min(values))
     dataset = xr.Dataset(numbers, coords={"probability": list(PROBABILITIES)})
     for key, variable in dataset.variables.items():

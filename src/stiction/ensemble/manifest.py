@@ -1,4 +1,4 @@
-"""Whether two studies are the same run, and where they differ."""
+"""The manifest of a run: which study it is, and whether another one is the same run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from stiction.ensemble.files import digest, printable, read_whole, write_whole
 from stiction.errors import StoreError
+
+FORMAT = 2
+MANIFEST = "manifest.json"
 
 
 def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
@@ -54,3 +58,45 @@ def differences(here: Any, there: Any, path: str = "") -> list[str]:
 def _short(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+class DamagedManifest(StoreError):
+    """A manifest that is gone or not what was written; the study makes a new one."""
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """The manifest of a run.
+
+    Raises
+    ------
+    DamagedManifest
+    StoreError
+        If it is of another format, or cannot be read.
+    """
+    data = read_whole(path / MANIFEST)
+    if data is None:
+        raise DamagedManifest(f"{path}: holds no run (no {MANIFEST} in it)")
+    advice = "is damaged; running the study again into the folder makes a new one"
+    try:
+        manifest: dict[str, Any] = json.loads(data)
+        said = manifest.pop("sha256", None)
+        found = manifest.get("format")
+    except (ValueError, AttributeError):
+        raise DamagedManifest(f"{path / MANIFEST}: {advice}") from None
+    if found != FORMAT and (said is None or said == _seal(manifest)):
+        raise StoreError(
+            f"{path}: is of format {printable(repr(found))}; this version reads {FORMAT}"
+        )
+    if said != _seal(manifest):
+        raise DamagedManifest(f"{path / MANIFEST}: {advice}")
+    return manifest
+
+
+def write_manifest(path: Path, study: dict[str, Any], versions: list[str]) -> None:
+    manifest = {"format": FORMAT, "study": study, "versions": versions}
+    text = json.dumps(manifest | {"sha256": _seal(manifest)}, indent=1)
+    write_whole(path / MANIFEST, text.encode())
+
+
+def _seal(manifest: Mapping[str, Any]) -> str:
+    return digest(json.dumps(manifest, sort_keys=True).encode())

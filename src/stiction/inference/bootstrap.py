@@ -1,0 +1,136 @@
+"""Intervals by a parametric bootstrap: how fits to simulated records of a fitted field scatter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._progress import Meter
+from stiction.errors import InputError
+from stiction.inference.estimate import Estimate, Setting, estimate, simulate
+
+PLACES = ("mean", "marginal.mean", "marginal.low", "marginal.high", "marginal.loc")
+"""Parameters that say where something is; all others are positive and live on a logarithm."""
+
+
+def parameters_of(found: Estimate, setting: Setting) -> dict[str, float]:
+    """Everything that was estimated, and what follows from it, by name."""
+    marginal, spectrum, model = found.marginal, found.model.spectrum, found.model
+    values = {
+        f"marginal.{name}": value for name, value in setting.marginal.parameters(marginal).items()
+    }
+    values |= {
+        "mean": float(marginal.distribution.mean()),
+        "standard_deviation": float(marginal.distribution.std()),
+    }
+    free = setting.spectrum.free
+    if "correlation_length" in free:
+        values["spectrum.correlation_length"] = spectrum.correlation_length
+    if "exponent" in free:
+        values["spectrum.exponent"] = spectrum.exponent
+    values["efolding_length"] = efolding_length(found, setting)
+    if "anisotropy" in free:
+        values["anisotropy"] = model.anisotropy
+    if "noise_share" in free:
+        values["noise"] = model.noise
+    return values
+
+
+def efolding_length(found: Estimate, setting: Setting) -> float:
+    """Where the correlation of z falls to 1/e, m: of the curve that was fitted, interpolated."""
+    spectrum = found.model.spectrum
+    lags = spectrum.correlation_length * LAGS
+    rho = spectrum.untruncated_correlation(lags)
+    return float(np.interp(-math.exp(-1.0), -rho, lags))
+
+
+LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
+"""In correlation lengths; every spectrum has its 1/e there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repetition:
+    """A fit to simulated records.
+
+    Attributes
+    ----------
+    estimate : Estimate
+    parameters : dict of str to float
+    """
+
+    estimate: Estimate
+    parameters: dict[str, float]
+
+
+def repeat(
+    found: Estimate, setting: Setting, count: int, seed: int, workers: int, meter: Meter
+) -> list[Repetition]:
+    """Fits to simulated records; fewer than asked for if the time is over.
+
+    Repetition b depends on (seed, b) only.
+    """
+    start = setting.spectrum.vector(found.model)
+
+    def one(number: int) -> Repetition | None:
+        if meter.over:
+            return None
+        rng = np.random.default_rng([seed, number])
+        try:
+            again = estimate(simulate(found, setting, rng), setting, start)
+            result = Repetition(again, parameters_of(again, setting))
+        except InputError:  # no member of the family fits: counted by its absence
+            return None
+        meter.advance()
+        return result
+
+    with ThreadPoolExecutor(workers) as pool:
+        results = list(pool.map(one, range(count)))
+    return [result for result in results if result is not None]
+
+
+def interval_of(
+    name: str,
+    estimated: Mapping[str, float],
+    repeated: Sequence[Mapping[str, float]],
+    confidence: float,
+) -> tuple[float, float]:
+    """The basic bootstrap interval of a parameter, on its own scale.
+
+    That of a place, such as the mean, is studentised: its error is as wide as the field's standard
+    deviation and the root of its correlation length, both of which the repetition finds anew.
+    """
+    place = name in PLACES
+    at = _scaled(name, np.array(estimated[name]))
+    around = _scaled(name, np.array([one[name] for one in repeated]))
+    widths = np.array([_width(one) if place else 1.0 for one in repeated])
+    tail = 0.5 * (1.0 - confidence)
+    low, high = np.quantile((around - at) / widths, [tail, 1.0 - tail])
+    ends = at - (_width(estimated) if place else 1.0) * np.array([high, low])
+    first, last = _unscaled(name, ends)
+    return float(first), float(last)
+
+
+def _width(values: Mapping[str, float]) -> float:
+    """What the error of a mean is proportional to."""
+    return values["standard_deviation"] * math.sqrt(values["efolding_length"])
+
+
+def _scaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    if name in PLACES:
+        return values
+    shift = 0.5 if name.endswith("exponent") else 0.0
+    found: NDArray[np.float64] = np.log(np.maximum(values - shift, 1e-300))
+    return found
+
+
+def _unscaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    if name in PLACES:
+        return values
+    shift = 0.5 if name.endswith("exponent") else 0.0
+    found: NDArray[np.float64] = shift + np.exp(values)
+    return found

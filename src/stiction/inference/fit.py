@@ -1,0 +1,519 @@
+"""A random field from measured profiles: the public function, its checks and its result."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from stiction._checks import check_choice, check_instance, is_finite, is_real, is_whole
+from stiction._model import describe
+from stiction._progress import Meter, Show, check_time_limit
+from stiction._typing import Array
+from stiction.ensemble.scheduler import usable_cores
+from stiction.errors import InputError, warn_accuracy
+from stiction.inference.bootstrap import Repetition, interval_of, parameters_of, repeat
+from stiction.inference.estimate import (
+    Estimate,
+    Setting,
+    detrended,
+    estimate,
+    make_windows,
+    observe,
+)
+from stiction.inference.fit_figure import draw_fit
+from stiction.inference.marginal_fit import Family, family_of
+from stiction.inference.noisy_marginal import mean_log_likelihood
+from stiction.inference.records import Record, check_quantity, records_of
+from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
+from stiction.inference.whittle import Observed
+from stiction.interface import Interface
+from stiction.profiles import UNITS
+from stiction.random.random_field import RandomField, warn_if_inaccurate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MARGINALS = ("lognormal", "weibull", "gamma", "beta")
+ENOUGH_LENGTHS = 10.0
+"""Correlation lengths below which a record says little of any parameter."""
+FAR = 0.01
+"""Share of repetitions that are further from their model than the data are from theirs."""
+AT_LIMIT = 1e-3
+HIGHEST_DEGREE = 3
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """How well a family describes the values at a point.
+
+    Attributes
+    ----------
+    marginal
+        The member that fits best.
+    distance : float
+        Largest difference of the distribution functions (Kolmogorov).
+    score : float
+        Log likelihood of as many independent values as the record holds correlation lengths, less
+        the number of parameters; differences below about 2 mean nothing.
+    """
+
+    marginal: Any
+    distance: float
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class FieldFit:
+    """A random field fitted to measured profiles, and how far it may be trusted.
+
+    Attributes
+    ----------
+    field : RandomField
+        To simulate with, without the measurement noise; it has the mean mode.
+    parameters : dict of str to float
+        What was estimated, in SI: ``marginal.*`` and ``spectrum.*`` by the names that study files
+        use, ``mean`` and ``standard_deviation`` of the field, ``efolding_length`` (m) at which the
+        correlation of z falls to 1/e, ``anisotropy``, and ``noise``, the standard deviation of the
+        measurement noise.
+    interval : dict of str to (float, float)
+        Of each of them, from the bootstrap.
+    confidence : float
+        Of the intervals.
+    repetitions : tuple of RandomField
+        The fits to records simulated from `field`: what another measurement might have given.
+    families : dict of str to Goodness
+        Of every family of marginals that was asked for.
+    misfit : dict of str to float
+        Shares of the repetitions that are as far from their own marginal, and spectrum, as the
+        data are from the fitted ones; small where a family does not suit.
+    lengths_held : float
+        Correlation lengths (on a plane, areas) that the records hold together.
+    warnings : tuple of str
+        What stands in the way of trusting it; empty if nothing does.
+    cut_short : bool
+        Whether `time_limit` ended the repetitions early.
+    """
+
+    field: RandomField
+    parameters: Mapping[str, float]
+    interval: Mapping[str, tuple[float, float]]
+    confidence: float
+    repetitions: tuple[RandomField, ...] = dataclasses.field(repr=False)
+    families: Mapping[str, Goodness] = dataclasses.field(repr=False)
+    misfit: Mapping[str, float] = dataclasses.field(repr=False)
+    lengths_held: float = dataclasses.field(repr=False)
+    quantity: str = dataclasses.field(repr=False)
+    _details: Details = dataclasses.field(repr=False)
+    warnings: tuple[str, ...] = ()
+    cut_short: bool = False
+
+    def __str__(self) -> str:
+        unit = UNITS[self.quantity]
+        width = max(len(name) for name in self.parameters)
+        lines = [
+            f"{_title(self.field)} from {self.lengths_held:.3g} correlation lengths,"
+            f" {100 * self.confidence:g} % intervals"
+        ]
+        for name, value in self.parameters.items():
+            low, high = self.interval[name]
+            suffix = unit_of(name, unit)
+            lines.append(
+                f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g} {suffix}".rstrip()
+            )
+        lines.append(
+            f"  as far from its marginal as {100 * self.misfit['marginal']:.3g} % of simulated"
+            f" records, from its spectrum as {100 * self.misfit['spectrum']:.3g} %"
+        )
+        lines += [f"  ! {text}" for text in self.warnings]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def plot(self) -> Figure:
+        """Histogram and quantiles, spectrum with its band, correlation, and residuals.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Of five panels, as a notebook shows it; ``savefig`` writes it.
+        """
+        return draw_fit(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Details:
+    """What the figure needs of a fit."""
+
+    values: Array
+    records: tuple[Record, ...]
+    estimate: Estimate
+    setting: Setting
+    observed: tuple[Observed, ...]
+    repeated: tuple[Estimate, ...]
+
+
+def _title(found: RandomField) -> str:
+    marginal = getattr(found.marginal, "type", "marginal").replace("_", " ")
+    return f"{marginal} marginal, {found.spectrum.type.replace('_', ' ')} spectrum"
+
+
+def unit_of(name: str, unit: str) -> str:
+    """SI unit of a parameter of a field in `unit`; empty for pure numbers."""
+    last = name.rpartition(".")[2]
+    if last in ("correlation_length", "efolding_length"):
+        return "m"
+    stresses = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
+    return "" if last not in stresses or unit == "1" else unit
+
+
+def fit_field(
+    profiles: Any,
+    interface: Interface | None = None,
+    *,
+    marginal: str | Mapping[str, Any] | Sequence[str] = MARGINALS,
+    spectrum: str | Mapping[str, Any] = "power_law",
+    detrend: int = 0,
+    noise: bool | float = True,
+    anisotropy: bool | float = False,
+    gaps: Literal["refuse", "skip"] = "refuse",
+    quantity: str = "strength",
+    bootstrap: int = 200,
+    confidence: float = 0.9,
+    seed: int = 0,
+    workers: int | None = None,
+    time_limit: float | None = None,
+    progress: Show = True,
+) -> FieldFit:
+    """Fit a random field to measured profiles, with an interval of every parameter.
+
+    Parameters
+    ----------
+    profiles : DataArray, array, or list of them
+        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile` returns; units
+        that are stated are converted, points may come in any order, and must be equally spaced.
+        Plain arrays, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx,
+        ny), in SI, have a value at each node of `interface`. Several profiles are of one field.
+    interface : Interface, optional
+        Needed for arrays without coordinates. The fitted field is looked at on it: a warning says
+        if it is too short, or its nodes too coarse, for that field.
+    marginal : str, dict or sequence of str
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal', 'uniform' or
+        any continuous distribution of `scipy.stats`. Of several the best is taken, and `families`
+        in the result compares them. A table keeps parameters: ``{"type": "beta", "low": 0,
+        "high": 2e6}``. The lower bound of those above a bound is 0 if it is not given; it is never
+        estimated. Both bounds of 'beta' are, unless they are given.
+    spectrum : str or dict
+        'power_law', 'squared_exponential' or 'exponential'; a table keeps parameters, such as
+        ``{"type": "power_law", "exponent": 4.0}`` or ``"power_kept": 0.999``.
+    detrend : int
+        Degree of the polynomial trend that is taken off, 0 to 3. The mean stays in any case.
+    noise : bool or float
+        Whether measurement noise, white and normal, is estimated along with the field; or its
+        standard deviation, where it is known (SI).
+    anisotropy : bool or float
+        Of maps: ratio of correlation lengths along y and x. False: 1; True: estimated.
+    gaps : {"refuse", "skip"}
+        Whether missing values (NaN, missing points, values that were filled in) are an error or
+        are left out. Nothing is filled in.
+    quantity : str
+        What it is, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
+    bootstrap : int
+        Repetitions, at least 20.
+    confidence : float
+        Of the intervals.
+    seed : int
+        Of the repetitions, not negative.
+    workers : int, optional
+        Threads; all cores by default. The numbers do not depend on it.
+    time_limit : float, optional
+        Seconds; the intervals then come from the repetitions that are done.
+    progress : bool or callable
+        As in `stiction.monte_carlo`.
+
+    Returns
+    -------
+    FieldFit
+        With `field`, `parameters`, `interval` and `plot()`.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit: unknown units, points that repeat or are not equally spaced,
+        gaps, constant or short records, values outside the bounds of the marginal.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the records hold fewer than ten correlation lengths, the marginal or the spectrum is far
+        from what its family can do, the noise hides the cut-off of the spectrum, a parameter lies
+        at the end of what is looked for, or values are outliers.
+
+    Notes
+    -----
+    The marginal is found by maximum likelihood, of values and noise together. The spectrum comes
+    from a Whittle likelihood whose expectation is exact for the window: taper, gaps, the removal of
+    the trend and aliasing are in it, as is the truncation of the spectrum (Sykulski et al., 2019;
+    Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian field z by
+    Hermite expansion (Grigoriu, 1995). A likelihood's own curvature understates the error; the
+    intervals come from fits to records simulated from the fitted field, reflected about the
+    estimate on the scale on which a parameter's error is about normal (the basic bootstrap, that of
+    a mean studentised; Davison and Hinkley, 1997, section 5.2), so that a bias of the estimate is
+    allowed for.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> truth = st.RandomField(st.Lognormal(mean=1e6, cov=0.2), st.ExponentialSpectrum(1e-3))
+    >>> interface = st.Interface(length=0.1, nodes=1000)
+    >>> fit = st.fit_field(truth.sample(interface, seed=1), interface, marginal="lognormal",
+    ...                    spectrum="exponential", noise=0.0, bootstrap=40)
+    >>> low, high = fit.interval["spectrum.correlation_length"]
+    >>> bool(low < 1e-3 < high)
+    True
+    """
+    families, spectral = _checked(
+        interface, marginal, spectrum, detrend, noise, anisotropy, gaps, quantity, bootstrap,
+        confidence, seed, workers, time_limit,
+    )  # fmt: skip
+    records = records_of(profiles, interface, quantity, gaps == "skip")
+    if spectral.anisotropy != 1.0 and records[0].values.ndim == 1:
+        raise InputError("anisotropy: is of maps; the profiles are lines, leave it out")
+    spacing = max(max(record.spacings) for record in records)
+    spectral = replace(
+        spectral, lengths=(spacing, 2.0 * max(max(record.lengths) for record in records))
+    )
+    windows = make_windows(records, int(detrend))
+    rows = [record.values[record.measured] for record in records]
+    count = usable_cores() if workers is None else int(workers)
+    with Meter("fit_field", int(bootstrap), progress, time_limit=time_limit) as meter:
+        found, setting, compared = _best(families, spectral, rows, windows, int(detrend))
+        repeated = repeat(found, setting, int(bootstrap), int(seed), count, meter)
+        cut_short = meter.over
+    if len(repeated) < 2:
+        raise InputError(
+            f"time_limit: {len(repeated)} of {bootstrap} repetitions were done, too few for an"
+            " interval; allow more time or a simpler marginal"
+        )
+    return _result(
+        found, setting, compared, repeated, records, rows, interface,
+        confidence=float(confidence), quantity=quantity, asked=int(bootstrap), cut_short=cut_short,
+    )  # fmt: skip
+
+
+def _checked(
+    interface: Any, marginal: Any, spectrum: Any, detrend: Any, noise: Any, anisotropy: Any,
+    gaps: Any, quantity: Any, bootstrap: Any, confidence: Any, seed: Any, workers: Any,
+    time_limit: Any,
+) -> tuple[list[Family], SpectrumFamily]:  # fmt: skip
+    """The families to fit, or everything that is wrong with the arguments."""
+    problems = check_time_limit(time_limit)
+
+    def collect(check: Any, *given: Any) -> Any:
+        try:
+            return check(*given)
+        except InputError as error:
+            problems.extend(error.problems)
+            return None
+
+    if interface is not None:
+        collect(check_instance, "interface", interface, Interface)
+    collect(check_choice, "gaps", gaps, ("refuse", "skip"))
+    collect(check_quantity, quantity)
+    if not (is_whole(detrend, 0) and detrend <= HIGHEST_DEGREE):
+        problems.append(f"detrend: must be a degree from 0 to 3, got {describe(detrend)}")
+    if not (isinstance(noise, bool) or (is_finite(noise) and noise >= 0.0)):
+        problems.append(
+            f"noise: must be True, False or a standard deviation >= 0, got {describe(noise)}"
+        )
+    if not (isinstance(anisotropy, bool) or (is_finite(anisotropy) and anisotropy > 0.0)):
+        problems.append(
+            f"anisotropy: must be True, False or a positive ratio, got {describe(anisotropy)}"
+        )
+    if not is_whole(bootstrap, 20):
+        problems.append(f"bootstrap: must be a whole number >= 20, got {describe(bootstrap)}")
+    if not (is_real(confidence) and 0.0 < confidence < 1.0):
+        problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
+    if not is_whole(seed, 0):
+        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
+    if workers is not None and not is_whole(workers, 1):
+        problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
+    several = isinstance(marginal, list | tuple)
+    families = [collect(family_of, one) for one in (marginal if several else [marginal])]
+    if not families:
+        problems.append("marginal: names no family")
+    ratio = None if anisotropy is True else 1.0 if anisotropy is False else anisotropy
+    deviation = None if noise is True else 0.0 if noise is False else noise
+    spectral = collect(spectrum_family, spectrum, ratio, deviation, (0.0, 0.0))
+    if problems:
+        raise InputError(problems)
+    return families, spectral
+
+
+def _best(
+    families: Sequence[Family],
+    spectral: SpectrumFamily,
+    rows: Sequence[Array],
+    windows: Sequence[Any],
+    degree: int,
+) -> tuple[Estimate, Setting, dict[str, Goodness]]:
+    """The family that describes the values best, and what is to be said of each."""
+    compared: dict[str, Goodness] = {}
+    best, chosen, highest = None, None, -math.inf
+    problems: list[str] = []
+    for family in families:
+        setting = Setting(tuple(windows), family, spectral, degree)
+        values = np.concatenate(
+            [detrended(r, w, degree) for r, w in zip(rows, windows, strict=True)]
+        )
+        try:
+            if spectral.noise == 0.0:
+                family.check(values)
+            found = estimate(rows, setting)
+        except InputError as error:
+            problems += error.problems
+            continue
+        independent = lengths_held(found, windows)
+        fitted = mean_log_likelihood(found.marginal, values, found.model.noise)
+        parameters = len(family.parameters(found.marginal))
+        score = fitted * min(independent, values.size) - parameters
+        compared[family.name] = Goodness(found.marginal, found.distance, score)
+        if best is None or score > highest:
+            best, chosen, highest = found, setting, score
+    if best is None or chosen is None:
+        raise InputError(problems)
+    top = max(one.score for one in compared.values())
+    compared = {name: replace(one, score=one.score - top) for name, one in compared.items()}
+    return best, chosen, compared
+
+
+def lengths_held(found: Estimate, windows: Sequence[Any]) -> float:
+    """Correlation lengths, or on a plane areas, that windows hold together."""
+    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
+    total = 0.0
+    for window in windows:
+        sizes = [d / length for d in window.spacings]
+        if len(sizes) == 2:
+            sizes[1] /= ratio
+        total += float(window.measured.sum()) * math.prod(sizes)
+    return total
+
+
+def _result(
+    found: Estimate,
+    setting: Setting,
+    compared: dict[str, Goodness],
+    repeated: Sequence[Repetition],
+    records: Sequence[Record],
+    rows: Sequence[Array],
+    interface: Interface | None,
+    *,
+    confidence: float,
+    quantity: str,
+    asked: int,
+    cut_short: bool,
+) -> FieldFit:
+    parameters = parameters_of(found, setting)
+    interval = {
+        name: interval_of(name, parameters, [one.parameters for one in repeated], confidence)
+        for name in parameters
+    }
+    misfit = {
+        "marginal": float(np.mean([one.estimate.distance >= found.distance for one in repeated])),
+        "spectrum": float(np.mean([one.estimate.roughness >= found.roughness for one in repeated])),
+    }
+    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
+    observed = tuple(observe(rows, setting.windows))
+    held = lengths_held(found, setting.windows)
+    texts = _doubts(found, setting, observed, misfit, held)
+    if len(repeated) < asked:
+        why = "the time was over" if cut_short else "the family could not be fitted to the others"
+        texts.append(f"intervals are from {len(repeated)} of {asked} repetitions: {why}")
+    for text in texts:
+        warn_accuracy(text)
+    if interface is not None:
+        found.field.modes(interface)
+        warn_if_inaccurate(found.field, interface)
+    details = Details(
+        np.concatenate(rows), tuple(records), found, setting, observed,
+        tuple(one.estimate for one in repeated),
+    )  # fmt: skip
+    return FieldFit(
+        field=found.field,
+        parameters=parameters,
+        interval=interval,
+        confidence=confidence,
+        repetitions=tuple(one.estimate.field for one in repeated),
+        families=compared,
+        misfit=misfit,
+        lengths_held=held,
+        quantity=quantity,
+        warnings=tuple(texts),
+        cut_short=cut_short,
+        _details=details,
+    )
+
+
+def _doubts(
+    found: Estimate,
+    setting: Setting,
+    observed: Sequence[Observed],
+    misfit: Mapping[str, float],
+    held: float,
+) -> list[str]:
+    """What stands in the way of trusting a fit."""
+    texts = []
+    length = found.model.spectrum.correlation_length
+    if held < ENOUGH_LENGTHS:
+        texts.append(
+            f"the records hold only {held:.2g} correlation lengths ({length:.3g} m), too few for"
+            " intervals to be trusted; about ten are needed: measure a longer piece, or several"
+        )
+    if misfit["marginal"] < FAR:
+        texts.append(
+            f"the values are far from any {setting.marginal.name} marginal: the distribution"
+            f" functions differ by {found.distance:.2g}, more than in 99 % of simulated records;"
+            " compare families (marginal=['beta', 'lognormal', 'weibull', ...]) or look at plot()"
+        )
+    if misfit["spectrum"] < FAR:
+        texts.append(
+            f"the periodogram is far from any {setting.spectrum.name} spectrum, more than in 99 %"
+            " of simulated records; take another spectrum or a higher detrend, or look at plot()"
+        )
+    if noise_hides_cutoff(found, observed):
+        texts.append(
+            f"the noise ({found.model.noise:.3g}) hides the cut-off of the spectrum: where its"
+            " density has fallen to a quarter it lies below the noise; the correlation length"
+            " rests on the family of the spectrum, not on the data"
+        )
+    family, vector = setting.spectrum, setting.spectrum.vector(found.model)
+    for name, at, (low, high) in zip(family.free, vector, family.limits, strict=True):
+        if name in ("variance", "noise_share"):
+            continue
+        if min(at - low, high - at) < AT_LIMIT * (high - low):
+            texts.append(
+                f"{name} lies at the end of the range that was searched: the data do not tell it;"
+                f" give it (spectrum={{'type': {family.name!r}, {name!r}: ...}}) or another"
+                " spectrum"
+            )
+    return texts
+
+
+def noise_hides_cutoff(found: Estimate, observed: Sequence[Observed]) -> bool:
+    """Whether the field's power lies below that of the noise where it has fallen to a quarter."""
+    model = found.model
+    if model.noise_share <= 0.0:
+        return False
+    for one in observed:
+        quiet = replace(model, noise_share=0.0, variance=model.variance * (1.0 - model.noise_share))
+        power = quiet.expectation(one)
+        visible = (one.weights > 0.0) & (power >= 0.25 * power[one.weights > 0.0].max())
+        # The noise is white: each ordinate expects its variance, the taper being normalised.
+        if power[visible].min() >= model.noise**2:
+            return False
+    return True

@@ -1,0 +1,287 @@
+"""Parameters of a spectrum by Fisher scoring on the Whittle likelihood."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stiction._checks import is_finite
+from stiction._model import describe
+from stiction._typing import Array
+from stiction.errors import InputError, unknown_name
+from stiction.inference.whittle import Model, Observed, loss
+from stiction.random.spectra import (
+    ExponentialSpectrum,
+    PowerLawSpectrum,
+    SquaredExponentialSpectrum,
+)
+
+CLASSES: dict[str, Any] = {
+    "power_law": PowerLawSpectrum,
+    "squared_exponential": SquaredExponentialSpectrum,
+    "exponential": ExponentialSpectrum,
+}
+POWER_KEPT = {"power_law": 0.9997, "squared_exponential": 0.9997, "exponential": 0.99}
+EXPONENTS = (0.65, 16.0)
+"""Beyond the upper one a power law looks like a squared exponential."""
+NOISE = (1e-6, 0.95)
+VARIANCES = (1e-200, 1e200)
+ANISOTROPIES = (0.05, 20.0)
+STEPS = 40
+DIFFERENCE = 1e-4
+SETTLED = 1e-3
+"""Gain of log likelihood below which scoring ends; a standard error is worth a half."""
+LONGEST = 1.5
+"""Step, on the scale on which parameters are searched for."""
+
+
+@dataclass(frozen=True)
+class SpectrumFamily:
+    """A family of spectra, what of it is fixed, and what else is estimated with it.
+
+    Attributes
+    ----------
+    name : str
+    fixed : tuple of (str, float)
+    anisotropy : float or None
+        None: estimated.
+    noise : float or None
+        Standard deviation of the measurement noise; None: estimated.
+    lengths : (float, float)
+        Between which correlation lengths are looked for, m.
+    """
+
+    name: str
+    fixed: tuple[tuple[str, float], ...]
+    anisotropy: float | None
+    noise: float | None
+    lengths: tuple[float, float]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """What is estimated, in the order of the vector of parameters."""
+        names = ["variance"]
+        if "correlation_length" not in dict(self.fixed):
+            names.append("correlation_length")
+        if self.name == "power_law" and "exponent" not in dict(self.fixed):
+            names.append("exponent")
+        if self.anisotropy is None:
+            names.append("anisotropy")
+        if self.noise is None:
+            names.append("noise_share")
+        return tuple(names)
+
+    @property
+    def limits(self) -> Array:
+        """Of each free parameter as it is searched for, (parameters, 2)."""
+        ranges = {
+            "variance": VARIANCES,
+            "correlation_length": self.lengths,
+            "exponent": EXPONENTS,
+            "anisotropy": ANISOTROPIES,
+            "noise_share": NOISE,
+        }
+        return np.array([[_forth(n, end) for end in ranges[n]] for n in self.free])
+
+    def model(self, vector: Array, shares: Array) -> Model:
+        """The model of a vector of parameters."""
+        found = {n: _back(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
+        variance = found.pop("variance")
+        anisotropy = found.pop("anisotropy", self.anisotropy)
+        known = min((self.noise or 0.0) ** 2 / variance, NOISE[1])
+        noise = found.pop("noise_share", known)
+        options = dict(self.fixed) | found
+        if "truncation" not in options:
+            options.setdefault("power_kept", POWER_KEPT[self.name])
+        return Model(
+            spectrum=CLASSES[self.name](**options),
+            anisotropy=float(anisotropy or 1.0),
+            noise_share=noise,
+            variance=variance,
+            shares=shares,
+        )
+
+    def vector(self, model: Model) -> Array:
+        """The parameters of a model."""
+        known = {
+            "variance": model.variance,
+            "correlation_length": model.spectrum.correlation_length,
+            "exponent": getattr(model.spectrum, "exponent", None),
+            "anisotropy": model.anisotropy,
+            "noise_share": model.noise_share,
+        }
+        return np.array([_forth(name, float(known[name])) for name in self.free])
+
+
+def _forth(name: str, value: float) -> float:
+    """To the scale on which a parameter is searched for and its error is about normal."""
+    if name == "exponent":
+        return math.log(value - 0.5)
+    if name == "noise_share":
+        return math.log(value / (1.0 - value))
+    return math.log(value)
+
+
+def _back(name: str, value: float) -> float:
+    if name == "exponent":
+        return 0.5 + math.exp(value)
+    if name == "noise_share":
+        return 1.0 / (1.0 + math.exp(-value))
+    return math.exp(value)
+
+
+def spectrum_family(
+    given: Any, anisotropy: float | None, noise: float | None, lengths: tuple[float, float]
+) -> SpectrumFamily:
+    """A family from its name, or a table with some of its parameters."""
+    if isinstance(given, str):
+        given = {"type": given}
+    if not isinstance(given, Mapping):
+        raise InputError(
+            "spectrum: must be 'power_law', 'squared_exponential' or 'exponential', or a table with"
+            " parameters to keep, such as {'type': 'power_law', 'exponent': 4.0}, got"
+            f" {describe(given)}"
+        )
+    name = str(given.get("type"))
+    if name not in CLASSES:
+        raise InputError(unknown_name("spectrum", name, CLASSES))
+    fixed = {str(key): value for key, value in given.items() if key != "type"}
+    known = [f.name for f in dataclasses.fields(CLASSES[name]) if f.name != "type"]
+    problems = [unknown_name(f"spectrum.{name}", key, known) for key in fixed if key not in known]
+    problems += [
+        f"spectrum.{key}: must be a finite number, got {describe(value)}"
+        for key, value in fixed.items()
+        if not is_finite(value)
+    ]
+    if not problems:
+        try:
+            CLASSES[name](**({"correlation_length": 1.0} | fixed))
+        except InputError as error:
+            problems = [f"spectrum: {text}" for text in error.problems]
+    if problems:
+        raise InputError(problems)
+    return SpectrumFamily(
+        name, tuple((k, float(v)) for k, v in fixed.items()), anisotropy, noise, lengths
+    )
+
+
+def coarse(family: SpectrumFamily, shares: Array, observed: Sequence[Observed]) -> Array:
+    """The best of a grid of parameters, to begin with."""
+    axes: dict[str, Sequence[float]] = {
+        "variance": [1.0],
+        "correlation_length": [float(v) for v in np.geomspace(*family.lengths, 17)[:-2]],
+        "exponent": [1.0, 2.0, 4.0],
+        "anisotropy": [0.5, 1.0, 2.0],
+        "noise_share": [1e-4, 0.01, 0.1, 0.4],
+    }
+    power = sum(float(np.sum(one.weights * one.average)) for one in observed)
+    best, least = np.zeros(0), math.inf
+    for entry in itertools.product(*[axes[name] for name in family.free]):
+        at = np.array([_forth(n, v) for n, v in zip(family.free, entry, strict=True)])
+        expected = _expected(family.model(at, shares), observed)
+        scale = power / sum(
+            float(np.sum(one.weights * e)) for one, e in zip(observed, expected, strict=True)
+        )
+        value = loss([scale * e for e in expected], observed)
+        if value < least:
+            best, least = at, value
+            best[0] = math.log(scale)
+    return best
+
+
+def _expected(model: Model, observed: Sequence[Observed]) -> list[Array]:
+    return [model.expectation(one) for one in observed]
+
+
+def fit_spectrum(
+    family: SpectrumFamily, shares: Array, observed: Sequence[Observed], start: Array
+) -> Array:
+    """The vector of parameters of the greatest likelihood, from a start.
+
+    Fisher scoring with the damping of Levenberg and Marquardt: with d = d log E/d theta the score
+    is sum w d (I/E - 1) and the information sum w d d^T.
+    """
+
+    def signals(at: Array) -> list[Array]:
+        model = family.model(at, shares)
+        return [model.signal(one) for one in observed]
+
+    def loss_of(at: Array, signal: Sequence[Array]) -> float:
+        model = family.model(at, shares)
+        mixed = [model.with_noise(s, one) for s, one in zip(signal, observed, strict=True)]
+        return loss(mixed, observed)
+
+    limits = family.limits
+    at = np.clip(start, limits[:, 0], limits[:, 1])
+    signal = signals(at)
+    value = loss_of(at, signal)
+    damping = 1e-3
+    for _ in range(STEPS):
+        score, information = np.zeros(at.size), np.zeros((at.size, at.size))
+        slopes = _slopes(family, at, shares, observed, signal)
+        for one, (expected, slope) in zip(observed, slopes, strict=True):
+            weight = len(one.periodograms) * one.weights.ravel()
+            d = slope / (expected + one.floor).ravel()
+            score += d @ (weight * ((one.average - expected) / (expected + one.floor)).ravel())
+            information += (d * weight) @ d.T
+        # What pushes against its limit is held there, or the others could not move.
+        held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
+        free = np.flatnonzero(~held)
+        information, score = information[np.ix_(free, free)], score[free]
+        diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information) + 1e-300)
+        while damping < 1e6:
+            step = np.zeros(at.size)
+            step[free] = np.linalg.solve(information + damping * diagonal, score)
+            step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
+            new = np.clip(at + step, limits[:, 0], limits[:, 1])
+            new_signal = signals(new)
+            new_value = loss_of(new, new_signal)
+            if new_value <= value:
+                break
+            damping *= 10.0
+        else:
+            break
+        gain = value - new_value
+        at, signal, value = new, new_signal, new_value
+        damping = max(0.1 * damping, 1e-9)
+        if gain < SETTLED:
+            break
+    return at
+
+
+def _slopes(
+    family: SpectrumFamily,
+    at: Array,
+    shares: Array,
+    observed: Sequence[Observed],
+    signal: Sequence[Array],
+) -> list[tuple[Array, Array]]:
+    """Expectations, and their derivatives by the parameters, (parameters, ordinates)."""
+    model, limits = family.model(at, shares), family.limits
+    variance, share = model.variance, model.noise_share
+    columns: list[list[Array]] = [[] for _ in observed]
+    for i, name in enumerate(family.free):
+        aside = at.copy()
+        aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
+        moved = family.model(aside, shares)
+        for column, one, s in zip(columns, observed, signal, strict=True):
+            if name == "variance" and family.noise is None:
+                slope = model.with_noise(s, one)
+            elif name == "variance":  # the noise stays what it is
+                slope = variance * s
+            elif name == "noise_share":
+                slope = variance * share * (1.0 - share) * (one.white - s)
+            else:
+                change = (moved.signal(one) - s) / (aside[i] - at[i])
+                slope = variance * (1.0 - share) * change
+            column.append(slope.ravel())
+    return [
+        (model.with_noise(s, one), np.array(column))
+        for column, one, s in zip(columns, observed, signal, strict=True)
+    ]

@@ -1,0 +1,84 @@
+"""Release rates of cracks: closed forms, and lengths that follow from them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stiction as st
+
+PROBLEM = st.paper.problem(nodes=1024)
+LENGTH = PROBLEM.interface.length
+
+
+def test_uniform_drop_is_koiters_row_of_cracks():
+    """G = L drop^2 tan(pi a/L)/(2 G*), a the half-length, for any length (Koiter, 1959)."""
+    whole = np.array([0.001, 0.02, 0.05, 0.09])
+    found = st.energy_release_rate(PROBLEM, 0.7e6, whole, centre=0.013)
+    exact = LENGTH * 0.7e6**2 * np.tan(0.5 * np.pi * whole / LENGTH)
+    exact /= 2.0 * PROBLEM.effective_modulus
+    # The drop is interpolated between nodes, to round-off where it is uniform.
+    np.testing.assert_allclose(found[:, 0], exact, rtol=1e-9)
+    np.testing.assert_allclose(found[:, 1], exact, rtol=1e-9)
+
+
+def test_a_short_crack_under_a_sloping_drop():
+    """drop = c + s x: K = (pi a)^(1/2) (c +- s a/2) in an infinite body; here a/L = 0.005."""
+    x = PROBLEM.interface.x - 0.5 * LENGTH
+    initial = 1e6 * x / LENGTH
+    problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
+    a = 0.005 * LENGTH
+    found = st.energy_release_rate(problem, 0.2e6, 2.0 * a, centre=0.5 * LENGTH)[0]
+    drop = np.array([0.2e6 - 0.5 * 1e6 * a / LENGTH, 0.2e6 + 0.5 * 1e6 * a / LENGTH])
+    # Neighbouring periods add (pi a/L)^2/3, 1e-4.
+    exact = np.pi * a * drop**2 / (2.0 * PROBLEM.effective_modulus)
+    np.testing.assert_allclose(found, exact, rtol=3e-4)
+
+
+def test_lengths_of_start_and_arrest():
+    problem = dataclasses.replace(
+        PROBLEM,
+        friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
+        load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+    )
+    options = {"centre": 0.5 * LENGTH}
+    start = st.griffith_length(problem, 0.35e6, 0.3, **options)
+    stop = st.griffith_length(problem, 0.35e6, 0.3, arrest=True, **options)
+    assert 0.0 < start < stop < LENGTH
+    rate = st.energy_release_rate(problem, 0.35e6, [start, stop], **options).min(axis=1)
+    np.testing.assert_allclose(rate, 0.3, rtol=2e-3)  # between 2,000 lengths
+    assert st.griffith_length(problem, 0.1e6, 0.3, **options) == np.inf
+    uniform = dataclasses.replace(problem, load=st.Load())
+    assert st.griffith_length(uniform, 0.9e6, 0.3, arrest=True, **options) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("call", "key"),
+    [
+        (lambda: st.energy_release_rate(PROBLEM, 1e6, 0.2), "lengths"),
+        (lambda: st.energy_release_rate(PROBLEM, np.nan, 0.01), "load"),
+        (lambda: st.griffith_length(PROBLEM, 1e6, -1.0), "fracture_energy"),
+    ],
+)
+def test_mistakes(call, key):
+    with pytest.raises(st.InputError, match=key):
+        call()
+
+
+def test_arrested_patches_are_as_long_as_griffith_says():
+    """Events by equilibrium under an edge load, against G = <Gamma>: to a third in the median."""
+    problem = dataclasses.replace(
+        st.paper.problem(nodes=512),
+        friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
+        load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+    )
+    tau_p = st.paper.strength(problem, 0.5).sample(problem.interface, samples=6, seed=0)
+    found = st.onset(problem, tau_p, method=st.Equilibrium(events=6), progress=False)
+    energy = float(np.mean((tau_p - 0.4e6) ** 2)) / 1e12
+    stress, length = found["event_stress"].values, found["event_length"].values
+    ratio = [
+        length[i] / st.griffith_length(problem, stress[i], energy, centre=0.05, arrest=True)
+        for i in zip(*np.nonzero(np.isfinite(length)), strict=True)
+    ]
+    assert len(ratio) > 12
+    assert 0.67 < np.median(ratio) < 1.5

@@ -1,0 +1,255 @@
+"""Inference: affine scaling, densities and the posterior against what they stand for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.stats
+
+import stiction as st
+from stiction._progress import SILENT
+from stiction.inference.affine import find_affine
+from stiction.inference.density import log_likelihoods, tabulate
+from stiction.inference.grid import on_grid
+from stiction.inference.likelihood import make_likelihood, make_model
+from stiction.inference.onset_table import simulate
+from stiction.inference.prior import make_prior
+
+pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+
+PROBLEM = st.paper.problem(nodes=256)
+H_N = PROBLEM.nucleation_length
+STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
+LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
+LENGTH = {"low": 0.25 * H_N, "high": 4.0 * H_N, "spacing": "log"}
+THREE = {
+    "correlation_length": LENGTH,
+    "marginal.low": (0.4e6, 0.9e6),
+    "marginal.high": (1.2e6, 2.2e6),
+}
+
+
+def with_marginal(marginal):
+    return dataclasses.replace(STRENGTH, marginal=marginal)
+
+
+def with_friction(**options):
+    return dataclasses.replace(PROBLEM, friction=st.SlipWeakening(**options))
+
+
+def model_of(prior, method=LOCAL, error=0.0, samples=400, **options):
+    return make_model(
+        prior,
+        method=method,
+        lengths=options.pop("lengths", [None]),
+        error=error,
+        samples=samples,
+        seed=0,
+        variable="critical_stress",
+        meter=SILENT,
+        **options,
+    )
+
+
+def onsets(prior, theta, method, samples=60):
+    found, _ = simulate(
+        prior, np.atleast_2d(theta), method=method, length=None, samples=samples, first=0, seed=3,
+        variable="critical_stress", meter=SILENT,
+    )  # fmt: skip
+    return found
+
+
+AFFINE = {
+    "bounds": (PROBLEM, STRENGTH, LOCAL, {"marginal.low": (0.4e6, 0.9e6)}, 1),
+    "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
+    "loc and scale": (
+        PROBLEM,
+        with_marginal(scipy.stats.lognorm(0.3, loc=0.3e6, scale=0.5e6)),
+        LOCAL,
+        {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)},
+        2,
+    ),
+    "residual strength, local": (
+        with_friction(weakening_rate=0.5e12, residual_strength=0.3e6),
+        STRENGTH,
+        LOCAL,
+        THREE,
+        2,
+    ),
+    "uniform initial stress, local": (
+        dataclasses.replace(PROBLEM, load=st.Load(initial_stress=0.1e6)),
+        STRENGTH,
+        LOCAL,
+        THREE,
+        2,
+    ),
+    "stretch by equilibrium": (
+        with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
+        with_marginal(scipy.stats.weibull_min(4.0, scale=1e6)),
+        EXACT,
+        {"marginal.scale": (0.5e6, 2e6)},
+        1,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", AFFINE)
+def test_affine_parameters_scale_every_onset(name):
+    problem, random, method, prior, count = AFFINE[name]
+    prior = make_prior(problem, random, prior)
+    affine = find_affine(prior, method)
+    assert len(affine.keys) == count
+    for u in (0.15, 0.85):
+        theta = prior.theta(np.full((1, prior.dimension), u))
+        base = theta.copy()
+        base[0, list(affine.keys)] = affine.reference[list(affine.keys)]
+        shift, stretch = affine.of(theta)
+        expected = shift + stretch * onsets(prior, base, method)[0]
+        # Round-off of the strength, 1e-9 by the quantile table, and of equilibrium's steps.
+        np.testing.assert_allclose(onsets(prior, theta, method)[0], expected, rtol=3e-9)
+
+
+NOT_AFFINE = {
+    "critical slip": (with_friction(critical_slip=2e-6), STRENGTH, EXACT, THREE),
+    "fracture energy": (with_friction(fracture_energy=1.0), STRENGTH, EXACT, THREE),
+    "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, {"marginal.low": (0.4e6, 0.9e6)}),
+    "residual strength by equilibrium": (
+        with_friction(weakening_rate=0.5e12, residual_strength=0.3e6),
+        with_marginal(scipy.stats.weibull_min(4.0, scale=1e6)),
+        EXACT,
+        {"marginal.scale": (0.8e6, 2e6)},
+    ),
+    "load profile": (
+        dataclasses.replace(
+            PROBLEM, load=st.Load(profile=1.0 + 0.3 * np.cos(2.0 * np.pi * np.arange(256) / 256))
+        ),
+        STRENGTH,
+        LOCAL,
+        {"marginal.low": (0.4e6, 0.9e6)},
+    ),
+    "shape": (PROBLEM, STRENGTH, LOCAL, {"marginal.alpha": (1.0, 3.0)}),
+    "rounded weights": (PROBLEM, STRENGTH, st.LocalCriterion(weights="rounded"), THREE),
+}
+
+
+@pytest.mark.parametrize("name", NOT_AFFINE)
+def test_where_scaling_does_not_hold_it_is_not_used(name):
+    problem, random, method, prior = NOT_AFFINE[name]
+    affine = find_affine(make_prior(problem, random, prior), method)
+    assert affine.keys == ()
+    assert affine.reason
+
+
+def test_a_load_profile_really_breaks_the_scaling():
+    """The test above would be met by never scaling: here a shift changes onsets otherwise."""
+    prior = make_prior(*NOT_AFFINE["load profile"][:2], {"marginal.low": (0.4e6, 0.6e6)})
+    low, high = onsets(prior, [[0.4e6], [0.6e6]], LOCAL)
+    stretch = (1.66e6 - 0.6e6) / (1.66e6 - 0.4e6)
+    scaled = 0.6e6 + stretch * (low - 0.4e6)
+    assert np.abs(high / scaled - 1.0).max() > 0.01
+
+
+def log_densities_at(samples, points, error=0.0, bound=-np.inf):
+    found = tabulate(samples[None, :], np.array([bound]))
+    out = np.empty((1, points.size))
+    one = np.ones(1)
+    log_likelihoods(
+        np.zeros((1, 1), dtype=np.int64), one[:, None], 0.0 * one, one, error, found, points, out
+    )
+    return out[0]
+
+
+@pytest.mark.parametrize("error", [0.0, 0.1, 2.0])
+def test_density_of_a_normal_sample(error):
+    quantiles = scipy.stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
+    points = np.linspace(-8.0, 8.0, 1601)
+    found = np.exp(log_densities_at(3.0 + quantiles, 3.0 + points, error))
+    exact = scipy.stats.norm.pdf(points, scale=np.hypot(1.0, error))
+    # The kernel keeps mean and variance; groups and the grid's interpolation cost 0.5 % of it.
+    assert np.abs(found - exact).max() < 0.005 * exact.max()
+    assert np.trapezoid(found, points) == pytest.approx(1.0, abs=2e-3)
+
+
+def test_density_far_out_falls_and_stays_finite():
+    sample = np.random.default_rng(0).gamma(4.0, size=1000)
+    found = log_densities_at(sample, np.array([15.0, 50.0, 100.0]))
+    assert np.isfinite(found).all()
+    assert found[2] < found[1] < found[0] < -5.0
+
+
+# The rule for errors of the load cell wants a density that is smooth within them.
+@pytest.mark.parametrize(
+    ("shape", "error", "most"),
+    [(1.5, 0.0, 0.03), (4.0, 0.0, 0.01), (4.0, 0.6, 0.01), (1.5, 3.0, 0.01)],
+)
+def test_density_above_a_bound(shape, error, most):
+    """Gamma distributions, one of which begins steeply at its bound, with a load cell's error."""
+    family = scipy.stats.gamma(shape, loc=10.0)
+    sample = family.ppf((np.arange(4000) + 0.5) / 4000)
+    points = 10.0 + np.linspace(0.02, 12.0, 400)
+    found = np.exp(log_densities_at(sample, points, error, bound=10.0))
+    exact = family.pdf(points)
+    if error:
+        fine = 10.0 + (np.arange(40_000) + 0.5) * 5e-4  # to 20 above the bound
+        kernel = scipy.stats.norm.pdf(points[:, None], fine[None, :], error)
+        exact = 5e-4 * kernel @ family.pdf(fine)
+    # The logarithm is not normal: a kernel of 0.2 in it rounds the steep flank a little.
+    assert np.abs(found - exact).max() < most * exact.max()
+    nothing = log_densities_at(sample, np.array([9.99]), 0.0, bound=10.0)
+    assert nothing[0] == -np.inf
+
+
+def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
+    """Interpolated and scaled, against simulated at the very point, with the same draws."""
+    prior = make_prior(PROBLEM, STRENGTH, THREE)
+    model = model_of(prior, samples=2000)
+    u = np.array([[0.31, 0.45, 0.4], [0.72, 0.6, 0.3]])
+    peaks = 1e6 * np.linspace(0.66, 0.78, 7)
+    for place in u:
+        theta = prior.theta(place[None, :])
+        direct, _ = simulate(
+            prior, theta, method=LOCAL, length=None, samples=2000, first=0, seed=0,
+            variable="critical_stress", meter=SILENT,
+        )  # fmt: skip
+        exact = log_densities_at(direct[0], peaks, bound=theta[0, 1])
+        found = model.log_densities(0, theta, peaks)[0]
+        likely = exact > exact.max() - 3.0
+        assert likely.sum() >= 2
+        # Linear between nodes; where a test is likely that costs a hundredth of its density.
+        np.testing.assert_allclose(found[likely], exact[likely], atol=0.03)
+
+
+def test_grid_against_a_sum_by_hand():
+    """One shift, likelihood known on a fine grid: evidence, information and quantiles."""
+    prior = make_prior(PROBLEM, STRENGTH, {"marginal.low": (0.5e6, 0.8e6)})
+    model = model_of(prior, error=2e4)
+    rng = np.random.default_rng(1)
+    peaks = onsets(prior, [[0.66e6]], LOCAL, 12)[0] + 2e4 * rng.standard_normal(12)
+    likelihood = make_likelihood(model, [peaks], [None])
+    u = (np.arange(100_000) + 0.5) / 100_000
+    values = likelihood(u[:, None])
+    density = np.exp(values - values.max())
+    evidence = values.max() + np.log(density.mean())
+    density /= density.mean()
+    held = density > 0.0
+    information = np.mean(density[held] * np.log(density[held]))
+    grid = on_grid(likelihood, SILENT)
+    # The midpoint rule on 512 cells of a smooth function within the zoomed box.
+    assert grid.log_evidence == pytest.approx(evidence, abs=1e-3)
+    assert grid.information(0) == pytest.approx(information, abs=1e-3)
+    assert grid.gain == pytest.approx(information, abs=1e-3)
+    draws = grid.draws(20_000, 0)[:, 0]
+    exact = np.interp([0.05, 0.5, 0.95], np.cumsum(density) / density.sum(), u)
+    assert np.quantile(draws, [0.05, 0.5, 0.95]) == pytest.approx(exact, abs=3e-3)
+
+
+def test_draws_of_the_prior_and_back():
+    prior = make_prior(
+        PROBLEM,
+        STRENGTH,
+        {"correlation_length": LENGTH, "marginal.low": scipy.stats.norm(0.6e6, 0.02e6)},
+    )
+    u = np.random.default_rng(0).random((50, 2))
+    np.testing.assert_allclose(prior.u(prior.theta(u)), u, atol=1e-12)
+    outside = prior.theta(u[:1]) * np.array([100.0, 1.0])
+    assert not (0.0 <= prior.u(outside)[0, 0] <= 1.0)

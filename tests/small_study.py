@@ -1,0 +1,37 @@
+"""The study that tests change to what they need: the paper's strength on few nodes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def small_study(
+    nodes: Any = 128,
+    weakening_rate: float = 0.25e12,
+    correlation_length: float = 4e-3,
+    **tables: Any,
+) -> dict[str, Any]:
+    """A study in plain form; `tables` replace or add those of this name."""
+    plain = {
+        "problem": {
+            "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
+            "interface": {"length": 0.1, "nodes": nodes},
+            "friction": {"weakening_rate": weakening_rate},
+        },
+        "random": {
+            "strength": {
+                "marginal": {
+                    "type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6,
+                },
+                "spectrum": {"type": "power_law", "correlation_length": correlation_length},
+            }
+        },
+        "method": {"type": "local_criterion"},
+        "ensemble": {"samples": 30, "seed": 3},
+    }  # fmt: skip
+    return plain | tables
+
+
+def lengths(*values: float) -> list[dict[str, Any]]:
+    """A sweep of the strength's correlation length, m."""
+    return [{"random.strength.spectrum.correlation_length": list(values)}]

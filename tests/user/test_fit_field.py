@@ -1,0 +1,207 @@
+"""`st.fit_field` as a laboratory uses it: units, gaps, order, bad records, the command."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import stiction as st
+from stiction.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+FIELD = st.RandomField(
+    st.Lognormal(mean=1e6, cov=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
+)
+COUNT, SPACING = 400, 2e-4
+PIECE = st.Interface(length=COUNT * SPACING, nodes=COUNT)
+VALUES = FIELD.sample(st.Interface(length=3 * PIECE.length, nodes=3 * COUNT), seed=5)[0, :COUNT]
+QUICK = {
+    "marginal": "lognormal", "spectrum": "exponential", "noise": False, "bootstrap": 20,
+    "progress": False,
+}  # fmt: skip
+
+
+def labelled(values=VALUES, x=PIECE.x, unit="Pa", x_unit="m"):
+    coords = {"x": ("x", x, {"units": x_unit})}
+    return xr.DataArray(values, dims="x", coords=coords, attrs={"units": unit})
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return st.fit_field(VALUES, PIECE, **QUICK)
+
+
+def test_what_it_finds_is_what_was_put_in(plain):
+    assert plain.field.mean == pytest.approx(1e6, rel=0.15)
+    assert plain.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.6)
+    assert plain.parameters.keys() == plain.interval.keys()
+    for name, (low, high) in plain.interval.items():
+        assert low < high, name
+    assert "marginal.cov" in repr(plain)
+    assert len(plain.repetitions) == 20
+    assert plain.field.sample(PIECE, seed=1).shape == (1, COUNT)
+
+
+def test_units_that_are_stated_are_converted(plain):
+    other = st.fit_field(labelled(VALUES * 1e-6, PIECE.x * 1e3, "MPa", "mm"), **QUICK)
+    for name, value in plain.parameters.items():
+        assert other.parameters[name] == pytest.approx(value, rel=1e-6), name
+    with pytest.raises(st.InputError, match="unknown unit 'furlong'"):
+        st.fit_field(labelled(x_unit="furlong"), **QUICK)
+    with pytest.raises(st.InputError, match="no unit of stress"):
+        st.fit_field(labelled(unit="um"), **QUICK)
+
+
+def test_coordinates_decide_and_not_the_order(plain):
+    order = np.random.default_rng(0).permutation(COUNT)
+    other = st.fit_field(labelled(VALUES[order], PIECE.x[order] + 0.3), **QUICK)
+    assert other.parameters == pytest.approx(plain.parameters, rel=1e-6)
+
+
+def test_gaps_are_named_and_skipped_on_request(plain):
+    values = VALUES.copy()
+    values[100:110] = np.nan
+    with pytest.raises(
+        st.InputError, match=r"no values \(NaN\) at x = 0.02 to 0.0218 m .10 of 400"
+    ):
+        st.fit_field(labelled(values), **QUICK)
+    skipped = st.fit_field(labelled(values), gaps="skip", **QUICK)
+    missing = np.delete(np.arange(COUNT), np.arange(100, 110))
+    left_out = st.fit_field(labelled(VALUES[missing], PIECE.x[missing]), gaps="skip", **QUICK)
+    assert skipped.parameters == left_out.parameters
+    length = "spectrum.correlation_length"
+    assert skipped.parameters[length] == pytest.approx(plain.parameters[length], rel=0.15)
+    with pytest.warns(st.AccuracyWarning, match="filled"):  # what was filled in is no measurement
+        filled = st.read_profile(labelled(values), interface=PIECE, gaps="fill")
+    with pytest.raises(st.InputError, match="no values"):
+        st.fit_field(filled, **QUICK)
+
+
+def test_several_records_are_of_one_field(plain):
+    many = st.fit_field([labelled(), labelled(VALUES[::-1])], **QUICK)
+    assert many.lengths_held == pytest.approx(2.0 * plain.lengths_held, rel=0.2)
+
+
+def test_maps_are_fitted_too():
+    truth = st.RandomField(
+        st.Weibull(mean=2e6, cov=0.3), st.SquaredExponentialSpectrum(1e-3), mean_mode=True
+    )
+    plane = st.Interface(length=(16e-3, 16e-3), nodes=(64, 64))
+    values = truth.sample(plane, seed=1)[0, :48, :40]
+    pressure = xr.DataArray(
+        values * 1e-6,
+        dims=("x", "y"),
+        coords={"x": plane.coordinates["x"][:48], "y": plane.coordinates["y"][:40]},
+        attrs={"units": "MPa"},
+    )
+    options = {"marginal": "weibull", "spectrum": "squared_exponential", "bootstrap": 20}
+    fit = st.fit_field(
+        pressure.transpose("y", "x"), quantity="normal_pressure", progress=False, **options
+    )
+    # 120 correlation areas.
+    assert fit.field.mean == pytest.approx(2e6, rel=0.15)
+    assert fit.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.15)
+    assert fit.plot().axes
+
+
+@pytest.mark.parametrize(
+    ("profiles", "text"),
+    [
+        (VALUES, "does not say how far its points are apart"),
+        (labelled(x=np.repeat(PIECE.x[::2], 2)), "x repeats"),
+        (labelled(x=PIECE.x**1.2), "not equally spaced"),
+        (labelled(VALUES[:40], PIECE.x[:40]), "40 measured points, too short"),
+        (labelled(np.full(COUNT, 1e6)), "is constant, 1e\\+06 everywhere"),
+        (labelled(np.where(np.arange(COUNT) == 3, np.inf, VALUES)), "must be finite; entry 3"),
+        ("profile.csv", "st.read_profile"),
+        ([], "none were given"),
+        (labelled(-VALUES), "400 of 400 values .* do not lie between the bounds"),
+    ],
+)
+def test_records_that_cannot_be_fitted_are_refused(profiles, text):
+    with pytest.raises(st.InputError, match=text):
+        st.fit_field(profiles, **QUICK)
+
+
+def test_every_wrong_option_is_named_at_once():
+    with pytest.raises(st.InputError) as raised:
+        st.fit_field(
+            VALUES, PIECE, marginal="lognormul", spectrum={"type": "power_law", "exponnt": 2.0},
+            detrend=7, noise=-1.0, gaps="fill", bootstrap=3, confidence=90, seed=-1,
+        )  # fmt: skip
+    text = str(raised.value)
+    for part in (
+        "did you mean 'lognormal'", "did you mean 'exponent'", "detrend", "noise", "gaps",
+        "bootstrap", "confidence", "seed",
+    ):  # fmt: skip
+        assert part in text
+    with pytest.raises(st.InputError, match="anisotropy: is of maps"):
+        st.fit_field(VALUES, PIECE, **QUICK, anisotropy=True)
+
+
+def test_a_record_of_few_lengths_is_warned_of():
+    with pytest.warns(st.AccuracyWarning, match="correlation lengths .* too few"):
+        found = st.fit_field(labelled(VALUES[:64], PIECE.x[:64] / 4.0), **QUICK | {
+            "spectrum": {"type": "exponential", "correlation_length": 1e-3}})  # fmt: skip
+    assert "too few" in found.warnings[0]
+
+
+def test_a_family_that_does_not_suit_is_warned_of():
+    two_sided = np.where(np.median(VALUES) < VALUES, VALUES + 2e6, VALUES)
+    with pytest.warns(st.AccuracyWarning, match="far from any lognormal marginal"):
+        st.fit_field(labelled(two_sided), **QUICK)
+
+
+def test_noise_that_hides_the_spectrum_is_warned_of():
+    rng = np.random.default_rng(1)
+    noisy = 1e7 + VALUES + 3e6 * rng.standard_normal(COUNT)
+    with pytest.warns(st.AccuracyWarning, match="hides the cut-off"):
+        st.fit_field(labelled(noisy), **QUICK | {"noise": 3e6})
+
+
+def test_outliers_are_warned_of():
+    values = VALUES.copy()
+    values[7] = 2e7
+    with pytest.warns(st.AccuracyWarning, match=r"1 of 400 values are outliers.*x = 0.0014 m"):
+        st.fit_field(labelled(values), **QUICK)
+
+
+def test_onset_leaves_out_the_samples_with_gaps():
+    problem = st.paper.problem(nodes=256)
+    tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(
+        problem.interface, samples=3, seed=0
+    )
+    whole = st.onset(problem, tau_p, method=st.LocalCriterion())
+    tau_p[1, 20:24] = np.nan
+    with pytest.warns(st.AccuracyWarning, match="1 of 3 samples have gaps and are left out"):
+        found = st.onset(problem, tau_p, method=st.LocalCriterion(), gaps="skip")
+    assert found["sample"].values.tolist() == [0, 2]
+    np.testing.assert_array_equal(found.critical_stress, whole.critical_stress[[0, 2]])
+    tau_p[:, 20] = np.nan
+    with pytest.raises(st.InputError, match="all of 3 samples have gaps"):
+        st.onset(problem, tau_p, method=st.LocalCriterion(), gaps="skip")
+
+
+def test_the_command_writes_a_page_and_a_field(tmp_path):
+    x, values = PIECE.x * 1e3, VALUES * 1e-6
+    table = np.column_stack([x, values])
+    path = tmp_path / "record.csv"
+    np.savetxt(path, table, delimiter=";", header="x (mm); strength (MPa)", comments="")
+    out = tmp_path / "fit"
+    arguments = ["fit", str(path), "--marginal", "lognormal", "--spectrum", "exponential"]
+    arguments += ["--bootstrap", "20", "--noise", "0", "--out", str(out)]
+    result = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert "spectrum.correlation_length" in result.output
+    page = (out / "page.html").read_text("utf-8")
+    assert "spectrum.correlation_length" in page
+    assert "data:image/png;base64," in page
+    field = tomllib.loads((out / "field.toml").read_text("utf-8"))["random"]["strength"]
+    found = st.RandomField(**field)
+    stated = re.search(r"mean +([\d.e+]+)", result.output)
+    assert stated is not None
+    assert found.mean == pytest.approx(float(stated[1]), rel=1e-3)

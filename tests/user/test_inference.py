@@ -1,0 +1,309 @@
+"""Inference as a user meets it: results, libraries of others, and mistakes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.stats
+import xarray as xr
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+
+PROBLEM = st.paper.problem(nodes=256)
+H_N = PROBLEM.nucleation_length
+STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
+LOCAL = st.LocalCriterion()
+PRESSED = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=2e6))
+PRIOR = {
+    "correlation_length": {"low": 0.25 * H_N, "high": 4.0 * H_N, "spacing": "log"},
+    "marginal.low": (0.4e6, 0.9e6),
+    "marginal.high": (1.2e6, 2.2e6),
+}
+LOW = {"marginal.low": (0.4e6, 0.9e6)}
+PEAKS = (
+    st.monte_carlo(PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99, progress=False)
+).critical_stress.values
+
+
+def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
+    options = {"method": LOCAL, "samples": 400, "progress": False} | options
+    return st.infer(problem, random, peaks, prior=prior, **options)
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return infer(prior=PRIOR, samples=1000, load_cell_error=5e3)
+
+
+def test_what_a_posterior_says(posterior):
+    assert posterior.names == tuple(PRIOR)
+    low, high = posterior.interval("marginal.low")
+    assert 0.4e6 < low < 0.66e6 < high < 0.9e6
+    assert low < posterior.mean("marginal.low") < high
+    # Peaks tell the lower bound of the strength, and next to nothing of the upper one.
+    assert posterior.information["marginal.low"] > 1.0 > posterior.information["marginal.high"]
+    assert posterior.total_information > max(posterior.information.values())
+    assert "nats" in str(posterior)
+    assert max(posterior.monte_carlo_error.values()) < 0.25
+    problem, random = posterior.at(0)
+    assert random.strength.marginal.low == posterior.draws["marginal.low"][0, 0]
+    assert problem == PROBLEM
+
+
+def test_units_and_labels_do_not_change_it():
+    plain = infer()
+    for other in (
+        infer(PEAKS / 1e6, unit="MPa"),
+        infer(xr.DataArray(PEAKS / 1e3, attrs={"units": "kPa"})),
+        infer(PEAKS / 2e6, problem=PRESSED, unit="1"),
+        infer(list(PEAKS)),
+    ):
+        # A coefficient is the stress over the pressure: to round-off.
+        assert other.mean("marginal.low") == pytest.approx(plain.mean("marginal.low"), rel=1e-6)
+
+
+def test_walkers_find_what_the_grid_finds(posterior):
+    walkers = infer(prior=PRIOR, samples=1000, load_cell_error=5e3, sampler="emcee")
+    assert walkers.sampler == "emcee"
+    for name in PRIOR:
+        apart = scipy.stats.ks_2samp(posterior.draws[name].ravel(), walkers.draws[name].ravel())
+        # 32 walkers of 3000 steps and 35 steps of correlation: 3000 independent draws, 0.03.
+        assert apart.statistic < 0.06
+        found = walkers.information[name]
+        assert posterior.information[name] == pytest.approx(found, abs=0.1)
+
+
+def test_arviz(posterior):
+    arviz = pytest.importorskip("arviz")
+    found = posterior.to_arviz()
+    groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data"}
+    assert groups <= set(found.groups())
+    assert found.log_likelihood.peak.dims[-1] == "test"
+    assert found.observed_data.peak.size == PEAKS.size
+    whole = found.log_likelihood.peak.sum("test").values
+    theta = np.stack([posterior.draws[name][0, :5] for name in PRIOR], axis=1)
+    np.testing.assert_allclose(posterior.log_likelihood(theta), whole[0, :5], rtol=1e-9)
+    assert np.isfinite(arviz.loo(found).elpd_loo)
+
+
+def test_the_picture(posterior, tmp_path):
+    figure = posterior.plot(tmp_path / "posterior.png")
+    assert (tmp_path / "posterior.png").stat().st_size > 20_000
+    assert len(figure.subfigs[0].axes) == 9
+    assert figure.subfigs[1].axes[0].get_xlabel() == "peak (MPa)"
+
+
+def test_a_second_length_tells_more():
+    short = dataclasses.replace(PROBLEM, interface=st.Interface(length=0.05, nodes=128))
+    more = st.monte_carlo(short, STRENGTH, method=LOCAL, samples=30, seed=5, progress=False)
+    both = infer({0.1: PEAKS, 0.05: more.critical_stress.values}, prior=PRIOR, samples=1000)
+    assert both.peaks.lengths == (0.1, 0.05)
+    assert len(both.predicted) == 2
+    assert np.mean(both.predicted[1]) > np.mean(both.predicted[0])  # fewer weak places
+
+
+def test_equilibrium_after_the_local_criterion():
+    """Its onset is lower, so the strength that goes with the same peaks is higher."""
+    local = infer(samples=None)
+    exact = infer(method=st.Equilibrium(), samples=100)
+    assert exact.method == "equilibrium"
+    assert any("every parameter was simulated" in note for note in exact.notes)
+    shift = exact.mean("marginal.low") - local.mean("marginal.low")
+    # The local criterion is about 0.1 % high at xi_0/h_n = 0.6.
+    assert 0.0 < shift < 5e3
+
+
+def test_positions_tell_where_the_load_varies():
+    x = np.arange(256) / 256
+    problem = dataclasses.replace(
+        PROBLEM, load=st.Load(profile=1.0 + 0.1 * np.cos(2.0 * np.pi * x))
+    )
+    prior = {"correlation_length": PRIOR["correlation_length"]}
+    found = st.monte_carlo(problem, STRENGTH, method=LOCAL, samples=40, seed=2, progress=False)
+    places = found.critical_position.values.copy()
+    places[::4] = np.nan
+    without = infer(found.critical_stress.values, problem, prior=prior, samples=1000)
+    seen = infer(found.critical_stress.values, problem, prior=prior, samples=1000, positions=places)
+    assert seen.log_evidence != pytest.approx(without.log_evidence, abs=1.0)
+    low, high = seen.interval("correlation_length", 0.98)
+    assert low < 0.6 * H_N < high
+
+
+@pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
+def test_positions_on_a_uniform_interface_are_said_to_tell_nothing():
+    with pytest.warns(st.AccuracyWarning, match="positions: say nothing here"):
+        infer(positions=np.full(PEAKS.size, 0.03))
+
+
+@pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
+def test_mixed_specimens_are_noticed():
+    mixed = np.concatenate([PEAKS[:12], PEAKS[:12] + 0.15e6])
+    with pytest.warns(st.AccuracyWarning, match="two kinds of specimens"):
+        infer(mixed, prior=PRIOR)
+
+
+@pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
+def test_a_prior_that_binds_is_named():
+    with pytest.warns(st.AccuracyWarning, match="upper end of marginal.low, 640000"):
+        infer(prior={"marginal.low": (0.4e6, 0.64e6)})
+
+
+BAD = {
+    "unknown unit": (lambda: infer(unit="Mstone"), ["unit", "Mstone", "Pa"]),
+    "a force": (lambda: infer(unit="kN"), ["unit", "force", "area"]),
+    "MPa taken for Pa": (lambda: infer(PEAKS / 1e6), ["below all that the prior", "unit = 'MPa'"]),
+    "below the prior": (
+        lambda: infer(np.append(PEAKS, 0.2e6)),
+        ["200000 lies below", "a lower marginal.low than 400000"],
+    ),
+    "above the prior": (
+        lambda: infer(PEAKS + 1e6, prior=PRIOR),
+        ["lies above", "a higher marginal.low than 900000"],
+    ),
+    "two peaks": (lambda: infer(PEAKS[:2]), ["peaks: are 2", "at least 3"]),
+    "no peaks": (lambda: infer([]), ["peaks: are none"]),
+    "constant": (lambda: infer([0.7e6] * 5), ["are all 700000", "scatter"]),
+    "nan": (lambda: infer([0.7e6, np.nan, 0.71e6]), ["number 1 is nan"]),
+    "negative": (lambda: infer([0.7e6, -0.7e6, 0.71e6]), ["positive", "number 1"]),
+    "text": (lambda: infer(["0.7", "0.8", "0.9"]), ["peaks", "numbers"]),
+    "two specimens in one list": (
+        lambda: infer([PEAKS[:5], PEAKS[5:9]]),
+        ["one list of numbers", "map each length"],
+    ),
+    "length as text": (lambda: infer({"short": PEAKS}), ["each length (m)", "'short'"]),
+    "a length too short": (lambda: infer({0.1: PEAKS, 1e-3: PEAKS}), ["0.001"]),
+    "friction without pressure": (
+        lambda: infer(PEAKS / 2e6, unit="1"),
+        ["coefficients of friction", "normal_pressure"],
+    ),
+    "load cell": (lambda: infer(load_cell_error=-1.0), ["load_cell_error", ">= 0"]),
+    "load cell in another unit": (
+        lambda: infer(PEAKS / 1e6, unit="MPa", load_cell_error=5e3),
+        ["load_cell_error", "unit of the peaks"],
+    ),
+    "position count": (lambda: infer(positions=[0.1]), ["positions", "each of the 30"]),
+    "unknown parameter": (lambda: infer(prior={"corelation_length": (1.0, 2.0)}), ["corelation"]),
+    "no parameter": (lambda: infer(prior={}), ["prior", "must map"]),
+    "same twice": (
+        lambda: infer(prior=LOW | {"random.strength.marginal.low": (0.1e6, 0.2e6)}),
+        ["same parameter"],
+    ),
+    "range upside down": (lambda: infer(prior={"marginal.low": (0.9e6, 0.4e6)}), ["low < high"]),
+    "log of zero": (
+        lambda: infer(prior={"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}),
+        ["positive range"],
+    ),
+    "family without parameters": (
+        lambda: infer(prior={"marginal.low": scipy.stats.uniform}),
+        ["frozen"],
+    ),
+    "discrete": (lambda: infer(prior={"marginal.low": scipy.stats.poisson(3)}), ["continuous"]),
+    "no marginal there": (
+        lambda: infer(prior={"marginal.low": (1.0e6, 2.0e6)}),
+        ["prior: at marginal.low = 2e+06", "below high"],
+    ),
+    "no mode there": (
+        lambda: infer(prior={"correlation_length": (1e-3, 1.0)}),
+        ["prior: at correlation_length = 0.316", "no mode is left"],
+    ),
+    "sampler": (lambda: infer(sampler="nuts"), ["sampler", "'emcee'"]),
+    "method": (lambda: infer(method="local"), ["method"]),
+    "problem": (lambda: infer(problem=STRENGTH, random=PROBLEM), ["problem", "Problem"]),
+    "too many to simulate": (
+        lambda: infer(
+            prior={
+                key: (1.0, 2.0)
+                for key in ("marginal.alpha", "marginal.beta", "exponent", "truncation")
+            }
+            | {"problem.friction.weakening_rate": (4e11, 6e11)}
+        ),
+        ["5 parameters would have to be simulated"],
+    ),
+    "limit state": (
+        lambda: st.limit_state(PROBLEM, STRENGTH, LOCAL)(np.zeros((2, 3))),
+        ["draws", "shape"],
+    ),
+    "simulator": (
+        lambda: st.simulator(PROBLEM, STRENGTH, ("marginal.lo",), method=LOCAL, samples=3)([1.0]),
+        ["'lo'", "'low'"],
+    ),
+    "theta": (
+        lambda: st.simulator(PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=3)([]),
+        ["theta", "1 finite"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_mistakes(name):
+    call, texts = BAD[name]
+    with pytest.raises(st.InputError) as caught:
+        call()
+    for text in texts:
+        assert text in str(caught.value)
+
+
+def written(tmp_path, text):
+    path = tmp_path / "peaks.csv"
+    path.write_text(text)
+    return path
+
+
+def test_peaks_from_a_file(tmp_path):
+    text = (
+        "test; peak [MPa]; length [mm]; position [mm]\n1;0,71;100;\n2;0,69;50;12,5\n3;0,7;50;30\n"
+    )
+    found = st.read_peaks(written(tmp_path, text))
+    assert found.lengths == (0.05, 0.1)
+    np.testing.assert_allclose(found.values[0], [0.69e6, 0.7e6])
+    np.testing.assert_allclose(found.positions[0], [0.0125, 0.03])
+    assert found.positions[1] is None
+    coefficients = st.read_peaks(written(tmp_path, "friction [-]\n0.31\n0.33\n0.35\n"))
+    assert coefficients.coefficients
+    assert coefficients.values[0][0] == 0.31
+
+
+BAD_FILES = {
+    "no unit": ("peak\n0.71\n0.69\n0.7\n", ["unit of the peaks is not stated"]),
+    "unknown unit": ("peak [Mstone]\n0.71\n0.69\n0.7\n", ["Mstone"]),
+    "no peak": ("a [MPa],b [MPa]\n0.7,1\n0.6,2\n0.7,1\n", ["no column is called peak"]),
+    "two peaks": ("peak [MPa],stress [MPa]\n0.7,1\n0.6,2\n0.7,1\n", ["may both be the peak"]),
+    "missing peak": ("peak [MPa],n [1]\n0.7,1\n,2\n0.7,1\n", ["number 1 is nan"]),
+    "length without unit": ("peak [MPa],length\n0.7,1\n0.6,2\n0.7,1\n", ["length", "not stated"]),
+    "missing length": (
+        "peak [MPa],length [mm]\n0.7,100\n0.6,\n0.7,100\n",
+        ["length: missing in row 1", "mixed"],
+    ),
+    "empty": ("", ["no numbers"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_files_that_are_not_taken(name, tmp_path):
+    text, parts = BAD_FILES[name]
+    with pytest.raises(st.InputError) as caught:
+        st.read_peaks(written(tmp_path, text))
+    for part in (*parts, "peaks.csv"):
+        assert part in str(caught.value)
+
+
+def test_no_file():
+    with pytest.raises(st.InputError, match="nowhere.csv"):
+        st.read_peaks("nowhere.csv")
+
+
+def test_simulated_tests_are_those_of_monte_carlo():
+    simulate = st.simulator(PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=30, seed=99)
+    np.testing.assert_array_equal(simulate([0.66e6]), PEAKS)
+    np.testing.assert_array_equal(simulate({"marginal.low": 0.66e6}), PEAKS)
+    later = simulate([0.66e6], first=10)
+    np.testing.assert_array_equal(later[:20], PEAKS[10:])
+
+
+def test_a_limit_state_of_one_row_and_of_many():
+    state = st.limit_state(PROBLEM, STRENGTH, LOCAL)
+    draws = state.draws(seed=99, first=0, samples=30)
+    np.testing.assert_array_equal(state(draws), PEAKS)
+    assert state(draws[3]) == PEAKS[3]

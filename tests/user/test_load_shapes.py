@@ -1,0 +1,107 @@
+"""Load shapes and event sequences: in Python, in study files, swept, and refused by name."""
+
+import numpy as np
+import pytest
+
+import stiction as st
+
+PLAIN = st.paper.problem(nodes=256)
+
+
+def loaded(profile):
+    return st.Problem(PLAIN.solid, PLAIN.interface, PLAIN.friction, st.Load(profile=profile))
+
+
+def test_shapes_have_mean_one_and_their_ends():
+    gradient = loaded(st.GradientLoad(amplitude=0.5, centre=0.25)).load_profile
+    assert gradient.mean() == pytest.approx(1.0, abs=1e-14)
+    assert (gradient.max(), gradient.min()) == (pytest.approx(1.5), pytest.approx(0.5))
+    assert gradient.argmax() == 64
+    edge = loaded(st.EdgeLoad(excess=4.0, decay=0.005)).load_profile
+    assert edge.mean() == pytest.approx(1.0, abs=1e-14)
+    # Half a period away exp(-10) of the excess is left, 2e-4.
+    assert edge[0] / edge[128] == pytest.approx(5.0, rel=2e-4)
+    plane = st.Interface(length=(0.1, 0.05), nodes=(64, 32))
+    assert np.ptp(st.EdgeLoad(excess=1.0, decay=0.01).on(plane), axis=1).max() == 0.0
+
+
+def test_a_shape_is_its_array():
+    shape = st.EdgeLoad(excess=2.0, decay=0.01, edge=0.5)
+    tau_p = st.paper.strength(PLAIN).sample(PLAIN.interface, samples=3, seed=0)
+    for method in (st.LocalCriterion(), st.Equilibrium()):
+        one = st.onset(loaded(shape), tau_p, method=method, progress=False)
+        other = st.onset(loaded(shape.on(PLAIN.interface)), tau_p, method=method, progress=False)
+        np.testing.assert_array_equal(one["critical_stress"], other["critical_stress"])
+
+
+def test_in_a_study_file_and_swept(tmp_path):
+    study = st.Study(
+        problem=loaded(st.EdgeLoad(excess=2.0, decay=0.01)),
+        random=st.paper.strength(PLAIN),
+        method=st.Equilibrium(events=3),
+        ensemble=st.Ensemble(samples=2),
+        sweep=({"problem.load.profile.excess": [0.5, 4.0]},),
+    )
+    path = tmp_path / "study.toml"
+    study.to_toml(path)
+    again = st.Study.from_toml(path)
+    assert again.problem == study.problem
+    result = again.run(progress=False)
+    assert result["event_length"].dims == ("excess", "sample", "event")
+    assert result["critical_stress"][0].mean() > result["critical_stress"][1].mean()
+
+
+def test_events_are_those_of_equilibrium_events(tmp_path):
+    strength = st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=4.66e6),
+        spectrum=st.PowerLawSpectrum(correlation_length=1.5e-3),
+    )
+    tau_p = strength.sample(PLAIN.interface, samples=6, seed=0)
+    found = st.onset(PLAIN, tau_p, method=st.Equilibrium(events=4), progress=False)
+    events = st.equilibrium_events(PLAIN, tau_p)
+    kept = found["event_moment"].values
+    assert np.isfinite(kept).sum() > 2
+    for sample in range(6):
+        own = events["moment"].values[events["sample"].values == sample][:4]
+        np.testing.assert_array_equal(kept[sample, : own.size], own)
+        assert np.isnan(kept[sample, own.size :]).all()
+    study = st.Study(
+        problem=PLAIN, random=strength, method=st.Equilibrium(events=4),
+        ensemble=st.Ensemble(samples=6),
+    )  # fmt: skip
+    stored = study.run(out=tmp_path / "run", progress=False)
+    np.testing.assert_array_equal(stored["event_moment"].values, kept)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: st.GradientLoad(amplitude=1.0), "amplitude"),
+        (lambda: st.EdgeLoad(excess=-1.0, decay=0.01), "excess"),
+        (lambda: st.EdgeLoad(excess=1.0, decay=0.0), "decay"),
+        (lambda: st.Load(profile={"type": "egde", "excess": 1.0}), "did you mean 'edge'"),
+        (lambda: st.Load(profile={"type": "edge", "exces": 1.0, "decay": 0.01}), "exces"),
+        (lambda: st.Equilibrium(events=-1), "events"),
+    ],
+)
+def test_mistakes(make, text):
+    with pytest.raises(st.InputError, match=text):
+        make()
+
+
+def test_statistics_want_a_uniform_load():
+    problem = loaded(st.EdgeLoad(excess=1.0, decay=0.01))
+    with pytest.raises(st.InputError, match=r"load\.profile"):
+        st.nucleation_statistics(problem, st.paper.strength(PLAIN))
+
+
+def test_quantile_distance():
+    """Of a normal distribution: 1.349 deviations, with the error that repetition shows."""
+    generator = np.random.default_rng(0)
+    found = [st.quantile_distance(row, 0.25, 0.75) for row in generator.normal(size=(200, 2000))]
+    values = np.array([each.value for each in found])
+    # 200 repetitions know the mean to 0.002 and the scatter to 5 %.
+    assert values.mean() == pytest.approx(1.349, abs=0.01)
+    assert np.mean([each.error for each in found]) == pytest.approx(values.std(), rel=0.2)
+    with pytest.raises(st.InputError, match="low, high"):
+        st.quantile_distance(values, 0.5, 0.5)

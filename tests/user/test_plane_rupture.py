@@ -1,0 +1,150 @@
+"""Ruptures on planes as they are asked for: files, streams, commands, memory, units."""
+
+import os
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+from typer.testing import CliRunner
+
+import stiction as st
+from stiction.cli.app import app
+
+pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+
+STUDY = """
+[problem.solid]
+shear_modulus = 1e9
+poisson_ratio = 0.33
+density = 1170.0
+[problem.interface]
+length = [0.016, 0.012]
+nodes = [40, 36]
+[problem.friction]
+weakening_rate = 0.5e12
+residual_strength = 1e5
+[random.strength.marginal]
+type = "beta"
+alpha = 1.5
+beta = 3.0
+low = 0.66e6
+high = 1.66e6
+[random.strength.spectrum]
+type = "power_law"
+correlation_length = 2e-3
+[method]
+type = "rupture"
+loading_rate = 1e8
+[ensemble]
+samples = 3
+seed = 4
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "plane.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def command(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_a_stored_study_is_that_in_memory_and_has_units(path, tmp_path):
+    command("run", path, "--out", tmp_path / "run")
+    stored = st.open_run(tmp_path / "run").dataset()
+    direct = st.Study.from_toml(path).run(progress=False)
+    for name in direct.data_vars:
+        assert np.array_equal(stored[name].values, direct[name].values, equal_nan=True)
+    assert direct.seismic_moment.attrs["units"] == "N m"
+    assert direct.radiated_energy.attrs["units"] == "J"
+    for name in ("critical_position", "rupture_speed", "median_rupture_speed"):
+        assert direct[name].dims == ("sample", "direction")
+        assert list(direct.direction.values) == ["x", "y"]
+    assert np.all(direct.stress_drop.values > 5e5)
+
+
+def test_the_command_draws_figures_and_a_film(path, tmp_path):
+    out = command("rupture", path, "--film", "--out", tmp_path)
+    for text in ("onset at x = ", ", y = ", " along x, ", " J; ended by: sliding"):
+        assert text in out
+    film = Image.open(tmp_path / "rupture.gif")
+    assert film.n_frames > 10
+    first = np.asarray(film.convert("RGB")).astype(int)
+    film.seek(film.n_frames - 1)
+    assert np.abs(np.asarray(film.convert("RGB")) - first).max() > 50
+    for name in ("rupture.png", "front.png"):
+        assert Image.open(tmp_path / name).size[0] > 500
+    with xr.open_dataset(tmp_path / "rupture.nc") as run:
+        assert run.slip_rate.dims == ("time", "x", "y")
+        assert run.arrival_time.dims == run.front_speed.dims == ("x", "y")
+
+
+def problem_and_strength(path):
+    plan = st.Study.from_toml(path).plans[0]
+    return plan.problem, plan.profiles(0, 1)
+
+
+def test_frames_streamed_to_disk_are_those_in_memory(path, tmp_path):
+    problem, strength = problem_and_strength(path)
+    options = {"method": st.Rupture(loading_rate=1e8), "every": 30, "progress": False}
+    whole = st.simulate_rupture(problem, strength, **options)
+    told = st.simulate_rupture(problem, strength, store=tmp_path / "frames", chunk=5, **options)
+    assert "slip" not in told
+    frames = st.open_rupture(tmp_path / "frames")
+    for name in ("slip", "slip_rate", "shear_stress", "load", "step_time"):
+        assert np.array_equal(frames[name].values, whole[name].values)
+    assert frames.slip.dims == ("time", "x", "y")
+    assert np.array_equal(frames.y.values, problem.interface.coordinates["y"])
+
+
+def test_a_run_may_begin_from_an_equilibrium(path):
+    problem, strength = problem_and_strength(path)
+    along = st.equilibrium_path(problem, strength, loads=[7.5e5])
+    slip = along.slip.values.reshape(problem.interface.shape)
+    method = st.Rupture(loading_rate=1e6, stop="onset")
+    options = {"method": method, "progress": False}
+    later = st.simulate_rupture(problem, strength, initial_slip=slip, initial_load=7.5e5, **options)
+    whole = st.simulate_rupture(problem, strength, **options)
+    assert float(later.critical_stress) == pytest.approx(float(whole.critical_stress), rel=1e-5)
+    with pytest.raises(st.InputError, match=r"initial_slip: must be \(40, 36\) numbers"):
+        st.simulate_rupture(
+            problem, strength, initial_slip=np.zeros((40, 35)), initial_load=7.5e5, **options
+        )
+
+
+def test_a_grid_without_room_in_memory_is_refused_before_it_begins(path, monkeypatch):
+    problem, strength = problem_and_strength(path)
+    real = os.sysconf
+    small = {"SC_PHYS_PAGES": 400}  # 1.6 MB
+    monkeypatch.setattr(os, "sysconf", lambda name: small.get(name, real(name)))
+    with pytest.raises(st.InputError, match=r"interface.nodes: this takes .* GiB of memory"):
+        st.onset(problem, strength, method=st.Rupture(loading_rate=1e8))
+
+
+def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
+    problem, strength = problem_and_strength(path)
+    with pytest.raises(st.InputError, match=r"time_step: .* above the stability limit"):
+        st.onset(problem, strength, method=st.Rupture(loading_rate=1e8, time_step=1e-6))
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.495, density=1170.0)
+    with pytest.raises(st.InputError, match=r"mode II needs nu <= 0.49"):
+        st.onset(
+            st.Problem(solid, problem.interface, problem.friction), strength,
+            method=st.Rupture(loading_rate=1e8),
+        )  # fmt: skip
+
+
+def test_other_friction_laws_slide_too(path):
+    problem, strength = problem_and_strength(path)
+    friction = st.ExponentialWeakening(weakening_rate=0.4e12, residual_strength=1e5)
+    found = st.onset(
+        st.Problem(problem.solid, problem.interface, friction), strength,
+        method=st.Rupture(loading_rate=1e9),
+    )  # fmt: skip
+    assert float(found.kinetic_stress[0]) == pytest.approx(1e5, rel=0.2)
+    assert 7e5 < float(found.critical_stress[0]) < 1e6
