@@ -130,9 +130,14 @@ def other_pages(app, docname, source):
     folders = "", "notebooks/", "tutorials/"
     there = {f"{one}{path.stem}" for one in folders for path in (HERE / one).glob("*.md")}
     rest = sorted(there - named - {"index", "README", *SECTIONS})
-    lessons = [name for name in rest if "tutorial" in name or "/" in name]
+    lessons = [name for name in rest if re.search("tutorial|from-a-|tell-me|/", name)]
     mine = lessons if docname == "start" else [name for name in rest if name not in lessons]
     source[0] = source[0].replace("@other pages@", "\n".join(mine))
+
+
+def with_other_pages(app, environment, added, changed, removed):
+    """A new page changes the lists, which did not change themselves."""
+    return ["start", "understand"]
 
 
 def plain_text(app, what, name, obj, options, lines):
@@ -181,6 +186,7 @@ def write_commands(app):
 
 def setup(app):
     app.connect("source-read", other_pages)
+    app.connect("env-get-outdated", with_other_pages)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)
     app.connect("builder-inited", write_other_names, priority=1)  # before autosummary looks

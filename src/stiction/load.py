@@ -168,6 +168,16 @@ class Load:
     ------
     InputError
         If the profile is not positive or the pressure not positive on average.
+
+    Examples
+    --------
+    A load that is higher in the middle of 8 nodes, under a pressure of 5 MPa:
+
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> load = st.Load(profile=1.0 + np.hanning(8), normal_pressure=5e6)
+    >>> load.profile.shape
+    (8,)
     """
 
     profile: LoadProfile = 1.0

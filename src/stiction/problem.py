@@ -52,6 +52,17 @@ class Problem:
     InputError
         If an array does not have one entry for each node, the nucleation length spans fewer than
         four nodes, or an interface of two dimensions is given plane stress or mode III.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    ...     interface=st.Interface(length=0.1, nodes=1024),
+    ...     friction=st.SlipWeakening(weakening_rate=0.5e12),
+    ... )
+    >>> round(problem.nucleation_length * 1e3, 3)  # mm
+    3.456
     """
 
     solid: Solid

@@ -157,6 +157,20 @@ def read_profile(
     -----
     AccuracyWarning
         If something is interpolated or filled in, or x lies between the nodes.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> interface = st.Interface(length=0.1, nodes=8)
+    >>> path = Path(tempfile.mkdtemp()) / "profile.csv"
+    >>> table = np.column_stack([interface.x * 1e3, np.linspace(0.8, 1.2, 8)])
+    >>> np.savetxt(path, table, delimiter=",", header="x (mm),strength (MPa)", comments="")
+    >>> profile = st.read_profile(path, interface=interface)
+    >>> round(float(profile.values.max()), 6)  # in Pa, as all of the package
+    1200000.0
     """
     import xarray as xr
 

@@ -34,6 +34,12 @@ class Solid:
     ------
     InputError
         If a value is missing, not finite or out of range.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0).shear_wave_speed
+    1000.0
     """
 
     shear_modulus: Positive

@@ -1,4 +1,4 @@
-"""The table of correlation lengths across libraries, in docs/conventions.md, holds."""
+"""What docs/correlation-lengths.md says of other libraries holds."""
 
 import numpy as np
 import pytest

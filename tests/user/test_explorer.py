@@ -1,6 +1,7 @@
 """The explorer: what it shows is what its code and its study file compute; and a real browser."""
 
 import io
+import sys
 import tomllib
 
 import browser
@@ -85,6 +86,24 @@ def test_it_listens_on_this_machine_only(monkeypatch):
     assert given["websocket_origin"] == ["127.0.0.1:5006", "localhost:5006"]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "panel", "said"),
+    [
+        (["--port", "70000"], True, "--port: must lie between 0 and 65535, got 70000"),
+        (["--no-browser"], False, "needs panel, which is not installed: python -m pip install"),
+    ],
+)
+def test_the_command_says_what_is_wrong(arguments, panel, said, monkeypatch, capsys):
+    from stiction.cli import app
+
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: "there" if panel else None)
+    monkeypatch.setattr(sys, "argv", ["stiction", "explore", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
+
+
 FIND = """
 (() => {
   const all = (root) => [...root.querySelectorAll('*')].flatMap(
@@ -99,6 +118,11 @@ HANDLE = f"""
     .getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
 }})()
+"""
+
+CODE = f"""
+{FIND}.some((one) => one.tagName == 'CODE' && one.getBoundingClientRect().height > 0
+  && one.innerText.includes('st.Problem('))
 """
 
 
@@ -127,5 +151,8 @@ def test_a_slider_moves_the_figure_in_a_real_browser(width, tmp_path):
             second = page.picture()
             (tmp_path / f"{width}.png").write_bytes(second)
             assert second != first
+            assert not page.ask(CODE)
+            page.ask(f"{FIND}.find((one) => one.classList.contains('card-header')).click()")
+            page.until(CODE)
     finally:
         server.stop()

@@ -113,6 +113,25 @@ def test_sweeps(system):
         st.plot.quantiles(result.isel(residual_strength=0, correlation_length=0))
 
 
+def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(system, tmp_path):
+    from stiction.report.run_figures import run_figures
+
+    problem, strength, _ = system
+    for number, one in enumerate((problem, make())):
+        study = st.Study(
+            problem=one,
+            random=strength,
+            method=st.LocalCriterion(),
+            ensemble=st.Ensemble(samples=40),
+        )
+        study.run(out=tmp_path / str(number))
+    labels = []
+    for number in (0, 1):
+        (drawn,) = run_figures(st.open_run(tmp_path / str(number)))
+        labels.append(drawn.figure.axes[0].get_xlabel())
+    assert labels == ["static friction coefficient", "critical stress (MPa)"]
+
+
 def test_failure_curve_and_weak_spots(system):
     problem, strength, _ = system
     method = st.LocalCriterion()

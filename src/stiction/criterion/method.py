@@ -45,6 +45,12 @@ class LocalCriterion:
     minimum is taken over nodes and shapes. Beside the variables of every method there are then
     `critical_aspect`, `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) of
     the ellipse that decided.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.LocalCriterion().supports(st.paper.problem(nodes=512))  # nothing speaks against it
+    []
     """
 
     weights: Weights = "exact"

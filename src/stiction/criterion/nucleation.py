@@ -91,6 +91,17 @@ def nucleation_stress(
     InputError
         If the profile does not fit the problem, the weakening rate varies along the interface, or
         a critical patch is larger than the interface.
+
+    Examples
+    --------
+    The average of a uniform strength is that strength; of any other it lies between the extremes.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> tau_n = st.nucleation_stress(problem, tau_p)
+    >>> bool(tau_p.min() < tau_n.min() < tau_n.max() < tau_p.max())
+    True
     """
     check_instance("problem", problem, Problem)
     check_aspect(problem, weights, aspect)

@@ -345,6 +345,16 @@ def monte_carlo(
     -----
     AccuracyWarning
         If the time limit was reached.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.LocalCriterion()
+    >>> found = st.monte_carlo(problem, strength, method=method, samples=50, seed=0)
+    >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
+    (('sample',), 'Pa')
     """
     names, chosen = _check_keep(keep, keep_samples, keep_limit)
     check_progress(progress)

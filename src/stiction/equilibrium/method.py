@@ -107,6 +107,15 @@ class Equilibrium:
     says whether the bounds are rigorous: they are not where a node reaches its residual strength
     before the first instability. Slipping nodes belong to one patch where their cells share an
     edge, also across the borders.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> found = st.onset(problem, tau_p, method=st.Equilibrium())
+    >>> bool(found.certificate_gap.item() < 1e-6 * found.critical_stress.item())
+    True
     """
 
     sensitivity: bool = False

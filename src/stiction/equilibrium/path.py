@@ -104,6 +104,15 @@ def equilibrium_path(
     ------
     InputError
         If there is more than one profile or the loads do not rise, and as `onset` does.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> path = st.equilibrium_path(problem, tau_p[0], [0.5e6, 2e6])
+    >>> path.sliding.values
+    array([False,  True])
     """
     given = _check_loads(loads)
     check_instance("problem", problem, Problem)

@@ -100,6 +100,14 @@ def nucleation_stress(problem: Problem, strength: Any, *, ax: Axes | None = None
     ------
     InputError
         If the strength does not fit the interface or there is no single nucleation length.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> st.plot.nucleation_stress(problem, tau_p).get_ylabel()
+    'stress (MPa)'
     """
     interface = problem.interface
     tau_p = rows_of(interface, strength)[0]

@@ -73,6 +73,15 @@ def onset(
     ------
     InputError
         If something does not fit together.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
+    >>> st.plot.onset(found, tau_p).get_xlabel()
+    'position $x$ (mm)'
     """
     results = named(result)
     if not results:

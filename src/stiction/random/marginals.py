@@ -32,6 +32,12 @@ class Beta:
     ------
     InputError
         If a shape is not positive or the bounds are not in order.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> float(st.Beta(alpha=1.0, beta=1.0, low=1e6, high=2e6).distribution.mean())  # uniform
+    1500000.0
     """
 
     alpha: Positive

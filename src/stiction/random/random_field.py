@@ -62,6 +62,17 @@ class RandomField:
 
     Translation process after Grigoriu (1995), spectral representation after Shinozuka and Deodatis
     (1991); Albertini et al. (2020), Eqs. 2 to 7.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> field = st.RandomField(
+    ...     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    ...     spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
+    ... )
+    >>> tau_p = field.sample(st.Interface(length=0.1, nodes=512), samples=3, seed=1)
+    >>> tau_p.shape, bool(tau_p.min() > 0.66e6)
+    ((3, 512), True)
     """
 
     marginal: Marginal

@@ -198,6 +198,13 @@ class PowerLawSpectrum(_ScaledSpectrum):
     -----
     On an infinite line this is a Matern covariance of smoothness exponent - 1/2, and on a plane the
     same with the density (k^2 + lambda^2)^-(exponent + 1/2).
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> spectrum = st.PowerLawSpectrum(correlation_length=2e-3, exponent=2.0)
+    >>> round(spectrum.with_efolding_length(1e-3).efolding_length * 1e3, 6)  # mm
+    1.0
     """
 
     correlation_length: Positive
@@ -288,6 +295,13 @@ class SquaredExponentialSpectrum(_ScaledSpectrum):
         Truncation in multiples of 2 pi/xi_0.
     power_kept : float, optional
         Share of the power kept by truncation; 0.9997 if neither is given.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> spectrum = st.SquaredExponentialSpectrum(correlation_length=2e-3)
+    >>> round(spectrum.with_efolding_length(1e-3).efolding_length * 1e3, 6)  # mm
+    1.0
     """
 
     correlation_length: Positive
@@ -342,6 +356,13 @@ class ExponentialSpectrum(_ScaledSpectrum):
     power_kept : float, optional
         Share of the power kept by truncation; 0.99 if neither is given, since the spectrum
         falls slowly and every further nine takes ten times as many modes.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> spectrum = st.ExponentialSpectrum(correlation_length=2e-3)
+    >>> round(spectrum.with_efolding_length(1e-3).efolding_length * 1e3, 6)  # mm
+    1.0
     """
 
     correlation_length: Positive

@@ -354,6 +354,16 @@ def design_stress(
     -----
     AccuracyWarning
         If the evaluations or the time allowed do not suffice, or the onset piles up on the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.LocalCriterion()
+    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cov=0.3)
+    >>> bool(found.stress > found.lower_bound)
+    True
     """
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_probability("probability", probability) + check_time_limit(time_limit)

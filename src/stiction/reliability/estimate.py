@@ -208,6 +208,16 @@ def failure_probability(
     of the failing samples, Lee and Whiteley (2018). Intervals are binomial (Clopper and Pearson,
     1934) for plain Monte Carlo, log-normal otherwise. Plain Monte Carlo counts until it has seen
     2 + 1/target_cov^2 failures, which leaves its estimate unbiased (Haldane, 1945).
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> found = st.failure_probability(problem, strength, 0.68e6, method=st.LocalCriterion())
+    >>> low, high = found.interval
+    >>> bool(0.0 < low < found.probability < high < 1.0)
+    True
     """
     problems = check_target(target_cov, confidence, max_evaluations)
     problems += check_time_limit(time_limit)

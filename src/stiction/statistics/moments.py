@@ -140,6 +140,14 @@ def nucleation_statistics(
     infinite one quadrature of the correlation against the autocorrelation of the weight. The
     correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the
     Gaussian field.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> found = st.nucleation_statistics(problem, st.paper.strength(problem, correlation_ratio=2.0))
+    >>> bool(0.0 < found.variance_ratio < 1.0)  # averaging lowers the variance
+    True
     """
     load, initial = _uniform_load(problem, strength)
     check_flag("infinite", infinite)

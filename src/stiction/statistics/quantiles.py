@@ -70,6 +70,14 @@ def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Qua
     The number of values below the p-quantile is binomial (N, p); the interval runs between the
     order statistics whose ranks hold it with the asked probability (David and Nagaraja, 2003,
     Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> found = st.quantiles(np.random.default_rng(0).normal(size=2000), [0.5])
+    >>> bool(found.lower[0] < 0.0 < found.upper[0])
+    True
     """
     ordered = np.sort(as_sample(values, 1))
     p = np.atleast_1d(numbers("probability", probability))

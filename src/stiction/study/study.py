@@ -115,6 +115,12 @@ class Ensemble:
         Numbers of the samples for which it is kept, or how many of the first; all if left out.
     keep_limit : float, optional
         Bytes that this may take in all; 1 GiB if left out.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Ensemble(samples=1e4, seed=1).samples
+    10000
     """
 
     samples: Count
@@ -155,6 +161,22 @@ class Study:
     InputError
         Naming every key that is missing, unknown or out of range, and the points of the sweep
         that make no valid study.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> study = st.Study(
+    ...     problem=problem,
+    ...     random=st.paper.strength(problem, correlation_ratio=2.0),
+    ...     method=st.LocalCriterion(),
+    ...     ensemble=st.Ensemble(samples=20),
+    ...     sweep=[{"random.strength.spectrum.correlation_length": [3e-3, 6e-3]}],
+    ... )
+    >>> dict(study.run().sizes)
+    {'correlation_length': 2, 'sample': 20}
+    >>> st.Study.from_dict(study.to_dict()) == study
+    True
     """
 
     problem: Problem
