@@ -10,8 +10,8 @@ import numpy as np
 from stiction import __version__
 from stiction.ensemble.files import write_whole
 from stiction.inference.posterior import Posterior
+from stiction.plot.style import save_figure
 from stiction.report.page import ShownFigure, render
-from stiction.report.style import save_figure
 from stiction.report.tables import Table
 
 CAPTION = (
@@ -68,7 +68,7 @@ def write_posterior(posterior: Posterior, folder: Path, *, title: str, peaks: Pa
             *([f"All parameters together: {total:.2f} nats."] if np.isfinite(total) else []),
         ],
         exceptions=(),
-        key_table=summary,
+        key_tables=[summary],
         figures=[ShownFigure("posterior", "1", "Before and after", CAPTION, image.getvalue(), ())],
         claims=(),
         parameters=[
