@@ -128,7 +128,11 @@ def nucleation_skewness(data: Data) -> Measured:
     sign = float(np.sign(own)) or 1.0
     series = at_each(data, lambda ratio: nucleation_moments(data, ratio)[2].scaled(sign))
     last = Quantity("longest, less that of tau_p", series[-1].estimate - abs(own))
-    return Measured((series, series[:1], (last,)), one("tau_p", own))
+    return Measured(
+        (series, series[:1], (last,)),
+        one("tau_p", own),
+        comment="positive in the sense of the skewness of tau_p",
+    )
 
 
 @claim(

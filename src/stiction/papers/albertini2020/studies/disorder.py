@@ -20,7 +20,7 @@ title = "More disorder: wide strength range, random load, random residual streng
 
 MOST = 250
 WIDE = ("twice the range", "four times the range")
-RUNS = 16
+RUNS = 8
 """Ruptures of each of them."""
 _EVENTS = 10  # cost of a sample with arrested events, in samples without
 
