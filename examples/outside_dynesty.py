@@ -44,7 +44,7 @@ def log_likelihood(theta):
 
 
 sampler = dynesty.NestedSampler(
-    log_likelihood, transform, 2, nlive=40, rstate=np.random.default_rng(1)
+    log_likelihood, transform, 2, nlive=30, rstate=np.random.default_rng(1)
 )
 sampler.run_nested(dlogz=0.5, print_progress=False)
 draws = sampler.results.samples_equal(np.random.default_rng(2))

@@ -1,14 +1,16 @@
 """Runs the what-if studies of this folder, draws a figure of each and writes what they show.
 
-``python examples/what_ifs.py`` writes docs/what-ifs.md and its pictures, in about four minutes;
-``python examples/what_ifs.py length plane`` runs some of them and prints what they show.
+``python examples/what_ifs.py`` writes docs/what-ifs.md and its pictures, in about five minutes;
+``python examples/what_ifs.py length plane`` writes some of its parts anew.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import re
 import sys
 import textwrap
+from collections.abc import Iterable
 from pathlib import Path
 
 from PIL import Image
@@ -62,29 +64,35 @@ def save(figure: object, path: Path) -> None:
     )
 
 
-def main(folder: str | Path = HERE.parent / "docs", samples: int | None = None) -> Path:
-    """Run all, and write the page and its pictures."""
+def section(name: str, title: str, sentences: list[str]) -> str:
+    """What the page says of one what-if."""
+    return (
+        f"## {title}\n\n![{title}](images/what_if_{name}.png)\n\n"
+        + textwrap.fill(" ".join(sentences), 100, break_on_hyphens=False)
+        + f"\n\nStudy: `examples/what_if_{name}.toml`.\n"
+    )
+
+
+def main(
+    folder: str | Path = HERE.parent / "docs",
+    samples: int | None = None,
+    names: Iterable[str] = tuple(PARTS),
+) -> Path:
+    """Run some, and put what they show and their pictures into the page, each as it is done."""
     folder = Path(folder)
     (folder / "images").mkdir(parents=True, exist_ok=True)
-    parts = [INTRODUCTION]
-    for name in PARTS:
+    page = folder / "what-ifs.md"
+    old = page.read_text(encoding="utf-8") if page.exists() else ""
+    known = {part.partition("images/what_if_")[2].partition(".png")[0]: part
+             for part in re.split(r"(?m)^(?=## )", old)[1:]}  # fmt: skip
+    for name in names:
         title, figure, sentences = run(name, samples)
         save(figure, folder / "images" / f"what_if_{name}.png")
-        parts.append(
-            f"## {title}\n\n![{title}](images/what_if_{name}.png)\n\n"
-            + textwrap.fill(" ".join(sentences), 100, break_on_hyphens=False)
-            + f"\n\nStudy: `examples/what_if_{name}.toml`.\n"
-        )
-    page = folder / "what-ifs.md"
-    page.write_text("\n".join(parts), encoding="utf-8")
+        known[name] = section(name, title, sentences)
+        parts = [known[each].rstrip() + "\n" for each in PARTS if each in known]
+        page.write_text("\n".join([INTRODUCTION, *parts]), encoding="utf-8")
     return page
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        for chosen in sys.argv[1:]:
-            heading, drawing, texts = run(chosen)
-            save(drawing, Path(f"what_if_{chosen}.png"))
-            print(heading, *texts, sep="\n")
-    else:
-        print(main())
+    print(main(names=sys.argv[1:] or tuple(PARTS)))

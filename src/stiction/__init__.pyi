@@ -6,7 +6,9 @@ from stiction.criterion.griffith import energy_release_rate as energy_release_ra
 from stiction.criterion.griffith import griffith_length as griffith_length
 from stiction.criterion.method import LocalCriterion as LocalCriterion
 from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
+from stiction.dynamics.compared import RuptureMisfit as RuptureMisfit
 from stiction.dynamics.method import Rupture as Rupture
+from stiction.dynamics.misfit import misfit as misfit
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.distributed import Cluster as Cluster
@@ -92,6 +94,7 @@ from stiction.reliability.estimate import failure_probability as failure_probabi
 from stiction.reliability.limit_state import limit_state as limit_state
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
+from stiction.statistics.control_variates import combined_mean as combined_mean
 from stiction.statistics.densities import density as density
 from stiction.statistics.moments import (
     nucleation_limits as nucleation_limits,

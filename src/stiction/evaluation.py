@@ -44,6 +44,7 @@ _OWN = {
     "local_criterion": "criterion.method:LocalCriterion",
     "equilibrium": "equilibrium.method:Equilibrium",
     "rupture": "dynamics.method:Rupture",
+    "rupture_misfit": "dynamics.compared:RuptureMisfit",
 }
 
 

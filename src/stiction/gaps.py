@@ -47,7 +47,7 @@ def gather(
             continue
         values[name] = found.values
         if found.measured is not None:
-            masks.append(np.atleast_2d(found.measured))
+            masks.append(found.measured.reshape(-1, problem.interface.size))
     if problems:
         raise InputError(problems)
     if not masks:
@@ -86,12 +86,38 @@ def without_gaps(
 def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Dataset:
     """A result that says where its profiles have gaps, and which onsets lie in one."""
     position = result["critical_position"]
-    inside = _inside(problem, np.atleast_1d(position.values), measured)
+    inside = (_inside_plane if problem.interface.is_plane else _inside)(
+        problem, np.atleast_1d(position.values), measured
+    )
+    dims = tuple(dim for dim in position.dims if dim != "direction")
     attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
-    result[IN_GAP] = (position.dims, inside.reshape(position.shape), attributes)
-    if np.all(measured == measured[:1]):
+    result[IN_GAP] = (dims, inside.reshape([position.sizes[dim] for dim in dims]), attributes)
+    if not problem.interface.is_plane and np.all(measured == measured[:1]):
         result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], problem.interface))
     return result
+
+
+def _inside_plane(problem: Problem, position: NDArray[np.float64], measured: Mask) -> Mask:
+    """Which onsets (samples, 2) lie at a node that was not measured."""
+    interface = problem.interface
+    position = position.reshape(-1, 2)
+    nodes = [
+        np.round(np.nan_to_num(place) / spacing).astype(np.int64) % count
+        for place, spacing, count in zip(
+            position.T, interface.spacings, interface.shape, strict=True
+        )
+    ]
+    maps = np.broadcast_to(measured, (len(position), interface.size))
+    rows = np.arange(len(position))
+    known = np.isfinite(position).all(axis=1)
+    inside: Mask = known & ~maps.reshape(-1, *interface.shape)[rows, nodes[0], nodes[1]]
+    if inside.any():
+        x, y = position[int(np.argmax(inside))]
+        warn_accuracy(
+            f"the onset at x = {x:.6g} m, y = {y:.6g} m lies in a gap of the map: the strength"
+            " there was filled in, not measured"
+        )
+    return inside
 
 
 def _inside(problem: Problem, position: NDArray[np.float64], measured: Mask) -> Mask:

@@ -11,7 +11,8 @@ from stiction._model import real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
-from stiction.profile_files import NETCDF, read_netcdf, read_npy
+from stiction.profile_files import NETCDF, TEXT, decoded, read_netcdf, read_npy
+from stiction.profile_text import Table, read_table
 from stiction.units import factor_to
 
 TOLERANCE = 0.02
@@ -85,9 +86,12 @@ def read_plane(
     """The same from a .npy file of shape (nx, ny), in SI or in `unit`, or a NetCDF file."""
     if path.suffix.lower() in NETCDF:
         return on_plane(read_netcdf(path, 2), quantity, si, interface, value, unit)
+    if path.suffix.lower() in TEXT:
+        return _from_table(read_table(decoded(path)), quantity, si, interface, value, unit)
     if path.suffix.lower() != ".npy":
         raise InputError(
-            f"a profile of a plane is an array (nx, ny) in a .npy or .nc file, got {path.name!r}"
+            "a profile of a plane is an array (nx, ny) in a .npy or .nc file, or text with the"
+            f" columns x, y and value, got {path.name!r}"
         )
     array = read_npy(path)
     if array.shape == interface.shape[::-1] != interface.shape:
@@ -98,3 +102,56 @@ def read_plane(
     if array.shape != interface.shape:
         raise InputError(f"must have shape {interface.shape}, got shape {array.shape}")
     return array * (factor_to(si, unit) if unit else 1.0)
+
+
+def _from_table(
+    table: Table, quantity: str, si: str, interface: Interface, value: Any, unit: str | None
+) -> Array:
+    """Values at the nodes from columns x, y and value; NaN where there is none."""
+    names = [str(name).casefold() for name in table.names]
+    if "x" not in names or "y" not in names:
+        raise InputError(
+            "a map as text needs a line of names, with columns called 'x', 'y' and the value's, got"
+            f" {', '.join(repr(name) for name in table.names)}"
+        )
+    rest = [i for i, name in enumerate(names) if name not in ("x", "y")]
+    chosen = [i for i in rest if table.names[i] == value or i == value]
+    called = [i for i in rest if names[i] == quantity]
+    if value is not None and not chosen:
+        raise InputError(unknown_name("value", str(value), [str(table.names[i]) for i in rest]))
+    column = (chosen or called or rest)[0]
+    if len(rest) > 1 and not chosen and not called:
+        raise InputError("holds several columns beside x and y; say which is meant: value=...")
+    stated = table.units[column]
+    if not (chosen or called or unit or stated):
+        raise InputError(
+            f"its column {table.names[column]!r} is not plainly the {quantity} ({si}): call it so,"
+            " state its unit, or say which it is with value=..."
+        )
+    found = np.full(interface.shape, np.nan)
+    index = []
+    for dim, spacing, count in zip(
+        interface.dims, interface.spacings, interface.shape, strict=True
+    ):
+        at = names.index(dim)
+        place = table.columns[at] * factor_to("m", table.units[at] or "m") / spacing
+        off = np.abs(place - np.round(place))
+        if not np.all(off <= TOLERANCE):
+            raise InputError(
+                f"{dim} must lie at the nodes, {spacing:.6g} m apart; {dim} ="
+                f" {place[int(np.argmax(~(off <= TOLERANCE)))] * spacing:.6g} m does not"
+            )
+        if place.min() < -TOLERANCE or place.max() > count - 1 + TOLERANCE:
+            raise InputError(
+                f"{dim} reaches from {place.min() * spacing:g} to {place.max() * spacing:g} m, the"
+                f" nodes from 0 to {(count - 1) * spacing:g} m; check its unit"
+            )
+        index.append(np.round(place).astype(np.int64))
+    flat = np.ravel_multi_index(index, interface.shape)
+    if np.unique(flat).size < flat.size:
+        raise InputError("repeats a place: two lines have the same x and y")
+    found.ravel()[flat] = table.columns[column]
+    given = None if unit is None or stated is None else factor_to(si, stated)
+    if given is not None and not np.isclose(given, factor_to(si, str(unit)), rtol=1e-12):
+        raise InputError(f"{quantity} is said to be in {unit}, the source states {stated}")
+    return found * factor_to(si, unit or stated or si)

@@ -18,10 +18,12 @@ from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.plane_gaps import close_gaps
 from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
 from stiction.profile_text import Table, read_table
+from stiction.topographies import is_topography, mapped
 from stiction.units import factor_to, parse
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ UNITS = {
     "fracture_energy": "J/m2",
     "load_profile": "1",
     "slip": "m",
+    "friction_coefficient": "1",
 }
 """What can be a profile, and its SI unit."""
 
@@ -52,6 +55,7 @@ _NAMES = {
     "fracture_energy": ("gamma",),
     "load_profile": ("profile", "load"),
     "slip": ("d", "delta"),
+    "friction_coefficient": ("mu", "coefficient"),
 }
 _PLACES = ("x", "position", "pos", "distance", "coordinate")
 _SAMPLES = ("sample", "samples", "kept_sample")
@@ -110,7 +114,8 @@ def read_profile(
     source : path, xarray.DataArray or xarray.Dataset
         ``.npy``: shape (nodes,), or columns. ``.csv``, ``.txt``, ``.dat``, ``.tsv``: columns
         separated by semicolons, tabs, commas or blanks, with or without a line of names, such as
-        ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate.
+        ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. Also a
+        line scan or map of the SurfaceTopography library, with `strength`.
     x, value : str or int, optional
         Name or number (from 0) of the column, coordinate or variable. Without them: the columns
         that are called so (``x``, ``position``; ``strength``, ``tau_p``), the only variable whose
@@ -120,14 +125,15 @@ def read_profile(
         that contradicts the source is refused.
     quantity : str
         What it is: 'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
-        'weakening_rate' (Pa/m), 'critical_slip' (m) or 'load_profile' (1).
+        'weakening_rate' (Pa/m), 'critical_slip' (m), 'load_profile' or 'friction_coefficient' (1).
     strength : callable, optional
         Map from another measured quantity, such as heights in SI units, to the strength in Pa;
         nothing is taken for a strength without one.
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
         in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
-        shape (nx, ny), or from ``.nc`` or labelled arrays over 'x' and 'y'.
+        shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y', or text with the columns x, y
+        and value in any order of lines.
     interpolate : bool
         Whether points may lie elsewhere than the nodes; then linearly between them.
     gaps : {"refuse", "fill", "skip"}
@@ -176,8 +182,16 @@ def read_profile(
         raise InputError(f"interface: must be an Interface, got {describe(interface)}")
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
+    if is_topography(source):
+        try:
+            source, strength = mapped(source, strength, quantity, UNITS[quantity]), None
+        except InputError as error:
+            raise InputError([_prefixed(name, text) for text in error.problems]) from None
+        if interface is None:
+            return source
     if interface is not None and interface.is_plane:
-        return _of_plane(name, source, quantity, interface, value, unit, (x, x_unit, strength))
+        others = (x, x_unit, strength)
+        return _of_plane(name, source, quantity, interface, value, unit, others, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
@@ -209,6 +223,7 @@ def _of_plane(
     value: Any,
     unit: str | None,
     others: tuple[Any, ...],
+    gaps: Gaps,
 ) -> xr.DataArray:
     """`read_profile` of a plane, which takes values at the nodes only."""
     import xarray as xr
@@ -225,12 +240,15 @@ def _of_plane(
         values = read(given, quantity, UNITS[quantity], interface, value, unit)
         if values.shape != interface.shape:
             raise InputError(f"must hold one profile, got shape {values.shape}")
+        values, measured = close_gaps(values, interface, gaps)
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
-    coords = {
+    coords: dict[str, Any] = {
         dim: (dim, place, {"units": "m", "long_name": f"position along {dim}"})
         for dim, place in interface.coordinates.items()
     }
+    if measured is not None:
+        coords[MEASURED] = (interface.dims, measured, {"long_name": "measured, not filled in"})
     attributes = {"units": UNITS[quantity], "long_name": quantity.replace("_", " ")}
     return xr.DataArray(values, dims=interface.dims, coords=coords, name=quantity, attrs=attributes)
 
@@ -517,6 +535,14 @@ def _magnitude(value: Any, si: str) -> Any:
     return value
 
 
+def _and_own_gaps(measured: Any, source: Any) -> Any:
+    """Where a map was measured, those that were filled earlier taken into account."""
+    if MEASURED not in getattr(source, "coords", {}):
+        return measured
+    own = source.coords[MEASURED].transpose("x", "y").values.astype(bool)
+    return own if measured is None else measured & own
+
+
 def at_nodes(
     name: str, value: Any, quantity: str, interface: Interface, gaps: Gaps = "refuse"
 ) -> AtNodes:
@@ -527,7 +553,11 @@ def at_nodes(
     try:
         value = simplified(value, quantity)
         if is_labelled(value) and interface.is_plane:
-            return AtNodes(on_plane(value, quantity, UNITS[quantity], interface), None)
+            found = on_plane(value, quantity, UNITS[quantity], interface)
+            if found.shape[-2:] != interface.shape:
+                return AtNodes(found, None)
+            filled = close_gaps(found, interface, gaps)
+            return AtNodes(filled.values, _and_own_gaps(filled.measured, value))
         if is_labelled(value):
             points = labelled(value, quantity)
             if points.x is None and points.values.shape[1:] == (1,):  # one value a sample
@@ -537,6 +567,8 @@ def at_nodes(
             return points.on(interface, interpolate=False, gaps=gaps)
         if gaps != "refuse":
             array = real_array(value)
+            if interface.is_plane and array.shape[-2:] == interface.shape:
+                return close_gaps(array, interface, gaps)
             if array.shape[-1:] == (interface.size,) and np.isnan(array).any():
                 return in_order(array, interface, gaps)
     except TypeError:

@@ -154,7 +154,15 @@ def log_densities_at(samples, points, error=0.0, bound=-np.inf):
     out = np.empty((1, points.size))
     one = np.ones(1)
     log_likelihoods(
-        np.zeros((1, 1), dtype=np.int64), one[:, None], 0.0 * one, one, error, found, points, out
+        np.zeros((1, 1), dtype=np.int64),
+        one[:, None],
+        0.0 * one,
+        one,
+        error,
+        found,
+        points,
+        -np.inf,
+        out,
     )
     return out[0]
 
@@ -177,10 +185,9 @@ def test_density_far_out_falls_and_stays_finite():
     assert found[2] < found[1] < found[0] < -5.0
 
 
-# The rule for errors of the load cell wants a density that is smooth within them.
 @pytest.mark.parametrize(
     ("shape", "error", "most"),
-    [(1.5, 0.0, 0.03), (4.0, 0.0, 0.01), (4.0, 0.6, 0.01), (1.5, 3.0, 0.01)],
+    [(1.5, 0.0, 0.03), (4.0, 0.0, 0.01), (4.0, 0.6, 0.01), (1.5, 0.2, 0.04), (1.5, 3.0, 0.01)],
 )
 def test_density_above_a_bound(shape, error, most):
     """Gamma distributions, one of which begins steeply at its bound, with a load cell's error."""
@@ -217,6 +224,19 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
         assert likely.sum() >= 2
         # Linear between nodes; where a test is likely that costs a hundredth of its density.
         np.testing.assert_allclose(found[likely], exact[likely], atol=0.03)
+
+
+def test_points_that_are_given_up_are_hopeless():
+    prior = make_prior(PROBLEM, STRENGTH, THREE)
+    likelihood = make_likelihood(model_of(prior), [1e6 * np.linspace(0.68, 0.74, 9)], [None])
+    u = np.random.default_rng(0).random((3000, 3))
+    whole = likelihood(u)
+    floor = whole.max() - 40.0
+    quick = likelihood(u, floor)
+    kept = np.isfinite(quick)
+    assert (~kept & np.isfinite(whole)).sum() > 1000
+    np.testing.assert_array_equal(quick[kept], whole[kept])
+    assert whole[~kept].max() < floor
 
 
 def test_grid_against_a_sum_by_hand():

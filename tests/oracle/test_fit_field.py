@@ -87,11 +87,12 @@ def test_correlation_length_against_a_variogram():
     fit = st.fit_field(
         values, piece, marginal="lognormal", spectrum="exponential", bootstrap=20, progress=False
     )
-    bins = np.arange(0.0, 3e-3, 1e-4)
-    centres, gamma = gstools.vario_estimate(piece.x, values, bins)
+    bins = np.arange(0.0, 3.0, 0.1)  # mm, MPa: its search begins at numbers about one
+    centres, gamma = gstools.vario_estimate(1e3 * piece.x, 1e-6 * values, bins)
     model = gstools.Exponential(dim=1)
     model.fit_variogram(centres, gamma, nugget=False)
     # 400 correlation lengths: either is within some 10 per cent of the truth.
     assert fit.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.2)
-    assert model.len_scale == pytest.approx(1e-3, rel=0.25)
-    assert fit.parameters["spectrum.correlation_length"] == pytest.approx(model.len_scale, rel=0.3)
+    assert model.len_scale == pytest.approx(1.0, rel=0.25)
+    ours = 1e3 * fit.parameters["spectrum.correlation_length"]
+    assert ours == pytest.approx(model.len_scale, rel=0.3)

@@ -2,26 +2,30 @@
 
 import functools
 import math
+import re
+from pathlib import Path
 
 import pytest
 
 from stiction.papers.albertini2020.claims import CLAIMS, Verdict
 from stiction.papers.albertini2020.claims import limits as table
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
+from stiction.papers.albertini2020.claims.combined_rules import (
     All,
-    Below,
-    Chance,
     Construction,
     EachReading,
+    Hypotheses,
+    Softly,
+)
+from stiction.papers.albertini2020.claims.rules import (
+    Above,
+    Below,
+    Chance,
     Falling,
     Graded,
-    Hypotheses,
     Never,
     Printed,
     Rising,
     SameCount,
-    Softly,
     Within,
     near,
     worst,
@@ -212,3 +216,20 @@ def test_every_limit_has_a_reason():
 def test_every_rule_says_what_it_asks():
     for name, claim in CLAIMS.items():
         assert len(claim.rule.text) > 5, name
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
+
+
+def test_the_page_has_every_statement_with_its_rule():
+    for claim in CLAIMS.values():
+        row = f"| {claim.where} | {claim.says} | `{claim.name}` | {claim.rule.text} |"
+        assert row in PAGE, claim.name
+    named = set(re.findall(r"\| `([a-z-]+)` \| ", PAGE.partition("## Statements")[2]))
+    assert named == set(CLAIMS)
+
+
+def test_the_page_has_every_limit_with_its_reason():
+    for limit in table.LIMITS.values():
+        assert f"| {limit.word} |" in PAGE
+        assert limit.reason in PAGE

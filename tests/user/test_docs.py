@@ -1,13 +1,17 @@
 """What the pages of docs/ show: python that runs, study files that parse, links, names."""
 
 import re
+import runpy
+import shutil
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import stiction as st
+from stiction.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -39,6 +43,41 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
     scope = {"st": st, "problem": problem, "strength": strength}
     run_blocks("docs/studies.md", scope, samples=4)
     assert scope["result"]["critical_stress"].dims == ("correlation_length", "length", "sample")
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
+    """Every block and command, with fewer repetitions."""
+    page = "docs/from-a-profile-to-a-failure-probability.md"
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
+    scope = {}
+    for block in blocks(page, "python"):
+        block = block.replace("bootstrap=200", "bootstrap=20").replace("[:20]", "[:2]")
+        exec(compile(block.replace("seed=1)", "seed=1, target_cov=0.3)"), page, "exec"), scope)
+    fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
+    for name, value in truth.items():
+        assert fit.parameters[name] == pytest.approx(value, rel=0.2)
+    assert 0.0 < scope["found"].probability < 0.5
+    assert 1.0 < scope["design"].safety_factor < 3.0
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", (ROOT / page).read_text("utf-8"), re.M | re.S)
+    (command,) = (text for language, text in fenced if not language)
+    arguments = command.replace("--bootstrap 200", "--bootstrap 20").split()
+    assert arguments[0] == "stiction"
+    result = CliRunner().invoke(app, arguments[1:], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    joint = st.Problem(**tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"])
+    assert joint == scope["joint"]
+
+
+def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
+    script = runpy.run_path(str(ROOT / "examples" / "data" / "make_strength_profile.py"))
+    text = (ROOT / "examples" / "data" / "strength_profile.csv").read_text("utf-8")
+    assert "synthetic" in text.splitlines()[0]
+    profile = st.read_profile(ROOT / "examples" / "data" / "strength_profile.csv")
+    x, strength = script["record"]()
+    np.testing.assert_allclose(profile["x"], 1e-3 * x, atol=1e-9)  # to the digits of the file
+    np.testing.assert_allclose(profile, 1e6 * strength, atol=51.0)
 
 
 @pytest.mark.slow

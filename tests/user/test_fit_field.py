@@ -50,8 +50,8 @@ def test_units_that_are_stated_are_converted(plain):
     other = st.fit_field(labelled(VALUES * 1e-6, PIECE.x * 1e3, "MPa", "mm"), **QUICK)
     for name, value in plain.parameters.items():
         assert other.parameters[name] == pytest.approx(value, rel=1e-6), name
-    with pytest.raises(st.InputError, match="unknown unit 'furlong'"):
-        st.fit_field(labelled(x_unit="furlong"), **QUICK)
+    with pytest.raises(st.InputError, match="unknown unit 'banana'"):
+        st.fit_field(labelled(x_unit="banana"), **QUICK)
     with pytest.raises(st.InputError, match="no unit of stress"):
         st.fit_field(labelled(unit="um"), **QUICK)
 
@@ -119,7 +119,7 @@ def test_maps_are_fitted_too():
         (labelled(np.where(np.arange(COUNT) == 3, np.inf, VALUES)), "must be finite; entry 3"),
         ("profile.csv", "st.read_profile"),
         ([], "none were given"),
-        (labelled(-VALUES), "400 of 400 values .* do not lie between the bounds"),
+        (labelled(-VALUES), "400 of 400 values.* do not lie between the bounds"),
     ],
 )
 def test_records_that_cannot_be_fitted_are_refused(profiles, text):
@@ -205,3 +205,27 @@ def test_the_command_writes_a_page_and_a_field(tmp_path):
     stated = re.search(r"mean +([\d.e+]+)", result.output)
     assert stated is not None
     assert found.mean == pytest.approx(float(stated[1]), rel=1e-3)
+
+
+class LineScan:
+    """Stands in for a line scan of SurfaceTopography: the members that are used, and no more."""
+
+    unit = "um"
+    physical_sizes = (80_000.0,)
+    is_uniform = True
+
+    def heights(self):
+        heights = np.ma.asarray(VALUES * 1e-6)  # um
+        heights[5] = np.ma.masked
+        return heights
+
+
+def test_heights_of_a_topography_need_a_map_and_keep_their_unit():
+    with pytest.raises(st.InputError, match="holds heights, which are no strength"):
+        st.read_profile(LineScan())
+    found = st.read_profile(LineScan(), strength=lambda h: 1e12 * h)  # of heights in m
+    assert found["x"].values[1] == pytest.approx(SPACING)
+    expected = np.where(np.arange(COUNT) == 5, np.nan, VALUES)
+    np.testing.assert_allclose(found, expected)
+    fit = st.fit_field(found, gaps="skip", **QUICK)
+    assert fit.field.mean == pytest.approx(np.nanmean(expected), rel=0.02)

@@ -105,14 +105,16 @@ def test_a_second_length_tells_more():
 
 
 def test_equilibrium_after_the_local_criterion():
-    """Its onset is lower, so the strength that goes with the same peaks is higher."""
     local = infer(samples=None)
-    exact = infer(method=st.Equilibrium(), samples=100)
+    exact = infer(method=st.Equilibrium(), samples=150)
     assert exact.method == "equilibrium"
     assert any("every parameter was simulated" in note for note in exact.notes)
+    first = exact.likelihood.model
+    assert np.all(first.high - first.low < 0.5)  # only where the first stage found anything
     shift = exact.mean("marginal.low") - local.mean("marginal.low")
-    # The local criterion is about 0.1 % high at xi_0/h_n = 0.6.
-    assert 0.0 < shift < 5e3
+    # The local criterion is 0.1 % high at xi_0/h_n = 0.6, a tenth of the posterior's width; the
+    # rest is the shape of a distribution known from 150 samples.
+    assert abs(shift) < 0.5 * local.draws["marginal.low"].std()
 
 
 def test_positions_tell_where_the_load_varies():

@@ -300,8 +300,8 @@ def test_gaps_are_named_filled_on_request_and_remembered(system, strength, recwa
     again = (profile * 2.0)[::-1]
     assert "in_gap" in st.onset(system, again, method=st.LocalCriterion())
     assert "in_gap" not in st.onset(system, strength, method=st.LocalCriterion(), gaps="fill")
-    with pytest.raises(st.InputError, match="gaps: must be 'refuse' or 'fill'"):
-        found(system, strength, gaps="skip")
+    with pytest.raises(st.InputError, match="gaps: must be 'refuse', 'fill' or 'skip'"):
+        found(system, strength, gaps="drop")
 
 
 def test_an_onset_in_a_gap_is_called_that(system, strength):

@@ -16,6 +16,7 @@ from stiction import __version__
 from stiction.cli.common import echo
 from stiction.cli.explore import explore
 from stiction.cli.fit import fit
+from stiction.cli.infer import infer
 from stiction.cli.onset import onset
 from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
@@ -71,6 +72,7 @@ for command in (
     rupture,
     reliability,
     fit,
+    infer,
     check,
     schema,
     status,

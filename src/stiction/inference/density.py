@@ -7,7 +7,8 @@ onset itself where there is no bound (Wand, Marron and Ruppert, 1991). Their wid
 (1986, section 3.4.2), and what it adds to the variance is taken from the sample (section 6.1.2).
 Densities are tabulated in units in which v has mean 0 and variance 1, where they hardly change from
 node to node. The error of the load cell is integrated: by Gauss and Hermite's rule where it is
-small against the spread of the onset, over the onset's distribution where it is not.
+small against the spread of the onset, Legendre's between the bound and where the error ends where
+it reaches the bound, and over the onset's distribution where it is large.
 """
 
 from __future__ import annotations
@@ -30,8 +31,13 @@ REACH = 10.0
 STEP = 0.05
 LARGE = 0.6
 """Load-cell error over the spread of the onset from which on it is not small."""
-_ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
+MODE = 1.0
+"""Logarithm of the density of no standardised onset is above this: of a normal one it is -0.9."""
+_ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_PLACES, _PARTS = np.polynomial.legendre.leggauss(16)
+NEAR = 4.5
+"""Standard deviations of the load cell that matter; nearer to the bound, the rule is Legendre's."""
 
 
 class Densities(NamedTuple):
@@ -160,12 +166,14 @@ def log_likelihoods(
     error: float,
     densities: Densities,
     peaks: Array,
+    floor: float,
     out: Array,
 ) -> None:
     """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
 
     Bound, mean and spread are linear between nodes, and so is the logarithm of the standardised
-    density.
+    density. A point whose sum would fall below `floor` even if all peaks to come were at the mode
+    is given up, and the rest of its row is -inf.
     """
     for i in range(index.shape[0]):
         near, share = index[i], weight[i]
@@ -175,10 +183,21 @@ def log_likelihoods(
         own = error / stretch[i]
         typical = spread * math.exp(mean) if bounded else spread
         large = own > LARGE * typical
+        at_mode = MODE - math.log(stretch[i] * math.hypot(typical, own))
+        hopeless, so_far = False, 0.0
         for j in range(peaks.size):
+            if hopeless:
+                out[i, j] = -np.inf
+                continue
             y = (peaks[j] - shift[i]) / stretch[i]
             top, total = -np.inf, 0.0
-            count = COARSE if large else (_ABSCISSAE.size if own > 0.0 else 1)
+            near_bound = bounded and own > 0.0 and y - NEAR * own < bound and not large
+            width = max(y, bound) + NEAR * own - bound
+            count = _ABSCISSAE.size if own > 0.0 else 1
+            if large:
+                count = COARSE
+            elif near_bound:
+                count = _PLACES.size
             for k in range(count):
                 if large:
                     z = _blend(densities.groups[:, k], near, share)
@@ -187,13 +206,19 @@ def log_likelihoods(
                     mass = _blend(densities.shares[:, k], near, share)
                     value = math.log(mass / (own * math.sqrt(2.0 * math.pi))) - 0.5 * away * away
                 else:
-                    x = y if own == 0.0 else y - own * _ABSCISSAE[k]
+                    x = y if own == 0.0 else y - own * _ABSCISSAE[k % _ABSCISSAE.size]
+                    if near_bound:
+                        x = bound + 0.5 * width * (1.0 + _PLACES[k])
                     if bounded and x <= bound:
                         continue
                     v = math.log(x - bound) if bounded else x
                     value = _interpolated(densities.table, near, share, (v - mean) / spread)
                     value -= math.log(spread) + (v if bounded else 0.0)
-                    if own > 0.0:
+                    if near_bound:
+                        away = (y - x) / own
+                        part = 0.5 * width * _PARTS[k] / (own * math.sqrt(2.0 * math.pi))
+                        value += math.log(part) - 0.5 * away * away
+                    elif own > 0.0:
                         value += math.log(_WEIGHTS[k])
                 if value > top:
                     total = total * math.exp(top - value) + 1.0
@@ -201,3 +226,5 @@ def log_likelihoods(
                 elif value > -np.inf:
                     total += math.exp(value - top)
             out[i, j] = (top + math.log(total) if total > 0.0 else -np.inf) - math.log(stretch[i])
+            so_far += out[i, j]
+            hopeless = so_far + (peaks.size - 1 - j) * at_mode < floor

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc
 
 from stiction._checks import check_count, check_progress, is_finite, is_whole
 from stiction._model import describe
-from stiction._progress import Meter, Show
+from stiction._progress import SILENT, Meter, Show
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.evaluation import Method, check_method
-from stiction.inference.likelihood import Model, make_likelihood, make_model, varies
+from stiction.inference.grid import grid_of
+from stiction.inference.likelihood import Likelihood, Model, make_likelihood, make_model, varies
 from stiction.inference.posterior import predicted
 from stiction.inference.prior import Prior, make_prior
 from stiction.problem import Problem
@@ -26,9 +26,10 @@ from stiction.results import Variable, to_dataset
 
 OPTIONS = ("tests", "known", "positions", "load_cell_error")
 REPETITIONS = 60
-LOG2_POINTS = 13
-"""Of the number of points of the prior by which a posterior is weighed."""
-BINS = 24
+POINTS = 8_000
+"""Of the grid of each posterior."""
+UNIFORM = 12.0**-0.5
+"""Standard deviation of u before any test."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,8 @@ def design_of_tests(
     Notes
     -----
     Expected information gain (Lindley, 1956) by nested Monte Carlo: parameters are drawn from the
-    prior, peaks from the same onsets that serve the likelihood, and the posterior is a weighted
-    set of points of the prior, the same for every design. Known parameters are drawn and then held
+    prior, peaks from the same onsets that serve the likelihood, and the posterior is that of
+    `infer` on a coarser grid. Known parameters are drawn and then held
     at what was drawn.
 
     Examples
@@ -220,22 +221,23 @@ def _told(
     specimens = tuple(model.specimens[lengths.index(length)] for length in design.tests)
     own = replace(model, error=design.load_cell_error, specimens=specimens)
     free = [i for i, name in enumerate(prior.names) if name not in design.known]
-    points = qmc.Sobol(len(free), seed=0).random_base2(LOG2_POINTS)
-    before = points.std(axis=0)
     gains = np.full((repetitions, prior.dimension), np.nan)
     left = np.full((repetitions, prior.dimension), np.nan)
     for number in range(repetitions):
         truth = rng.random(prior.dimension)
-        peaks, places = _campaign(own, design, truth, rng)
-        likelihood = make_likelihood(own, peaks, places, quiet=True)
-        u = np.tile(truth, (points.shape[0], 1))
-        u[:, free] = points
-        mass = _weights(likelihood(u))
+        likelihood = make_likelihood(own, *_campaign(own, design, truth, rng), quiet=True)
+
+        def given_what_is_known(
+            v: Array, floor: float, truth: Array = truth, likelihood: Likelihood = likelihood
+        ) -> Array:
+            u = np.tile(truth, (v.shape[0], 1))
+            u[:, free] = v
+            return likelihood(u, floor)
+
+        grid = grid_of(given_what_is_known, own.low[free], own.high[free], SILENT, POINTS)
         for place, i in enumerate(free):
-            gains[number, i] = _divergence(points[:, place], mass)
-            mean = mass @ points[:, place]
-            spread = np.sqrt(mass @ (points[:, place] - mean) ** 2)
-            left[number, i] = spread / before[place]
+            gains[number, i] = grid.information(place)
+            left[number, i] = grid.spread(place) / UNIFORM
         meter.advance()
     error = gains.std(axis=0) / np.sqrt(repetitions)
     return np.stack([gains.mean(axis=0), error, left.mean(axis=0)])
@@ -253,19 +255,3 @@ def _campaign(
         peaks.append(own)
         places.append(where if design.positions else None)
     return peaks, places
-
-
-def _weights(values: Array) -> Array:
-    mass = np.exp(values - values.max())
-    return np.asarray(mass / mass.sum(), dtype=np.float64)
-
-
-def _divergence(u: Array, mass: Array) -> float:
-    """Divergence of weighted points from the uniform distribution, nats, by a histogram.
-
-    Corrected for the number of points that carry the weight, after Miller and Madow.
-    """
-    share = np.histogram(u, bins=BINS, range=(0.0, 1.0), weights=mass)[0]
-    held = share[share > 0.0]
-    bias = 0.5 * (held.size - 1) * float(mass @ mass)
-    return float(np.sum(held * np.log(held * BINS))) - bias

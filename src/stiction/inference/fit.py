@@ -271,7 +271,7 @@ def fit_field(
     >>> import stiction as st
     >>> truth = st.RandomField(st.Lognormal(mean=1e6, cov=0.2), st.ExponentialSpectrum(1e-3))
     >>> interface = st.Interface(length=0.1, nodes=1000)
-    >>> fit = st.fit_field(truth.sample(interface, seed=1), interface, marginal="lognormal",
+    >>> fit = st.fit_field(truth.sample(interface, seed=2), interface, marginal="lognormal",
     ...                    spectrum="exponential", noise=0.0, bootstrap=40)
     >>> low, high = fit.interval["spectrum.correlation_length"]
     >>> bool(low < 1e-3 < high)

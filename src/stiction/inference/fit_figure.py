@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import fft
 
 from stiction._typing import Array
 from stiction.inference.estimate import bands, simulate
@@ -117,7 +118,7 @@ def _correlation(axes: Any, details: Details, one: Observed, simulated: list[Arr
 
 def _covariance(power: Array, one: Observed) -> Array:
     """Circular covariance along x of a periodogram."""
-    found: Array = np.fft.irfftn(power, one.window.shape)
+    found: Array = fft.irfftn(power, one.window.shape)
     return found.reshape(found.shape[0], -1)[:, 0]
 
 

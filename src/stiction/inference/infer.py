@@ -79,7 +79,8 @@ def infer(
         How the onset is found. For all but the local criterion that one, where it holds, first
         finds the part of the prior that matters.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`.
+        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
+        coefficient.
     positions : array or mapping of arrays, optional
         Where slip began in each test, m; NaN where it was not seen. It tells something only where
         load or friction vary along the interface.
@@ -142,7 +143,7 @@ def infer(
     if samples is not None:
         samples = check_count("samples", samples, 100)
     measured = make_peaks(peaks, positions, unit)
-    error = _load_cell(load_cell_error, unit, measured)
+    error = _load_cell(load_cell_error, unit, measured, si=isinstance(peaks, Peaks))
     parameters = make_prior(problem, random, prior)
     check_pressure(parameters, measured)
     options: dict[str, Any] = {
@@ -163,13 +164,14 @@ def infer(
         return _posterior(likelihood, measured, sampler, seed, meter)
 
 
-def _load_cell(given: Any, unit: str, peaks: Peaks) -> float:
+def _load_cell(given: Any, unit: str, peaks: Peaks, si: bool) -> float:
     """The load-cell error in the unit of the checked peaks."""
     if not (is_finite(given) and given >= 0.0):
         raise InputError(
             f"load_cell_error: must be a standard deviation >= 0 in {unit}, got {describe(given)}"
         )
-    error = float(given) * factor_to("1" if peaks.coefficients else "Pa", unit)
+    factor = 1.0 if si else factor_to("1" if peaks.coefficients else "Pa", unit)
+    error = float(given) * factor
     values = np.concatenate(peaks.values)
     if error > values.max():
         raise InputError(
@@ -225,6 +227,7 @@ def _posterior(
     prior = model.prior
     diagnostics: dict[str, float] = {}
     total = evidence = float("nan")
+    meter.stage("posterior")
     if sampler == "grid":
         grid = on_grid(likelihood, meter)
         u = grid.draws(DRAWS, seed)[None]

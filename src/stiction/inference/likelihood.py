@@ -68,7 +68,12 @@ class Model:
     high: Array
 
     def log_densities(
-        self, number: int, theta: Array, peaks: Array, densities: Densities | None = None
+        self,
+        number: int,
+        theta: Array,
+        peaks: Array,
+        densities: Densities | None = None,
+        floor: float = -np.inf,
     ) -> Array:
         """Of peaks of specimen `number` at points, (points, peaks)."""
         own = self.specimens[number]
@@ -84,6 +89,7 @@ class Model:
             self.error,
             used,
             np.ascontiguousarray(peaks),
+            floor,
             out,
         )
         return out
@@ -221,12 +227,12 @@ class Likelihood:
     peaks: tuple[Array, ...]
     position_tables: tuple[Array | None, ...]
 
-    def each(self, u: Array) -> Array:
+    def each(self, u: Array, floor: float = -np.inf) -> Array:
         """Logarithm of the likelihood of each test at points u (points, parameters)."""
         theta = self.model.prior.theta(u)
         parts = []
         for number, peaks in enumerate(self.peaks):
-            part = self.model.log_densities(number, theta, peaks)
+            part = self.model.log_densities(number, theta, peaks, floor=floor)
             places = self.position_tables[number]
             if places is not None:
                 index, weight = self.model.specimens[number].table.corners(theta)
@@ -234,12 +240,17 @@ class Likelihood:
             parts.append(part)
         return np.concatenate(parts, axis=1)
 
-    def __call__(self, u: Array) -> Array:
-        """Logarithm of the likelihood at points u (points, parameters); -inf outside the prior."""
+    def __call__(self, u: Array, floor: float = -np.inf) -> Array:
+        """Logarithm of the likelihood at points u (points, parameters).
+
+        -inf outside the prior, and, for speed, where it is below `floor`.
+        """
+        if len(self.peaks) > 1 or self.position_tables[0] is not None:
+            floor = -np.inf  # other parts may make up for it
         inside = np.all((u >= self.model.low) & (u <= self.model.high), axis=1)
         result = np.full(u.shape[0], -np.inf)
         if inside.any():
-            result[inside] = self.each(u[inside]).sum(axis=1)
+            result[inside] = self.each(u[inside], floor).sum(axis=1)
         return result
 
     def of_peaks(self, u: Array, *, without: int | None = None) -> Array:

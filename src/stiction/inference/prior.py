@@ -17,6 +17,7 @@ from stiction._typing import Array
 from stiction.dotted_keys import with_values
 from stiction.errors import InputError
 from stiction.problem import Problem
+from stiction.random.marginals import scipy_marginal
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 
@@ -124,8 +125,11 @@ def full_key(key: str) -> str:
     return f"random.strength.spectrum.{key}"
 
 
-def _distribution(key: str, value: Any) -> Any:
-    """A frozen distribution from one, from two ends, or from a table {low, high, spacing}."""
+def distribution_of(key: str, value: Any) -> Any:
+    """A frozen distribution from one, from two ends, or from a table.
+
+    Tables are {low, high, spacing}, or {type, ...} with scipy's name and parameters.
+    """
     if hasattr(value, "ppf") and hasattr(value, "support"):
         if not hasattr(value, "args"):
             raise InputError(
@@ -136,6 +140,12 @@ def _distribution(key: str, value: Any) -> Any:
             raise InputError(f"prior: {key}: must be a continuous distribution, got a discrete one")
         return value
     spacing = "linear"
+    if isinstance(value, Mapping) and "type" in value:
+        parameters = {name: own for name, own in value.items() if name != "type"}
+        try:
+            return scipy_marginal(str(value["type"]), parameters).distribution
+        except InputError as error:
+            raise InputError([f"prior: {key}: {text}" for text in error.problems]) from None
     if isinstance(value, Mapping):
         unknown = [name for name in value if name not in _RANGE]
         if unknown or not {"low", "high"} <= set(value):
@@ -183,7 +193,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         if twice:
             problems.append(f"prior: {key} and {twice[0]} are the same parameter")
         try:
-            found[key] = _distribution(key, value)
+            found[key] = distribution_of(key, value)
         except InputError as error:
             problems += error.problems
     if problems:

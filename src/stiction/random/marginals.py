@@ -111,7 +111,8 @@ def _parameter_names(family: Any) -> list[str]:
     return [*shapes, "loc", "scale"]
 
 
-def _scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
+def scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
+    """A distribution by scipy's name for it and its parameters, checked."""
     names = [*_continuous_names(), *FAMILIES]
     if name not in names:
         valid = ["beta", *FAMILIES, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
@@ -173,7 +174,7 @@ def _marginal(value: Any) -> Any:
             return Beta(**given)
         if name in FAMILIES and not (name == "gamma" and {"a", "loc", "scale"} & set(given)):
             return FAMILIES[name](**given)
-        return _scipy_marginal(str(name), given)
+        return scipy_marginal(str(name), given)
     family = getattr(value, "dist", None)
     if isinstance(value, scipy.stats.rv_continuous):
         return _marginal(_frozen(value))
@@ -187,7 +188,7 @@ def _marginal(value: Any) -> Any:
         _check_moments(type(family).__name__, value, value.args)
         return PythonMarginal(value)
     parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return _scipy_marginal(name, parameters)
+    return scipy_marginal(name, parameters)
 
 
 def _serialise(value: Any) -> Any:

@@ -104,7 +104,7 @@ def render(
     key_tables: Sequence[Table],
     figures: Sequence[ShownFigure],
     claims: Sequence[tuple[str, Sequence[ShownClaim]]],
-    limits: Table,
+    limits: Table | None = None,
     parameters: Sequence[tuple[str, str]],
     notes: Sequence[str],
     provenance: Sequence[tuple[str, str]],
@@ -123,8 +123,8 @@ def render(
         The results in a few tables.
     figures : sequence of ShownFigure
     claims : sequence of (subject, claims)
-    limits : Table
-        What the words of the paper are taken to mean.
+    limits : Table, optional
+        What the words of claims are taken to mean.
     parameters, provenance : sequences of (name, value)
     notes : sequence of str
         On accuracy.

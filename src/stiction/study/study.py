@@ -45,6 +45,7 @@ from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.errors import InputError, unknown_name
 from stiction.evaluation import methods
+from stiction.inference.settings import Inference
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
@@ -150,6 +151,8 @@ class Study:
         the sweep has the same samples.
     cluster : Cluster, optional
         What ``stiction run --slurm`` asks for; no part of what is computed.
+    inference : Inference, optional
+        What ``stiction infer`` is to find out; no part of what is computed.
     title : str
         For people.
 
@@ -182,6 +185,7 @@ class Study:
     ensemble: Ensemble
     sweep: Sweep = ()
     cluster: Cluster | None = None
+    inference: Inference | None = None
     title: str = ""
 
     @model_validator(mode="after")
@@ -268,7 +272,8 @@ class Study:
             plain = self.to_dict()
         except InputError as error:  # a function of the user's: the result says so
             return {"study_incomplete": str(error), "seed": self.ensemble.seed}
-        plain.pop("cluster", None)
+        for name in ("cluster", "inference"):
+            plain.pop(name, None)
         result: dict[str, Any] = {"study": plain, "seed": self.ensemble.seed}
         return result | ({"title": self.title} if self.title else {})
 

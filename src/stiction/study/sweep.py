@@ -26,7 +26,7 @@ from stiction.results import Variable
 
 MOST_POINTS = 100_000
 _FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
-_FIXED_TABLES = ("title", "sweep", "cluster", "ensemble.keep_limit")
+_FIXED_TABLES = ("title", "sweep", "cluster", "inference", "ensemble.keep_limit")
 _RANGE = ("start", "stop", "count", "spacing")
 _UNITS = {
     "length": "m",

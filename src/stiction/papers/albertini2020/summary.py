@@ -10,8 +10,8 @@ import numpy as np
 
 from stiction.papers.albertini2020.claims import SUBJECTS, Claim, Finding, Verdict
 from stiction.papers.albertini2020.claims.claim import rounded
+from stiction.papers.albertini2020.claims.combined_rules import EachReading
 from stiction.papers.albertini2020.claims.limits import LIMITS
-from stiction.papers.albertini2020.claims.rules import EachReading
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import (
     SCATTER,

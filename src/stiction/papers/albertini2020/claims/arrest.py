@@ -8,10 +8,10 @@ import numpy as np
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All
 from stiction.papers.albertini2020.claims.measures import at_each, at_simulated, one, values
 from stiction.papers.albertini2020.claims.rules import (
     Above,
-    All,
     Below,
     Falling,
     Never,

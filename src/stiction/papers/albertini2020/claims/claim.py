@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from stiction.papers.albertini2020.claims.rules import EachReading, Rule, Verdict
+from stiction.papers.albertini2020.claims.combined_rules import EachReading
+from stiction.papers.albertini2020.claims.rules import Rule, Verdict
 from stiction.papers.albertini2020.data import Data
 from stiction.statistics.estimates import Estimate
 

@@ -8,15 +8,13 @@ from typing import Any
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import CLAIMS, Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, EachReading, Hypotheses
 from stiction.papers.albertini2020.claims.measures import labelled, one
 from stiction.papers.albertini2020.claims.rules import (
     Above,
-    All,
     Below,
-    EachReading,
     Falling,
     Graded,
-    Hypotheses,
     SameCount,
     Verdict,
     Within,

@@ -7,15 +7,9 @@ from scipy.special import ndtr
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All
 from stiction.papers.albertini2020.claims.measures import at_each, labelled, one
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    All,
-    Below,
-    Falling,
-    Rising,
-    near,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Falling, Rising, near
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import nucleation_moments, variance_ratio
 from stiction.statistics.estimates import Estimate, mean

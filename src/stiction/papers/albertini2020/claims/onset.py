@@ -7,13 +7,12 @@ from scipy.stats import ks_2samp, kstest
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import at_each, labelled, pairs
 from stiction.papers.albertini2020.claims.rules import (
     Above,
-    All,
     Below,
     Chance,
-    Construction,
     Falling,
     Rising,
     Verdict,
@@ -282,7 +281,7 @@ def weakest_does_not_govern(data: Data) -> Measured:
     where="Sec. 3.1",
     says="The critical stress is not reached when the first point begins to slip.",
     needs=("monte_carlo",),
-    rule=Construction("an average of the strength over h_n cannot be below its minimum"),
+    rule=Construction("an average of the strength over a length cannot be below its minimum"),
 )
 def above_first_slip(data: Data) -> Measured:
     """tau_cr above the weakest strength of the same sample, mean over <tau_p>."""

@@ -9,16 +9,9 @@ import numpy as np
 from stiction.criterion.eigenproblem import eigenvalues_and_vector, rounded_weight
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import at_each, labelled, one, pairs
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    All,
-    Below,
-    Construction,
-    Graded,
-    Printed,
-    Within,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Graded, Printed, Within
 from stiction.papers.albertini2020.data import Data
 from stiction.statistics.estimates import Estimate, mean, standard_deviation
 
@@ -214,7 +207,9 @@ def correlation_length(data: Data) -> Measured:
     where="Sec. 5.1, Eq. 14",
     says="The fracture energy varies with (tau_p - tau_r)^2: stronger places dissipate more.",
     needs=("griffith",),
-    rule=Construction("W and tau_r are uniform, so that Gamma is a rising function of tau_p"),
+    rule=Construction(
+        "weakening rate and residual strength are uniform, so that a stronger place dissipates more"
+    ),
 )
 def fracture_energy_varies(data: Data) -> Measured:
     """Mean and spread of Gamma(x)."""

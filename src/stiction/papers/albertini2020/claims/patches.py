@@ -8,17 +8,9 @@ import numpy as np
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import at_each, one, values
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    All,
-    Below,
-    Construction,
-    Falling,
-    Graded,
-    Never,
-    Within,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Falling, Graded, Never, Within
 from stiction.papers.albertini2020.data import Data
 from stiction.statistics.estimates import Estimate, mean, share
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Construction
 from stiction.papers.albertini2020.claims.measures import (
     at_each,
     at_simulated,
@@ -14,13 +15,7 @@ from stiction.papers.albertini2020.claims.measures import (
     root_mean_square,
     values,
 )
-from stiction.papers.albertini2020.claims.rules import (
-    All,
-    Below,
-    Construction,
-    Falling,
-    Graded,
-)
+from stiction.papers.albertini2020.claims.rules import Below, Falling, Graded
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import (
     displaced,

@@ -9,14 +9,7 @@ import numpy as np
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
 from stiction.papers.albertini2020.claims.measures import labelled, one, pairs
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    Below,
-    Falling,
-    Graded,
-    Rising,
-    near,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Falling, Graded, Rising, near
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import required_width, variation
 from stiction.papers.albertini2020.studies.summary import estimates

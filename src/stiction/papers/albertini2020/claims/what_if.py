@@ -6,16 +6,9 @@ import numpy as np
 
 from stiction.papers.albertini2020.claims import limits
 from stiction.papers.albertini2020.claims.claim import Measured, Quantity, claim
+from stiction.papers.albertini2020.claims.combined_rules import All, Softly
 from stiction.papers.albertini2020.claims.measures import labelled, one, pairs
-from stiction.papers.albertini2020.claims.rules import (
-    Above,
-    All,
-    Below,
-    Falling,
-    Rising,
-    Softly,
-    Verdict,
-)
+from stiction.papers.albertini2020.claims.rules import Above, Below, Falling, Rising, Verdict
 from stiction.papers.albertini2020.data import Data
 from stiction.papers.albertini2020.derived import scatter
 from stiction.papers.albertini2020.studies.summary import estimates

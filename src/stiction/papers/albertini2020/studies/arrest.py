@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from stiction.dynamics.method import Rupture
 from stiction.equilibrium.events import equilibrium_events
 from stiction.evaluation import onset
 from stiction.papers.albertini2020.studies.context import Context, work
@@ -29,28 +28,29 @@ def compute(context: Context) -> xr.Dataset:
     setting = context.setting
     problem = setting.problem
     found = context.results["interaction"]["arrested_events"]
-    rows: list[tuple[float, int, float, float, float]] = []
-    method: Rupture = METHOD
-    for ratio in setting.correlation_ratios:
-        samples = np.flatnonzero(found.sel(correlation_ratio=ratio).values > 0)[:MOST]
-        field = setting.field(ratio)
-        for number in samples:
-            profile = field.sample(
-                problem.interface, samples=1, seed=context.seed, first=int(number)
-            )
-            events = equilibrium_events(problem, profile)
-            run = onset(problem, profile, method=method)
-            rows.append(
-                (
-                    ratio,
-                    int(number),
-                    float(events["length"].values.max(initial=0.0)),
-                    float(events["load"].values.min(initial=np.inf)),
-                    float(run["arrested_events"].values[0]),
-                )
-            )
-            context.report(work(method, 1))
-        context.report(work(method, MOST - samples.size))
+    chosen = [
+        (ratio, int(number))
+        for ratio in setting.correlation_ratios
+        for number in np.flatnonzero(found.sel(correlation_ratio=ratio).values > 0)[:MOST]
+    ]
+
+    def again(which: tuple[float, int]) -> tuple[float, int, float, float, float]:
+        ratio, number = which
+        profile = setting.field(ratio).sample(
+            problem.interface, samples=1, seed=context.seed, first=number
+        )
+        events = equilibrium_events(problem, profile)
+        run = onset(problem, profile, method=METHOD, progress=False)
+        return (
+            ratio,
+            number,
+            float(events["length"].values.max(initial=0.0)),
+            float(events["load"].values.min(initial=np.inf)),
+            float(run["arrested_events"].values[0]),
+        )
+
+    rows = context.map(again, chosen, work(METHOD, 1))
+    context.report(cost(context) - work(METHOD, len(chosen)))
     columns = np.array(rows, dtype=np.float64).reshape(-1, 5)
     return xr.Dataset(
         {

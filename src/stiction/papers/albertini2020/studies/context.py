@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import xarray as xr
 
@@ -16,6 +18,9 @@ from stiction.papers.albertini2020.setting import Setting
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 WORK = {"equilibrium": 15, "rupture": 4000}
 """Cost of a sample by method, in samples by the local criterion (about 50 microseconds)."""
@@ -100,6 +105,15 @@ class Context:
             ),
             weight * work(method, 1),
         )
+
+    def map(self, work: Callable[[Item], Found], items: Iterable[Item], each: int) -> list[Found]:
+        """`work` of every item, in threads, in the order of the items; each counts as `each`."""
+        found = []
+        with ThreadPoolExecutor(self.workers or os.cpu_count()) as pool:
+            for result in pool.map(work, items):
+                found.append(result)
+                self.report(each)
+        return found
 
     def listen(
         self, compute: Callable[[Callable[[int, int], None]], xr.Dataset], each: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -25,7 +26,9 @@ SAMPLES = 16
 EVENTS = 12
 """Arrested events kept of each sample."""
 _NODES = 512
+_EVENT_COST = 20  # of a sample with many events, in samples without
 _RATE = 2e7  # Pa/s, as in the other ruptures
+RUPTURE = work(Rupture(loading_rate=_RATE), 1)
 _HELD = 1.005  # of the load of the first arrested event: what inertia is given
 _PATIENCE = 1e-3  # s, longest rupture that is waited for
 _SLIPPED = 1e-2  # of the largest slip, from which a node belongs to the arrested patch
@@ -55,11 +58,8 @@ def problem_of(setting: Setting, load: Load) -> Problem:
 
 def cost(context: Context) -> int:
     """Events by equilibrium, and as many ruptures."""
-    return (
-        len(cases(context.setting))
-        * SAMPLES
-        * (work(Equilibrium(), 20) + work(Rupture(loading_rate=_RATE), 1))
-    )
+    each = work(Equilibrium(), _EVENT_COST) + RUPTURE
+    return len(cases(context.setting)) * SAMPLES * each
 
 
 def compute(context: Context) -> xr.Dataset:
@@ -70,7 +70,9 @@ def compute(context: Context) -> xr.Dataset:
     for load in cases(setting).values():
         problem = problem_of(setting, load)
         field = setting.field(ratio)
-        found = context.monte_carlo(problem, field, Equilibrium(events=EVENTS), SAMPLES, weight=20)
+        found = context.monte_carlo(
+            problem, field, Equilibrium(events=EVENTS), SAMPLES, weight=_EVENT_COST
+        )
         profiles = field.sample(problem.interface, samples=SAMPLES, seed=context.seed)
         energy = _energy(problem, profiles)
         length, stress = found["event_length"].values, found["event_stress"].values
@@ -84,11 +86,12 @@ def compute(context: Context) -> xr.Dataset:
                 centre=0.5 * problem.interface.extent,
                 arrest=True,
             )
+        arrested = np.flatnonzero(np.isfinite(length[:, 0]))
         dynamic = np.full(SAMPLES, np.nan)
-        for i, profile in enumerate(profiles):
-            if np.isfinite(length[i, 0]):
-                dynamic[i] = _with_inertia(problem, profile, float(stress[i, 0]))
-            context.report(work(Rupture(loading_rate=_RATE), 1))
+        dynamic[arrested] = context.map(
+            partial(_with_inertia, problem, profiles, stress[:, 0]), arrested, RUPTURE
+        )
+        context.report(RUPTURE * (SAMPLES - arrested.size))
         kept = found[["critical_stress", "first_instability", "arrested_events", "event_length",
                       "event_stress", "event_position", "event_moment"]]  # fmt: skip
         kept["griffith_length"] = (("sample", "event"), griffith, {"units": "m"})
@@ -121,9 +124,10 @@ def curve(setting: Setting, case: str, loads: Array) -> Array:
     )
 
 
-def _with_inertia(problem: Problem, profile: Array, stress: float) -> float:
+def _with_inertia(problem: Problem, profiles: Array, stresses: Array, sample: int) -> float:
     """Length of the patch in which a rupture comes to rest under the load at which equilibrium
     has its first arrested event, m; the interface if it does not."""
+    profile, stress = profiles[sample], float(stresses[sample])
     rise = _HELD * stress / _RATE
     run = simulate_rupture(
         problem,

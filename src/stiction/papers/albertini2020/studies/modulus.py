@@ -19,6 +19,7 @@ from stiction.statistics.estimates import Estimate, mean, share
 name = "modulus"
 title = "Plane stress, plane strain, or one for the other"
 
+MOST = 2000
 READINGS = {
     "a": "plane stress throughout",
     "b": "plane strain throughout",
@@ -44,15 +45,19 @@ def cases(setting: Setting) -> dict[str, tuple[Problem, Problem, float]]:
     }
 
 
+def _count(context: Context) -> int:
+    return min(MOST, context.fewer)
+
+
 def cost(context: Context) -> int:
     """Both methods for each reading."""
     each = work(Equilibrium(), 1) + 2 * work(LocalCriterion(), 1)
-    return len(READINGS) * each * context.fewer * len(context.setting.correlation_ratios)
+    return len(READINGS) * each * _count(context) * len(context.setting.correlation_ratios)
 
 
 def compute(context: Context) -> xr.Dataset:
     """Bias and misplaced onsets of the prediction, its share of interaction, and patches."""
-    setting, count = context.setting, context.fewer
+    setting, count = context.setting, _count(context)
     known: dict[Any, xr.Dataset] = {}
 
     def onsets(problem: Problem, unit: float, ratio: float, method: Any) -> xr.Dataset:

@@ -1,0 +1,81 @@
+"""Maps with gaps, and maps as text: the rules of lines, on planes."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+
+PLANE = st.Interface(length=(0.02, 0.01), nodes=(32, 16))
+VALUES = 1e6 + 1e5 * np.sin(2.0 * np.pi * PLANE.x / 0.02)[:, None] * np.ones(16)
+
+
+def text(path, unit="MPa", x_unit="mm", shuffled=True, without=0):
+    x, y = np.meshgrid(*PLANE.coordinates.values(), indexing="ij")
+    lengths, stresses = {"mm": 1e3, "m": 1.0}[x_unit], {"MPa": 1e-6, "Pa": 1.0}[unit]
+    rows = np.column_stack([lengths * x.ravel(), lengths * y.ravel(), stresses * VALUES.ravel()])
+    rows = rows[without:]
+    if shuffled:
+        rows = np.random.default_rng(0).permutation(rows)
+    header = f"x ({x_unit}); y ({x_unit}); strength ({unit})"
+    np.savetxt(path, rows, delimiter=";", header=header, comments="", fmt="%.9g")
+    return path
+
+
+@pytest.mark.parametrize("units", [("MPa", "mm"), ("Pa", "m")])
+def test_maps_as_text_honour_units_and_places(tmp_path, units):
+    path = text(tmp_path / "map.csv", *units)
+    found = st.read_profile(path, interface=PLANE)
+    np.testing.assert_allclose(found, VALUES, rtol=1e-8)  # nine digits in the file
+    path.write_text(path.read_text().replace(f"({units[0]})", "(kg)"))
+    with pytest.raises(st.InputError, match="no unit of stress"):
+        st.read_profile(path, interface=PLANE)
+
+
+def test_a_millimetre_taken_for_a_metre_is_refused(tmp_path):
+    path = text(tmp_path / "map.csv")
+    path.write_text(path.read_text().replace("(mm)", "(m)"))
+    with pytest.raises(st.InputError, match="x must lie at the nodes|check its unit"):
+        st.read_profile(path, interface=PLANE)
+
+
+def test_gaps_are_refused_filled_or_left(tmp_path):
+    path = text(tmp_path / "map.csv", without=3)
+    with pytest.raises(st.InputError, match="at 3 of 512 nodes, the first at x = 0 m, y = 0 m"):
+        st.read_profile(path, interface=PLANE)
+    left = st.read_profile(path, interface=PLANE, gaps="skip")
+    assert int(np.isnan(left).sum()) == 3
+    with pytest.warns(st.AccuracyWarning, match="filled smoothly"):
+        filled = st.read_profile(path, interface=PLANE, gaps="fill")
+    assert int((~filled["measured"]).sum()) == 3
+    # The map varies along x as a sine and is odd about x = 0: Laplace keeps it between its rim.
+    assert np.abs(filled.values[0, :3] - 1e6).max() < 1e3
+
+
+def test_a_filled_gap_is_harmonic():
+    """Of a map that solves the discrete Laplace equation, what is missing is found again."""
+    i, j = np.arange(32)[:, None], np.arange(16)[None, :]
+    plane = 1e6 + 2e3 * (i - 10) - 3e3 * (j - 5)  # linear, away from the edges
+    values = plane.astype(float)
+    values[8:13, 4:9] = np.nan
+    with pytest.warns(st.AccuracyWarning, match="filled"):
+        found = st.read_profile(xr.DataArray(values, dims=("x", "y")), interface=PLANE, gaps="fill")
+    np.testing.assert_allclose(found, plane, rtol=1e-12)
+
+
+def test_an_onset_in_a_gap_of_a_map_says_so():
+    problem = st.Problem(
+        solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
+        interface=PLANE,
+        friction=st.SlipWeakening(weakening_rate=3e11),
+    )
+    values = VALUES.copy()
+    values[22:27, 5:9] = np.nan  # around the weakest line, x = 15 mm
+    values[24, 4] = values[24, 9] = 0.3e6
+    with pytest.raises(st.InputError, match="must be finite"):
+        st.onset(problem, values, method=st.LocalCriterion())
+    with pytest.warns(st.AccuracyWarning, match="lies in a gap of the map"):
+        found = st.onset(problem, values, method=st.LocalCriterion(), gaps="fill")
+    assert bool(found["in_gap"].item())
+    whole = st.onset(problem, VALUES, method=st.LocalCriterion())
+    assert "in_gap" not in whole
