@@ -135,6 +135,11 @@ def other_pages(app, docname, source):
     source[0] = source[0].replace("@other pages@", "\n".join(mine))
 
 
+def links_to_the_list(app, docname, source):
+    """Of all pages: where the source is read it is README.md, here the front page."""
+    source[0] = re.sub(r"\]\((?:\.\./docs/)?README\.md(#[\w-]+)?\)", "](/index.md)", source[0])
+
+
 def with_other_pages(app, environment, added, changed, removed):
     """A new page changes the lists, which did not change themselves."""
     return ["start", "understand"]
@@ -186,6 +191,7 @@ def write_commands(app):
 
 def setup(app):
     app.connect("source-read", other_pages)
+    app.connect("source-read", links_to_the_list)
     app.connect("env-get-outdated", with_other_pages)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)

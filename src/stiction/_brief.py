@@ -67,7 +67,8 @@ def _rows(self: Any) -> Iterator[tuple[str, str, str]]:
     told = _described(type(self))
     for field in dataclasses.fields(self):
         value = getattr(self, field.name)
-        if field.name != "type" and value is not None:
+        shown = field.repr or hasattr(value, "sizes")  # datasets by their sizes
+        if shown and field.name != "type" and value is not None:
             meaning = told.get(field.name, "")
             yield field.name, _html(value, _unit(meaning)), meaning
     for name, derived in inspect.getmembers(type(self), lambda one: isinstance(one, property)):

@@ -29,7 +29,7 @@ def test_space_time_figure_has_its_four_panels(simulated, tmp_path):
     figure = rupture_figure(run, problem)
     assert isinstance(figure, matplotlib.figure.Figure)
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert r"$\tau_p$ (MPa)" in labels
+    assert r"$\tau_\mathrm{p}$ (MPa)" in labels
     assert r"$t - T$ (µs)" in labels
     figure.savefig(tmp_path / "figure.png")
     assert Image.open(tmp_path / "figure.png").size[0] > 500

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from stiction._brief import brief_html
 from stiction._checks import check_choice, check_instance, is_finite, is_real, is_whole
 from stiction._model import describe
 from stiction._progress import Meter, Show, check_time_limit
@@ -111,6 +112,8 @@ class FieldFit:
     _details: Details = dataclasses.field(repr=False)
     warnings: tuple[str, ...] = ()
     cut_short: bool = False
+
+    _repr_html_ = brief_html
 
     def __str__(self) -> str:
         unit = UNITS[self.quantity]

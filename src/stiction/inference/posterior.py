@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stiction._brief import brief_html
 from stiction._checks import is_finite, numbers
 from stiction._model import describe
 from stiction._typing import Array
@@ -72,6 +73,8 @@ class Posterior:
     u: Array = field(repr=False)
     seed: int = 0
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
+
+    _repr_html_ = brief_html
 
     def _flat(self, name: str) -> Array:
         if name not in self.draws:
