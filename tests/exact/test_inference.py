@@ -234,7 +234,7 @@ def test_points_that_are_given_up_are_hopeless():
     floor = whole.max() - 40.0
     quick = likelihood(u, floor)
     kept = np.isfinite(quick)
-    assert (~kept & np.isfinite(whole)).sum() > 1000
+    assert (~kept & np.isfinite(whole)).sum() > 500  # more are impossible, not hopeless
     np.testing.assert_array_equal(quick[kept], whole[kept])
     assert whole[~kept].max() < floor
 

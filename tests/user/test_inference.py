@@ -112,9 +112,8 @@ def test_equilibrium_after_the_local_criterion():
     first = exact.likelihood.model
     assert np.all(first.high - first.low < 0.5)  # only where the first stage found anything
     shift = exact.mean("marginal.low") - local.mean("marginal.low")
-    # The local criterion is 0.1 % high at xi_0/h_n = 0.6, a tenth of the posterior's width; the
-    # rest is the shape of a distribution known from 150 samples.
-    assert abs(shift) < 0.5 * local.draws["marginal.low"].std()
+    # The local criterion is 0.1 % high at xi_0/h_n = 0.6: a fifth of the posterior's width.
+    assert 0.0 < shift < 0.4 * local.draws["marginal.low"].std()
 
 
 def test_positions_tell_where_the_load_varies():

@@ -145,7 +145,8 @@ def make_model(
     axes = make_axes(prior, affine, low, high)
     thetas = thetas_of(axes, affine.reference)
     count = SAMPLES.get(method.type, FEW) if samples is None else samples
-    control = method.type != "local_criterion" and not local_refused(prior)
+    # Where positions count, the pairs of peak and position have to be the method's own.
+    control = scaling and method.type != "local_criterion" and not local_refused(prior)
     everywhere = count if not control else max(count, SAMPLES["local_criterion"])
     meter.stage("simulated onsets", len(thetas) * len(lengths) * (count + control * everywhere))
     specimens = []
@@ -159,7 +160,7 @@ def make_model(
         }
         peaks, places = simulate(prior, thetas, method=method, samples=count, **options)
         if control:
-            local, _ = simulate(
+            local, places = simulate(
                 prior, thetas, method=LocalCriterion(), samples=everywhere, **options
             )
             peaks = controlled(peaks, local)
@@ -183,16 +184,15 @@ def bounds_of(prior: Prior, thetas: Array, method: Any, variable: str) -> Array:
 
 
 def controlled(peaks: Array, local: Array) -> Array:
-    """A few onsets with the mean and spread that many by the local criterion let expect.
+    """Many onsets by the local criterion, (points, many), moved to where a few by the method are.
 
-    The same samples by both methods differ little, so the difference of the means and the ratio of
-    the spreads are known from a few.
+    The same samples by both methods differ little, and so do their quantiles: the difference of
+    the quantiles of the few is added to the many.
     """
-    few = local[:, : peaks.shape[1]]
-    mean = peaks.mean(axis=1)
-    better = mean + local.mean(axis=1) - few.mean(axis=1)
-    ratio = local.std(axis=1) / few.std(axis=1)
-    result: Array = better[:, None] + ratio[:, None] * (peaks - mean[:, None])
+    result = np.empty_like(local)
+    for row, (few, many) in enumerate(zip(peaks, local, strict=True)):
+        known = np.sort(many[: few.size])
+        result[row] = many + np.interp(many, known, np.sort(few) - known)
     return result
 
 

@@ -66,7 +66,10 @@ def posterior_figure(posterior: Posterior) -> Figure:
             if i == j:
                 own.set_yticks([])
                 own.set_title(f"{posterior.information[names[i]]:.2f} nats", fontsize=8, loc="left")
-    axes[0, 0].legend(fontsize=7, frameon=False, loc="best")
+    if count > 1:  # where there are no pairs
+        left.legend(*axes[0, 0].get_legend_handles_labels(), fontsize=8, frameon=False)
+    else:
+        axes[0, 0].legend(fontsize=7, frameon=False)
     _peaks(right, posterior)
     return figure
 
@@ -82,7 +85,7 @@ def _marginal(axes: Any, pair: Any, _: Any) -> None:
     ):
         axes.hist(values, bins=bins, weights=np.full(values.size, 1.0 / values.size), **style)
     if log:
-        axes.set_xscale("log")
+        _logarithmic(axes, "x")
 
 
 def _pair(axes: Any, along: Any, up: Any) -> None:
@@ -92,7 +95,18 @@ def _pair(axes: Any, along: Any, up: Any) -> None:
         ends = np.quantile(values, [0.002, 0.998])
         getattr(axes, f"set_{axis}lim")(*ends)
         if ends[0] > 0.0 and ends[1] > 6.0 * ends[0]:
-            getattr(axes, f"set_{axis}scale")("log")
+            _logarithmic(axes, axis)
+
+
+def _logarithmic(axes: Any, name: str) -> None:
+    """A logarithmic axis with plain numbers at 1, 2, 5, 10, ..."""
+    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+
+    getattr(axes, f"set_{name}scale")("log")
+    axis = getattr(axes, f"{name}axis")
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ScalarFormatter())
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _peaks(figure: Any, posterior: Posterior) -> None:
