@@ -45,6 +45,7 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
     assert scope["result"]["critical_stress"].dims == ("correlation_length", "length", "sample")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
     """Every block and command, with fewer repetitions."""
