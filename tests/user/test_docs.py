@@ -101,7 +101,8 @@ def test_tables_of_study_files():
 
 
 def test_links():
-    for page in [*PAGES, ROOT / "CONTRIBUTING.md"]:
+    # The entry of the site links pages that are made when it is built, and is checked there.
+    for page in [*(p for p in PAGES if p.name != "index.md"), ROOT / "CONTRIBUTING.md"]:
         for target in re.findall(r"\]\((?!http)([^)#]+)", page.read_text("utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
