@@ -51,22 +51,22 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
     for p in range(pairs):
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.pace[0] * step)
-        base = np.exp(unit)
+        base, inverse = np.exp(unit), 1.0 / unit
         decay = 1.0 + 0.0j
         for j in range(fresh.size):
             if grid.copies == 1:
                 decay = decay * base
-                z = unit * (j + 1)
+                z, per_z = unit * (j + 1), inverse * (1.0 / (j + 1))
                 part = 1.0
             else:
                 z = pole * (grid.pace[j] * step)
-                decay = np.exp(z)
+                decay, per_z = np.exp(z), 1.0 / z
                 part = grid.share[j] if p < grid.split else 1.0 - grid.share[j]
-            if abs(z) < 0.02:
+            if z.real * z.real + z.imag * z.imag < 4e-4:
                 gain, lean = step * _phi(z), step * step * _tilt(z)
             else:
-                ratio = (decay - 1.0) / z
-                gain, lean = step * ratio, step * step * ((ratio - 1.0) / z - 0.5 * ratio)
+                ratio = (decay - 1.0) * per_z
+                gain, lean = step * ratio, step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
@@ -124,3 +124,21 @@ def remember(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
             y = decay * complex(memory[o + 128], memory[o + 192]) + gain * v.imag + lean * a.imag
             memory[o + 128], memory[o + 192] = y.real, y.imag
             o, t, s = o + 256, t + 256, s + 128
+
+
+@jit
+def remember_growth(grid: Grid, memory: Array, rate_hat: Array, growth: float) -> Array:
+    """psi of a slip rate that has always grown as exp(growth t); return Re sum w psi, (modes,)."""
+    total = np.zeros(rate_hat.size, dtype=np.complex128)
+    pairs = grid.poles.size
+    for q in range(1, rate_hat.size):
+        v, slot = rate_hat[q], grid.slot[q]
+        o = _address(grid, q)[0]
+        for p in range(pairs):
+            part = grid.share[slot] if p < grid.split else 1.0 - grid.share[slot]
+            gain = 1.0 / (growth - grid.poles[p] * grid.pace[slot])
+            memory[o], memory[o + 64] = gain.real * v.real, gain.imag * v.real
+            memory[o + 128], memory[o + 192] = gain.real * v.imag, gain.imag * v.imag
+            total[q] += part * (grid.weights[p] * gain).real * v
+            o += 256
+    return total

@@ -24,6 +24,7 @@ FIELDS = 28
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
+RUNAWAY = 7  # seen between phases, not in them
 
 # Columns of the record of every step.
 REC_TIME, REC_LOAD, REC_MEAN_STRESS, REC_MEAN_SLIP, REC_TOP_RATE, REC_STEP, REC_WORK = range(7)
