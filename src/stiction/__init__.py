@@ -36,6 +36,7 @@ _HOMES = {
     "monte_carlo": "ensemble.monte_carlo",
     "nucleation_statistics": "statistics.moments",
     "nucleation_limits": "statistics.moments",
+    "combined_mean": "statistics.control_variates",
     "density": "statistics.densities",
     "quantiles": "statistics.quantiles",
     "rice_distribution": "statistics.rice",

@@ -60,6 +60,7 @@ from stiction.reliability.design import (
 from stiction.reliability.estimate import failure_probability as failure_probability
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
+from stiction.statistics.control_variates import combined_mean as combined_mean
 from stiction.statistics.densities import density as density
 from stiction.statistics.moments import (
     nucleation_limits as nucleation_limits,

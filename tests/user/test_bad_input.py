@@ -238,7 +238,7 @@ CASES = {
         ),
         ["draws", "finite"],
     ),
-    "rupture on a plane": (
+    "arrival beyond the residual strength": (
         lambda: st.simulate_rupture(
             st.Problem(
                 st.Solid(**GOOD_SOLID | {"plane": "strain"}),
@@ -247,8 +247,9 @@ CASES = {
             ),
             np.full((64, 64), 1e6),
             method=st.Rupture(loading_rate=1e7),
+            arrival=1.5,
         ),
-        ["rupture", "two dimensions"],
+        ["arrival", "(0, 1]", "1.5"],
     ),
     "rate that is nan": (
         lambda: st.onset(

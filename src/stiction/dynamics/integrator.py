@@ -191,6 +191,7 @@ class Run:
         rate[rate * self.medium.impedance < 1e-12 * nodes.strength] = 0.0
         stress = stress - self.medium.impedance * rate
         watch[monitor.TIME], watch[monitor.LOAD] = time, load
+        watch[monitor.START_LOAD] = load
         watch[monitor.MEAN_STRESS] = watch[monitor.PEAK_STRESS] = stress.mean()
         watch[monitor.LOCAL_STRESS] = stress.mean()
         watch[monitor.LOCAL_RADIATED] = self.medium.impedance * rate.mean()

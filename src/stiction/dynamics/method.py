@@ -25,7 +25,7 @@ from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, turns, uniform_rate
 from stiction.dynamics.runaway import refused_stop, runs_away
 from stiction.dynamics.scale import stress_scale
-from stiction.dynamics.slow_start import STARTS, SlowStart, slow_start, static_setting
+from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.law import FrictionLaw
@@ -170,7 +170,7 @@ class Rupture:
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
-        return onset_variables(problem.interface) | scalars(problem.interface) | STARTS
+        return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
         """Kernel and tables for a problem."""
@@ -204,15 +204,11 @@ class Rupture:
 
         return solve
 
-    def _one(self, problem: Problem, run: Run, begun: SlowStart | None) -> dict[str, Any]:
+    def _one(self, problem: Problem, run: Run, begun: State | None) -> dict[str, Any]:
         time = first_slip(run)
         check_pace(run, time)
         warn_if_reversed_before(run, time)
-        state = run.start(time) if begun is None else begun.state
-        from_where = {
-            "start_load": state.load,
-            "start_error": 0.0 if begun is None else begun.error,
-        }
+        state = run.start(time) if begun is None else begun
         reason = self._advance(run, state)
         check_finite(run, state, reason)
         if reason == monitor.DONE:
@@ -225,7 +221,7 @@ class Rupture:
                 "never break an infinite strength"
             )
         warn_if_unresolved(problem, run, state)
-        found = summary(problem, run, state) | from_where
+        found = summary(problem, run, state)
         if self.stop in ("onset", "runaway"):
             later = [n for n in _LATER if self.stop == "onset" or n != "arrested_events"]
             found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}

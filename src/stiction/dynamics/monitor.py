@@ -20,7 +20,8 @@ KINETIC = 24  # Pa, mean stress when all that can break first had broken; -inf b
 PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
 SCALE = 26  # Pa, stress scale of the largest load so far
 CALM_TOP = 27  # m/s, largest slip rate when the row of calm steps began
-FIELDS = 28
+START_LOAD, START_ERROR = 28, 29  # Pa, where the run began and what that may cost
+FIELDS = 30
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)

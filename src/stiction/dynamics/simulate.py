@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from numbers import Real
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import as_path, is_finite, is_whole, refusals
+from stiction._checks import refusals
 from stiction._model import describe, real_array, to_plain
 from stiction._progress import Meter
 from stiction.dynamics import monitor
@@ -34,6 +33,7 @@ from stiction.dynamics.method import (
     make_run,
     set_stop,
 )
+from stiction.dynamics.options import Stop, check_options
 from stiction.dynamics.runaway import refused_stop, runs_away
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
@@ -45,14 +45,12 @@ from stiction.profiles import at_nodes
 from stiction.results import DIRECTION, Variable, along, coordinate
 from stiction.sample import named_profiles
 
-Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
-
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are streamed
 _NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
 
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ()),
-    "arrival_time": Variable("s", "when half of the strength was lost", ()),
+    "arrival_time": Variable("s", "when the front arrived, see `arrival`", ()),
     "front_speed": Variable("m/s", "apparent speed of the rupture front", ()),
 }
 
@@ -97,62 +95,6 @@ def _note(now: Progress) -> str:
     )
 
 
-_MOST_EVERY = 10**6
-"""The record of the steps between two frames is kept in memory."""
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, Real) and is_finite(value)
-
-
-def _check(options: dict[str, Any]) -> None:
-    problems = []
-    for name in ("every", "every_implicit", "every_near_onset", "checkpoint_every", "chunk"):
-        value = options[name]
-        if value is None and name == "every_near_onset":
-            continue
-        if not is_whole(value, 1) or value > _MOST_EVERY:
-            given = describe(value)
-            problems.append(f"{name}: must be a whole number of steps, 1 to 10**6, got {given}")
-    for name in ("interval", "end_time"):
-        value = options[name]
-        if value is not None and not (_finite(value) and value > 0.0):
-            problems.append(f"{name}: must be a positive number of seconds, got {value!r}")
-    if options["stop"] is not None and options["stop"] not in get_args(Stop):
-        problems.append(f"stop: must be one of {get_args(Stop)}, got {describe(options['stop'])}")
-    elif options["stop"] == "time" and options["end_time"] is None:
-        problems.append("end_time: needed with stop='time', got None")
-    if (options["initial_slip"] is None) != (options["initial_load"] is None):
-        problems.append("initial_slip and initial_load: give both or neither")
-    elif options["initial_load"] is not None and not _finite(options["initial_load"]):
-        problems.append(f"initial_load: must be a number, Pa, got {options['initial_load']!r}")
-    for name in ("store", "checkpoint", "restart"):
-        value = options[name]
-        if value is None:
-            continue
-        try:
-            as_path(name, value)
-        except InputError as error:
-            problems += error.problems
-            continue
-        if name == "checkpoint" and Path(value).is_dir():
-            problems.append(f"checkpoint: {str(value)!r} is a folder; name a file")
-    told = options["progress"]
-    if told is not None and not isinstance(told, bool) and not callable(told):
-        problems.append(f"progress: must be true, false or callable, got {describe(told)}")
-    if not isinstance(options["steps"], bool | np.bool_):
-        problems.append(f"steps: must be True or False, got {describe(options['steps'])}")
-    if not isinstance(options["problem"], Problem):
-        problems.append(f"problem: must be a Problem, got {describe(options['problem'])}")
-    if not isinstance(options["method"], Rupture):
-        problems.append(
-            "method: must be a method object st.Rupture(loading_rate=...), got "
-            f"{describe(options['method'])}"
-        )
-    if problems:
-        raise InputError(problems)
-
-
 def _initial(run: Run, slip: Any, load: float | None) -> State:
     if slip is None or load is None:
         time = first_slip(run)
@@ -194,6 +136,7 @@ def simulate_rupture(
     steps: bool = True,
     stop: Stop | None = None,
     end_time: float | None = None,
+    arrival: float = 0.5,
     store: str | Path | None = None,
     chunk: int = 64,
     checkpoint: str | Path | None = None,
@@ -234,6 +177,9 @@ def simulate_rupture(
         good ("rest").
     end_time : float, optional
         s; the run never goes beyond it (except for a part of the last explicit step).
+    arrival : float
+        Share of its way to the residual that the strength of a node has lost when the front has
+        arrived there, in (0, 1]: 0.5 is the middle of the cohesive zone, 1e-3 its tip.
     store : path, optional
         Folder to stream frames to, in chunks of `chunk` frames; memory then stays bounded, the
         result holds no fields, and `open_rupture` reads them back.
@@ -261,7 +207,7 @@ def simulate_rupture(
     OSError
         If a stream cannot be written; what was written stays readable.
     """
-    _check(dict(locals()))
+    check_options(dict(locals()))
     check_variables(variables)
     if refused := refusals(problem, method) or refused_stop(problem, stop or method.stop):
         raise InputError(refused)
@@ -275,6 +221,8 @@ def simulate_rupture(
     run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
     stop = stop or method.stop
     set_stop(run.control, stop)
+    passed = min(problem.friction.slip_at(1.0 - arrival), problem.friction.reach)
+    run.control[monitor.ARRIVAL] = passed / problem.friction.reach
     if end_time is not None:
         run.control[monitor.END_TIME] = end_time
     if restart is None:

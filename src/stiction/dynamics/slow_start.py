@@ -13,8 +13,6 @@ what is wrong with the state and, as a stress, by how much the onset can be misp
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,13 +20,13 @@ from stiction.dynamics import monitor
 from stiction.dynamics.energies import radiated_energy
 from stiction.dynamics.implicit_tables import remember_growth
 from stiction.dynamics.integrator import Run, State
+from stiction.equilibrium.continuation import exceeds
 from stiction.equilibrium.pieces import refused
 from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample as StaticSample
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.results import Variable
 from stiction.sample import Sample
 
 Floats = NDArray[np.float64]
@@ -37,30 +35,6 @@ _TOLERANCE = 2e-5  # of the stress scale: a fifth of the fall that counts as an 
 _CROSSINGS = 10.0  # of h_n by shear waves: how long before the onset the first trial begins
 _BACK = 0.25  # of the distance to the onset, over which the rate is measured
 _TRIALS = 5
-
-STARTS = {
-    "start_load": Variable("Pa", "load factor at which the simulation began"),
-    "start_error": Variable(
-        "Pa", "estimated error of the first instability due to the start; 0 from rest"
-    ),
-}
-
-
-class SlowStart(NamedTuple):
-    """A state on the slow path and what is known of it.
-
-    Attributes
-    ----------
-    state : State
-    load : float
-        tau_0 of it, Pa.
-    error : float
-        Stress by which the equation of motion is missed there, Pa.
-    """
-
-    state: State
-    load: float
-    error: float
 
 
 def static_setting(problem: Problem) -> Setting | None:
@@ -73,9 +47,7 @@ def static_setting(problem: Problem) -> Setting | None:
         return None
 
 
-def slow_start(
-    setting: Setting, run: Run, rows: Sample, number: int, rate: float
-) -> SlowStart | None:
+def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: float) -> State | None:
     """The state closest to the onset whose error is small enough, None if there is none.
 
     Parameters
@@ -111,19 +83,20 @@ def slow_start(
         found = _at(setting, run, static, onset.load, distance, rate)
         if found is None:
             distance *= 4.0
-        elif found.error <= asked:
+        elif found.watch[monitor.START_ERROR] <= asked:
             return found
         else:  # V falls as distance^(-1/2), its second derivative as distance^(-5/2)
-            distance *= 1.2 * (found.error / asked) ** 0.4
+            distance *= 1.2 * (found.watch[monitor.START_ERROR] / asked) ** 0.4
     return None
 
 
 def _at(
     setting: Setting, run: Run, static: StaticSample, onset: float, distance: float, rate: float
-) -> SlowStart | None:
-    """The state at a distance (Pa) below the onset; None where a node has lost half its strength.
+) -> State | None:
+    """The state at a distance (Pa) below the onset; None where it is not known well enough.
 
-    (For such nodes the time at which that happened would be unknown.)
+    That is where a node is beyond the first piece of its law, so that the programme does not hold,
+    or has lost half of its strength at a time that would be unknown.
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     load, back = onset - distance, _BACK * distance
@@ -131,6 +104,8 @@ def _at(
         setting.programme(static.excess, static.rate, cap) for cap in (load, load - back)
     )
     if here is None or before is None:
+        return None
+    if exceeds(static, here.slip):
         return None
     weakens = nodes.critical > 0.0
     half = run.control[monitor.ARRIVAL] * nodes.critical
@@ -158,4 +133,5 @@ def _at(
         watch[field] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
     watch[monitor.WORK] -= radiated_energy(run.friction, nodes, grid, state.fields)
-    return SlowStart(state, applied, float(missed.max(initial=0.0)))
+    watch[monitor.START_ERROR] = missed.max(initial=0.0)
+    return state

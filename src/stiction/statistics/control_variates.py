@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from stiction._typing import Array
-from stiction.statistics.estimates import Estimate
+from stiction.errors import InputError
+from stiction.statistics.estimates import Estimate, as_sample
 
 
 @dataclass(frozen=True)
@@ -62,21 +64,49 @@ def _telescoped(dear: Array, chain: Sequence[Array], least: float = 0.0) -> tupl
     return float(rest.mean()) + weight * value, missed + weight**2 * variance
 
 
-def combined_mean(dear: Array, *cheap: Array) -> Combined:
-    """Mean of the dear result.
+def combined_mean(dear: Any, *cheap: Any) -> Combined:
+    """Mean of a dear result of few samples, with the help of cheaper ones of more.
+
+    Such as onsets by `Rupture`, `Equilibrium` and `LocalCriterion` of samples of the same seed.
 
     Parameters
     ----------
     dear : (n,) array
         Of samples 0 .. n - 1, at least three.
     *cheap : (N_1,), (N_2,), ... arrays
-        Of the same samples first and then of more, each longer than the one before.
+        Of the same samples first and then of more, each at least as long as the one before.
 
     Returns
     -------
     Combined
+        `estimate` with its `value` and standard `error`, `plain_error` of the dear results alone,
+        and `saving`, how many times as many of these would give the same error.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three dear results, one is not finite, or cheaper results are fewer.
+
+    Notes
+    -----
+    Linear control variates, one in the other (Peherstorfer, Willcox and Gunzburger, 2016).
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> found = st.combined_mean([1.0, 2.1, 2.9], [0.9, 2.0, 2.8, 1.7, 2.2, 1.9])
+    >>> round(found.estimate.value, 3)
+    2.017
+    >>> found.estimate.error < found.plain_error
+    True
     """
-    value, variance = _telescoped(dear, cheap)
+    dear, chain = as_sample(dear, 3), [as_sample(results, 3) for results in cheap]
+    sizes = [dear.size, *(results.size for results in chain)]
+    if sizes != sorted(sizes):
+        raise InputError(
+            f"cheap: each must have at least as many results as the one before, got {sizes} samples"
+        )
+    value, variance = _telescoped(dear, chain)
     plain = float(dear.var(ddof=1)) / dear.size
     return Combined(Estimate(value, math.sqrt(variance)), math.sqrt(plain))
 
