@@ -23,7 +23,7 @@ def result(**values):
         "rupture_speed": 4000.0,
     } | values  # fmt: skip
     dataset = xr.Dataset({name: ((), value) for name, value in scalars.items()})
-    dataset["radiated_energy"] = ("time", [0.0, 3.25])
+    dataset["radiated_energy"] = ("time", [0.0, 3.25], {"units": "J/m"})
     return dataset.assign_attrs(stopped="sliding")
 
 
