@@ -171,6 +171,7 @@ class ImplicitTables(NamedTuple):
     pushed, increment, driving, falling, residual, direction, product, other : (nodes,) arrays
     state : (nodes,) int array
         0 stuck, 1 slipping.
+    packed, others : arrays in packed order, see `memory_layout`
     """
 
     made: Array
@@ -193,3 +194,5 @@ class ImplicitTables(NamedTuple):
     product: Array
     other: Array
     state: Ints
+    packed: Array
+    others: Array
