@@ -159,7 +159,7 @@ def test_checkpoint_of_another_run_is_refused_by_name(tmp_path):
     with np.load(path) as data:
         arrays = dict(data)
     np.savez(path, **(arrays | {"format": 99}))
-    with pytest.raises(InputError, match="format version 99, this version reads 5"):
+    with pytest.raises(InputError, match="format version 99, this version reads 6"):
         simulate_rupture(problem, profile(), method=METHOD, restart=path)
     path.write_bytes(b"not a checkpoint")
     with pytest.raises(InputError, match="not a readable checkpoint"):

@@ -25,7 +25,7 @@ def paper(
     ruptures: Annotated[
         int | None,
         typer.Option(
-            help="Ruptures for each correlation length: 20, or 1,000 with --full.",
+            help="Ruptures for each correlation length: 20, or all samples with --full.",
             show_default=False,
         ),
     ] = None,

@@ -132,7 +132,18 @@ class Setting(NamedTuple):
 
 
 class ExplicitTables(NamedTuple):
-    """Of one fixed explicit step, see `memory_layout.step_table`, with room to work."""
+    """Of one fixed explicit step h, with room to work.
+
+    Attributes
+    ----------
+    step : float
+        h, s.
+    table : flat array
+        [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h); the memory
+        is kept as psi/B.
+    fresh : (modes,) array
+        Re sum_p w B, weight of the current slip rate, s.
+    """
 
     step: float
     table: Array
@@ -160,6 +171,7 @@ class ImplicitTables(NamedTuple):
     pushed, increment, driving, falling, residual, direction, product, other : (nodes,) arrays
     state : (nodes,) int array
         0 stuck, 1 slipping.
+    packed, others : arrays in packed order, see `memory_layout`
     """
 
     made: Array
@@ -182,3 +194,5 @@ class ImplicitTables(NamedTuple):
     product: Array
     other: Array
     state: Ints
+    packed: Array
+    others: Array

@@ -14,7 +14,7 @@ from stiction.dynamics import monitor
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
 
-FORMAT = 5
+FORMAT = 6
 
 _SLIPS = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from stiction._checks import check_memory
 from stiction.dynamics.arrays import Grid
 from stiction.dynamics.courant_limit import courant_limit, plane_limit
-from stiction.dynamics.memory_layout import places
+from stiction.dynamics.memory_layout import places, step_table
 from stiction.elasticity.compiled_transform import make_transform
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
@@ -54,6 +55,17 @@ class Medium:
     def impedance(self) -> float:
         """Z = G/(2 c_s), Pa s/m."""
         return self.grid.impedance
+
+    def step_table(self) -> tuple[Floats, Floats]:
+        """Tables of the explicit step; runs share those of a line, a plane's are too large to keep.
+
+        (Beside them a run on a plane would have no room for those of its implicit steps.)
+        """
+        return step_table(self.grid, self.step) if self.interface.is_plane else self._line_table
+
+    @functools.cached_property
+    def _line_table(self) -> tuple[Floats, Floats]:
+        return step_table(self.grid, self.step)
 
 
 def refused_laws(problem: Problem) -> list[str]:
@@ -163,8 +175,9 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
 def bytes_needed(interface: Interface, pairs: int) -> float:
     """Memory of one run at its largest, while it takes implicit steps; without frames.
 
-    Memory variables and tables (see `memory_layout`), and some forty arrays of one value a node.
+    Memory variables and tables (see `memory_layout`), on a line those of explicit steps too, and
+    some forty arrays of one value a node.
     """
     modes = interface.wavenumbers.size
-    tables = 6 * modes / (2 if interface.is_plane else 1)
+    tables = 6 * modes / 2 if interface.is_plane else 10 * modes
     return 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)

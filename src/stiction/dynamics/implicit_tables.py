@@ -9,7 +9,7 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.dynamics.arrays import Grid, ImplicitTables
-from stiction.dynamics.memory_layout import LANES, blocks, rooms
+from stiction.dynamics.memory_layout import LANES, blocks, pack, rooms
 
 
 @jit
@@ -32,6 +32,7 @@ def make_tables(grid: Grid) -> ImplicitTables:
         np.array([-1.0, -1.0]),
         *(table, tilt, *rooms(2, slots, float), *rooms(2, modes, float)),
         *(*rooms(4, modes, complex), *rooms(8, nodes, float), np.zeros(nodes, dtype=np.int64)),
+        *np.zeros((2, count * grid.copies * 2 * LANES)),
     )
 
 
@@ -52,6 +53,7 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.pace[0] * step)
         base = np.exp(unit)
+        inverse = 1.0 / unit if grid.copies == 1 else 0.0j  # on a plane pace[0] = 0, the mean's
         decay = 1.0 + 0.0j
         for j in range(fresh.size):
             if grid.copies == 1:
@@ -62,11 +64,12 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
                 z = pole * (grid.pace[j] * step)
                 decay = np.exp(z)
                 part = grid.share[j] if p < grid.split else 1.0 - grid.share[j]
-            if abs(z) < 0.02:
+            if z.real * z.real + z.imag * z.imag < 4e-4:
                 gain, lean = step * _phi(z), step * step * _tilt(z)
             else:
-                ratio = (decay - 1.0) / z
-                gain, lean = step * ratio, step * step * ((ratio - 1.0) / z - 0.5 * ratio)
+                per_z = inverse * (1.0 / (j + 1)) if grid.copies == 1 else 1.0 / z
+                ratio = (decay - 1.0) * per_z
+                gain, lean = step * ratio, step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
@@ -77,50 +80,68 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
 
 
 @jit
-def _address(grid: Grid, q: int) -> Any:
-    """Where the first pair of a mode is: in memory, in `table` and in `tilt`."""
-    pairs, lane = grid.poles.size, grid.place[q] % 64
-    block = grid.place[q] // 128
-    return (
-        block * pairs * 256 + lane,
-        block // grid.copies * pairs * 256 + lane,
-        block // grid.copies * pairs * 128 + lane,
-    )
-
-
-@jit
 def carry(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
     """Re sum w E psi of all modes into `carried`, complex: what the past leaves after the step."""
-    table, out = tables.table, tables.carried
-    pairs, split = grid.poles.size, grid.split
-    for q in range(1, out.size):
-        o, t, _ = _address(grid, q)
-        share = grid.share[grid.slot[q]]
-        total = 0.0 + 0.0j
-        for first, last, part in ((0, split, share), (split, pairs, 1.0 - share)):
-            real, imaginary = 0.0, 0.0
-            for p in range(first, last):
-                w = grid.weights[p] * complex(table[t + p * 256], table[t + p * 256 + 64])
-                y = o + p * 256
-                real += w.real * memory[y] - w.imag * memory[y + 64]
-                imaginary += w.real * memory[y + 128] - w.imag * memory[y + 192]
-            total += complex(part * real, part * imaginary)
-        out[q] = total
+    pairs, copies, split = grid.poles.size, grid.copies, grid.split
+    sums = np.empty((2, 128))  # of the pairs before `split`, and of those from there on
+    for block in range(memory.size // (256 * pairs)):
+        sums[:] = 0.0
+        for p in range(pairs):
+            # Views that begin at zero: the compiler then knows that no index is negative.
+            y = memory[(block * pairs + p) * 256 :][:256]
+            e = tables.table[(block // copies * pairs + p) * 256 :][:256]
+            out = sums[0 if p < split else 1]
+            wr, wi = grid.weights[p].real, grid.weights[p].imag
+            for j in range(64):
+                cr, ci = wr * e[j] - wi * e[64 + j], wr * e[64 + j] + wi * e[j]
+                out[j] += cr * y[j] - ci * y[64 + j]
+                out[64 + j] += cr * y[128 + j] - ci * y[192 + j]
+        tables.packed[block * 128 : block * 128 + 128] = sums[0]
+        tables.others[block * 128 : block * 128 + 128] = sums[1]
+    for q in range(1, tables.carried.size):
+        o, share = grid.place[q], grid.share[grid.slot[q]]
+        rest = 1.0 - share
+        tables.carried[q] = complex(
+            share * tables.packed[o] + rest * tables.others[o],
+            share * tables.packed[o + 64] + rest * tables.others[o + 64],
+        )
 
 
 @jit
 def remember(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
     """psi <- E psi + B V, V = `rate_hat`, with a slip rate that changes by `past_hat` in it."""
-    table, tilt = tables.table, tables.tilt
-    for q in range(1, tables.rate_hat.size):
-        v, a = tables.rate_hat[q], tables.past_hat[q]
-        o, t, s = _address(grid, q)
-        for _p in range(grid.poles.size):
-            decay = complex(table[t], table[t + 64])
-            gain = complex(table[t + 128], table[t + 192])
-            lean = complex(tilt[s], tilt[s + 64])
-            y = decay * complex(memory[o], memory[o + 64]) + gain * v.real + lean * a.real
-            memory[o], memory[o + 64] = y.real, y.imag
-            y = decay * complex(memory[o + 128], memory[o + 192]) + gain * v.imag + lean * a.imag
-            memory[o + 128], memory[o + 192] = y.real, y.imag
-            o, t, s = o + 256, t + 256, s + 128
+    pairs, copies = grid.poles.size, grid.copies
+    pack(grid.place, tables.rate_hat, tables.packed)
+    pack(grid.place, tables.past_hat, tables.others)
+    for block in range(memory.size // (256 * pairs)):
+        v, a = tables.packed[block * 128 :][:128], tables.others[block * 128 :][:128]
+        for p in range(pairs):
+            y = memory[(block * pairs + p) * 256 :][:256]
+            own = block // copies * pairs + p
+            e, s = tables.table[own * 256 :][:256], tables.tilt[own * 128 :][:128]
+            for j in range(64):
+                er, ei, gr, gi, lr, li = e[j], e[64 + j], e[128 + j], e[192 + j], s[j], s[64 + j]
+                yr, yi = y[j], y[64 + j]
+                y[j] = er * yr - ei * yi + gr * v[j] + lr * a[j]
+                y[64 + j] = er * yi + ei * yr + gi * v[j] + li * a[j]
+                yr, yi = y[128 + j], y[192 + j]
+                y[128 + j] = er * yr - ei * yi + gr * v[64 + j] + lr * a[64 + j]
+                y[192 + j] = er * yi + ei * yr + gi * v[64 + j] + li * a[64 + j]
+
+
+@jit
+def remember_growth(grid: Grid, memory: Array, rate_hat: Array, growth: float) -> Array:
+    """psi of a slip rate that has always grown as exp(growth t); return Re sum w psi, (modes,)."""
+    total = np.zeros(rate_hat.size, dtype=np.complex128)
+    pairs = grid.poles.size
+    for q in range(1, rate_hat.size):
+        v, slot = rate_hat[q], grid.slot[q]
+        o = grid.place[q] // 128 * pairs * 256 + grid.place[q] % 64
+        for p in range(pairs):
+            part = grid.share[slot] if p < grid.split else 1.0 - grid.share[slot]
+            gain = 1.0 / (growth - grid.poles[p] * grid.pace[slot])
+            memory[o], memory[o + 64] = gain.real * v.real, gain.imag * v.real
+            memory[o + 128], memory[o + 192] = gain.real * v.imag, gain.imag * v.imag
+            total[q] += part * (grid.weights[p] * gain).real * v
+            o += 256
+    return total

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,17 @@ from numpy.typing import NDArray
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import ExplicitTables, Fields, ImplicitTables, Setting
 from stiction.dynamics.discretization import Medium
+from stiction.dynamics.energies import fracture_energy
 from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import implicit_steps
 from stiction.dynamics.implicit_tables import make_tables
 from stiction.dynamics.loading import History, load_at
-from stiction.dynamics.memory_layout import carry_memory, empty_memory, scale_memory, step_table
+from stiction.dynamics.memory_layout import (
+    carry_memory,
+    empty_memory,
+    explicit_tables,
+    scale_memory,
+)
 from stiction.dynamics.scale import follow_scale
 from stiction.friction.kernels import strengths
 from stiction.friction.law import FrictionLaw
@@ -137,6 +144,14 @@ class Run:
         shared: Floats = interface.inverse_transform(stress_hat).ravel()
         return shared + load * nodes.profile + nodes.initial
 
+    @functools.cached_property
+    def toughest(self) -> float:
+        """Largest fracture energy, J/m²: infinite if there are barriers that never break."""
+        nodes = self.setting.nodes
+        if not np.all(np.isfinite(nodes.strength)):
+            return np.inf
+        return float(fracture_energy(self.friction, nodes.critical, nodes).max())
+
     def scale_at(self, load: float) -> float:
         """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
         setting = self.setting
@@ -176,6 +191,7 @@ class Run:
         rate[rate * self.medium.impedance < 1e-12 * nodes.strength] = 0.0
         stress = stress - self.medium.impedance * rate
         watch[monitor.TIME], watch[monitor.LOAD] = time, load
+        watch[monitor.START_LOAD] = load
         watch[monitor.MEAN_STRESS] = watch[monitor.PEAK_STRESS] = stress.mean()
         watch[monitor.LOCAL_STRESS] = stress.mean()
         watch[monitor.LOCAL_RADIATED] = self.medium.impedance * rate.mean()
@@ -249,7 +265,8 @@ class Run:
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):
             self.tables = None  # let go of the others before these are made
-            self.tables = step_table(self.medium.grid, self.medium.step)
+            medium = self.medium
+            self.tables = explicit_tables(medium.grid, medium.step, *medium.step_table())
         return self.tables
 
     def _implicit_tables(self) -> ImplicitTables:

@@ -68,22 +68,8 @@ def _weights(grid: Grid, some: slice) -> Spectrum:
     return weights
 
 
-def step_table(grid: Grid, step: float) -> ExplicitTables:
-    """Tables of one fixed explicit step h.
-
-    Parameters
-    ----------
-    grid : Grid
-    step : float
-        h, s.
-
-    Returns
-    -------
-    ExplicitTables
-        `table`, flat [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h);
-        the memory is kept as psi/B. `fresh`, (modes,): Re sum_p w B, weight of the current slip
-        rate, s.
-    """
+def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
+    """Tables of one fixed explicit step h: `table` and `fresh` of `ExplicitTables`."""
     pairs, count = grid.poles.size, blocks(grid.pace.size)
     table = np.zeros((count, pairs, 4, LANES))
     fresh = np.empty(grid.pace.size)
@@ -96,10 +82,15 @@ def step_table(grid: Grid, step: float) -> ExplicitTables:
         for row, values in enumerate(rows):
             table[block, :, row, : values.shape[1]] = values
         fresh[some] = np.sum((weights * gain).real, axis=0)
+    return table.ravel(), fresh[grid.slot]
+
+
+def explicit_tables(grid: Grid, step: float, table: Floats, fresh: Floats) -> ExplicitTables:
+    """Tables from `step_table` with room to work, which belongs to one run."""
     modes, nodes = grid.slot.size, int(np.prod(grid.transform.shape))
-    packed = np.zeros(count * grid.copies * 2 * LANES)
+    packed = np.zeros(blocks(grid.pace.size) * grid.copies * 2 * LANES)
     spectra, fields = rooms(2, modes, complex), rooms(2, nodes, float)
-    return ExplicitTables(step, table.ravel(), fresh[grid.slot], packed, *spectra, *fields)
+    return ExplicitTables(step, table, fresh, packed, *spectra, *fields)
 
 
 @jit

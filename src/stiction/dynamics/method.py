@@ -21,9 +21,11 @@ from stiction.dynamics.checks import (
     warn_if_unresolved,
 )
 from stiction.dynamics.discretization import Medium, prepare_medium, refused_laws
-from stiction.dynamics.integrator import Run
+from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import History, first_reach, turns, uniform_rate
+from stiction.dynamics.runaway import refused_stop, runs_away
 from stiction.dynamics.scale import stress_scale
+from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.law import FrictionLaw
@@ -41,8 +43,11 @@ _STEADY_STRESS = 1e-2  # Z V of creep, likewise
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
-Stop = Literal["sliding", "onset", "rest"]
-# Not known yet when a run stops at its onset.
+_PORTION = 32  # steps between two looks at whether a rupture can still be stopped
+
+Start = Literal["equilibrium", "rest"]
+Stop = Literal["sliding", "onset", "rest", "runaway"]
+# Not known yet when a run stops at its onset; the events are once it runs away.
 _LATER = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
     "arrested_events", "rupture_speed", "median_rupture_speed",
@@ -54,10 +59,10 @@ class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
     Implicit steps of adaptive size follow the interface while it creeps, explicit ones its
-    rupture; the run goes from the first slip to the moment when every node that can break has
-    reached its residual strength, or as far as `stop` says. Strength may be infinite where nothing
-    ever breaks, and the initial stress may be above the strength: such a patch breaks at once, at
-    zero load.
+    rupture; the run goes from just below the first instability (see `start`) to the moment when
+    every node that can break has reached its residual strength, or as far as `stop` says. Strength
+    may be infinite where nothing ever breaks, and the initial stress may be above the strength:
+    such a patch breaks at once, at zero load.
 
     Parameters
     ----------
@@ -80,14 +85,24 @@ class Rupture:
         Rise of the load in one implicit step, in units of the stress scale (see Notes).
     event_drop : float
         Fall of the mean stress that counts as an instability, in the same units.
-    stop : {"sliding", "onset", "rest"}
+    start : {"equilibrium", "rest"}
+        "rest": at the first slip. "equilibrium": on the quasi-static path, as close below the
+        first instability as an estimate of the error allows; `start_load` says where, and
+        `start_error` (Pa) what the estimate is. Where there is no such state, the run begins at
+        the first slip and `start_error` is 0: at a loading rate too fast for it, on planes, with
+        laws without straight pieces, barriers or stress above the strength, where a node loses
+        half of its strength before, and on grids too fine for `Equilibrium`.
+    stop : {"sliding", "onset", "rest", "runaway"}
         "sliding": when every node that can break is at its residual strength. "onset": when the
         first instability has begun; critical values are those of that maximum of the mean stress,
         even if the instability would be arrested later, and what comes after it is nan (kinetic
         stress, stress drop, moment, energies, arrested events, rupture speeds). "rest": when
         everything has come to rest after an instability, or slides; critical values are then
         those of the largest mean stress so far, kinetic stress and stress drop are nan unless
-        it slides, and the rest is that of the arrested event.
+        it slides, and the rest is that of the arrested event. "runaway": when the rupture has
+        grown so long that no fracture energy of the interface can stop it (Griffith), or slides:
+        all loads and `arrested_events` are known then, what "onset" leaves nan is nan but for
+        those. Lines only.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -123,6 +138,7 @@ class Rupture:
     load_step: Fraction = 1e-3
     event_drop: Fraction = 1e-4
     implicit: bool = True
+    start: Start = "equilibrium"
     stop: Stop = "sliding"
     max_steps: Count = 5_000_000
     type: Literal["rupture"] = "rupture"
@@ -143,13 +159,14 @@ class Rupture:
         """About how long a sample takes on one core, s."""
         shape = problem.interface.shape
         if len(shape) == 1:
-            return 0.1 * (shape[0] / 1024) ** 2
+            usual = 0.1 if self.start == "rest" else 0.05
+            return usual * (shape[0] / 1024) ** 2
         # Steps as the longer side has nodes, each as dear as the plane has nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        return refused_laws(problem)
+        return refused_laws(problem) + refused_stop(problem, self.stop)
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
@@ -169,25 +186,30 @@ class Rupture:
         """A solver for rows of this problem; the kernel is fitted here, once."""
         medium = self.medium(problem)
         history = uniform_rate(self.loading_rate)
+        wanted = self.start == "equilibrium" and self.implicit
+        static = static_setting(problem) if wanted else None
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             warn_if_coarse(problem, rows)
-            found = [
-                self._one(problem, make_run(self, problem.friction, medium, rows, i, history))
-                for i in range(rows.samples)
-            ]
+            found = []
+            for i in range(rows.samples):
+                run = make_run(self, problem.friction, medium, rows, i, history)
+                begun = None
+                if static is not None:
+                    begun = slow_start(static, run, rows, i, self.loading_rate)
+                found.append(self._one(problem, run, begun))
             return {
                 name: np.array([one[name] for one in found]) for name in self.variables(problem)
             }
 
         return solve
 
-    def _one(self, problem: Problem, run: Run) -> dict[str, float]:
+    def _one(self, problem: Problem, run: Run, begun: State | None) -> dict[str, Any]:
         time = first_slip(run)
         check_pace(run, time)
         warn_if_reversed_before(run, time)
-        state = run.start(time)
-        _, reason = run.advance(state, self.max_steps)
+        state = run.start(time) if begun is None else begun
+        reason = self._advance(run, state)
         check_finite(run, state, reason)
         if reason == monitor.DONE:
             slid, breakable = state.watch[monitor.SLID], run.control[monitor.BREAKABLE]
@@ -195,14 +217,26 @@ class Rupture:
                 f"max_steps: {self.max_steps} steps were taken before the run came to stop="
                 f"{self.stop!r} (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa, with "
                 f"{slid:.0f} of {breakable:.0f} nodes at their residual strength); raise max_steps "
-                "or the loading rate, stop at 'onset' or 'rest', or give barriers that never break "
-                "an infinite strength"
+                "or the loading rate, stop at 'onset', 'rest' or 'runaway', or give barriers that "
+                "never break an infinite strength"
             )
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
-        if self.stop == "onset":
-            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
+        if self.stop in ("onset", "runaway"):
+            later = [n for n in _LATER if self.stop == "onset" or n != "arrested_events"]
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
         return found
+
+    def _advance(self, run: Run, state: State) -> int:
+        """Go on until the run is to stop; returns why."""
+        if self.stop != "runaway":
+            return run.advance(state, self.max_steps)[1]
+        reason = monitor.DONE
+        while reason == monitor.DONE and state.steps < self.max_steps:
+            _, reason = run.advance(state, min(_PORTION, self.max_steps - state.steps))
+            if reason == monitor.DONE and runs_away(run, state):
+                return monitor.RUNAWAY
+        return reason
 
 
 def make_run(

@@ -20,10 +20,12 @@ KINETIC = 24  # Pa, mean stress when all that can break first had broken; -inf b
 PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
 SCALE = 26  # Pa, stress scale of the largest load so far
 CALM_TOP = 27  # m/s, largest slip rate when the row of calm steps began
-FIELDS = 28
+START_LOAD, START_ERROR = 28, 29  # Pa, where the run began and what that may cost
+FIELDS = 30
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
+RUNAWAY = 7  # seen between phases, not in them
 
 # Columns of the record of every step.
 REC_TIME, REC_LOAD, REC_MEAN_STRESS, REC_MEAN_SLIP, REC_TOP_RATE, REC_STEP, REC_WORK = range(7)

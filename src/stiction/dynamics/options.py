@@ -14,7 +14,7 @@ from stiction.dynamics.method import Rupture
 from stiction.errors import InputError
 from stiction.problem import Problem
 
-Stop = Literal["sliding", "onset", "rest", "time"]
+Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
 
 _MOST_EVERY = 10**6
 """The record of the steps between two frames is kept in memory."""

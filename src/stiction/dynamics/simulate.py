@@ -34,6 +34,7 @@ from stiction.dynamics.method import (
     set_stop,
 )
 from stiction.dynamics.options import Stop, check_options
+from stiction.dynamics.runaway import refused_stop, runs_away
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
@@ -153,7 +154,7 @@ def simulate_rupture(
         by name, as in `onset`. Where the initial stress is above the strength, slip begins at
         once.
     method : Rupture
-        Loading rate and numerical options.
+        Loading rate and numerical options. The run begins at the first slip, whatever its `start`.
     load : callable or (times, values), optional
         tau_0(t), Pa, instead of the method's constant rate. It must not fall before the first
         slip. A callable needs `end_time`.
@@ -170,7 +171,7 @@ def simulate_rupture(
         s; at most one frame in each interval of this length, counted from zero load.
     steps : bool
         Keep time, load, mean stress, ... of every step, over 'step'.
-    stop : {"sliding", "onset", "rest", "time"}, optional
+    stop : {"sliding", "onset", "rest", "runaway", "time"}, optional
         As `method.stop`, which holds if left out; or "time", only at `end_time`. Unless it waits
         for `end_time`, a run also ends where nothing slips and the load has stopped rising for
         good ("rest").
@@ -208,7 +209,7 @@ def simulate_rupture(
     """
     check_options(dict(locals()))
     check_variables(variables)
-    if refused := refusals(problem, method):
+    if refused := refusals(problem, method) or refused_stop(problem, stop or method.stop):
         raise InputError(refused)
     given, measured = gather(problem, named_profiles(profiles), "refuse")
     rows = problem.sample(given, accept=method.accepts)
@@ -327,6 +328,8 @@ def _reason(code: int, run: Run, state: State, stop: str) -> str | None:
         return "onset"
     if code == monitor.AT_REST:
         return "rest"
+    if stop == "runaway" and runs_away(run, state):
+        return "runaway"
     if run.ended(state):
         return "time"
     if stop != "time" and run.resting(state):

@@ -30,6 +30,10 @@ _SCALARS: dict[str, Variable] = {
     "arrested_events": Variable("1", "instabilities that stopped before the whole interface slid"),
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
+    "start_load": Variable("Pa", "load factor at which the simulation began"),
+    "start_error": Variable(
+        "Pa", "estimated error of the first instability due to the start; 0 from rest"
+    ),
     "implicit_steps": Variable("1", "implicit steps taken"),
     "explicit_steps": Variable("1", "explicit steps taken"),
 }
@@ -129,6 +133,8 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
         "arrested_events": int(watch[monitor.ARRESTED]),
         "rupture_speed": _per_direction([_of_finite(np.max, speeds) for speeds in far]),
         "median_rupture_speed": _per_direction([_of_finite(np.median, speeds) for speeds in near]),
+        "start_load": float(watch[monitor.START_LOAD]),
+        "start_error": float(watch[monitor.START_ERROR]),
         "implicit_steps": int(watch[monitor.IMPLICIT_STEPS]),
         "explicit_steps": int(watch[monitor.EXPLICIT_STEPS]),
     }

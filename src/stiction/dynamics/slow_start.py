@@ -1,0 +1,137 @@
+"""Where a run may begin: on the quasi-static path, close to the first instability.
+
+While the load rises slowly, slip follows the equilibria d(tau_0) at the rate V = R dd/dtau_0, R the
+loading rate. Slip that grows as exp(a t) leaves in each memory variable, psi' = z psi + V with
+z = s_p |k| c_s, what it leaves for ever: psi = V/(a - z). Near the onset, a fold, the distance of
+slip from its limit falls as (tau_c - tau_0)^(1/2), so that a = R / (2 (tau_c - tau_0)).
+
+Stress that follows such a rate without delay needs no force; what is left over is inertia (the
+kernel is even in a but for the radiation of the mean, to which the load is raised). So the stress
+by which such a state misses the strength where it slips is an estimate of the error: it is at once
+what is wrong with the state and, as a stress, by how much the onset can be misplaced.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.dynamics import monitor
+from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.implicit_tables import remember_growth
+from stiction.dynamics.integrator import Run, State
+from stiction.equilibrium.continuation import exceeds
+from stiction.equilibrium.pieces import refused
+from stiction.equilibrium.prepared import Setting
+from stiction.equilibrium.solver import sample_of
+from stiction.equilibrium.workspace import Sample as StaticSample
+from stiction.errors import InputError
+from stiction.problem import Problem
+from stiction.sample import Sample
+
+Floats = NDArray[np.float64]
+
+_TOLERANCE = 2e-5  # of the stress scale: a fifth of the fall that counts as an event
+_CROSSINGS = 10.0  # of h_n by shear waves: how long before the onset the first trial begins
+_BACK = 0.25  # of the distance to the onset, over which the rate is measured
+_TRIALS = 5
+
+
+def static_setting(problem: Problem) -> Setting | None:
+    """What finding equilibria of a problem needs; None where they are not followed."""
+    if problem.interface.is_plane or refused(problem.friction):
+        return None
+    try:
+        return Setting(problem)
+    except InputError:  # so fine a grid that an equilibrium takes longer than a run from rest
+        return None
+
+
+def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: float) -> State | None:
+    """The state closest to the onset whose error is small enough, None if there is none.
+
+    Parameters
+    ----------
+    setting : Setting
+        From `static_setting`.
+    run : Run
+    rows : Sample
+    number : int
+        Of the sample in `rows`.
+    rate : float
+        R, Pa/s.
+    """
+    nodes = run.setting.nodes
+    if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
+        return None
+    try:
+        setting.refuse_too_fine(float(nodes.weakening.max()))
+    except InputError:
+        return None
+    static = sample_of(rows, number, setting.pieces)
+    onset = setting.programme(static.excess, static.rate)
+    if onset is None:
+        return None
+    asked = _TOLERANCE * run.scale_at(onset.load)
+    crossing = setting.problem.nucleation_length_of(run.steepest_rate) / (
+        setting.problem.solid.shear_wave_speed
+    )
+    distance = max(_CROSSINGS * crossing * rate, 1e-6 * asked)
+    for _ in range(_TRIALS):
+        if onset.load - (1.0 + _BACK) * distance <= run.first_load:
+            return None
+        found = _at(setting, run, static, onset.load, distance, rate)
+        if found is None:
+            distance *= 4.0
+        elif found.watch[monitor.START_ERROR] <= asked:
+            return found
+        else:  # V falls as distance^(-1/2), its second derivative as distance^(-5/2)
+            distance *= 1.2 * (found.watch[monitor.START_ERROR] / asked) ** 0.4
+    return None
+
+
+def _at(
+    setting: Setting, run: Run, static: StaticSample, onset: float, distance: float, rate: float
+) -> State | None:
+    """The state at a distance (Pa) below the onset; None where it is not known well enough.
+
+    That is where a node is beyond the first piece of its law, so that the programme does not hold,
+    or has lost half of its strength at a time that would be unknown.
+    """
+    nodes, grid = run.setting.nodes, run.medium.grid
+    load, back = onset - distance, _BACK * distance
+    here, before = (
+        setting.programme(static.excess, static.rate, cap) for cap in (load, load - back)
+    )
+    if here is None or before is None:
+        return None
+    if exceeds(static, here.slip):
+        return None
+    weakens = nodes.critical > 0.0
+    half = run.control[monitor.ARRIVAL] * nodes.critical
+    if np.any(here.slip[weakens] >= half[weakens]) or np.any(here.slip[~weakens] > 0.0):
+        return None
+    interval, growth = back / rate, 0.5 * rate / distance
+    mean_rate = np.maximum(here.slip - before.slip, 0.0) / interval
+    slip_rate = mean_rate * (1.0 + 0.5 * growth * interval)
+    radiated = run.medium.impedance * float(slip_rate.mean())
+    applied = load + radiated / run.setting.mean_profile
+    state = run.start(applied / rate, here.slip)
+    rate_hat = run.medium.interface.transform(slip_rate)
+    memory = remember_growth(grid, state.memory, rate_hat, growth)
+    pushed = run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
+    stress = run.elastic_stress(state.slip_hat, applied) + pushed
+    stress -= run.medium.impedance * slip_rate
+    missed = np.abs(stress - run.strength_after(here.slip))[here.slip > 0.0]
+    state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
+    state.explicit = False
+    watch = state.watch
+    watch[monitor.PAST_STEP], watch[monitor.TOP_RATE] = interval, slip_rate.max()
+    for field in (monitor.MEAN_STRESS, monitor.PEAK_STRESS, monitor.LOCAL_STRESS):
+        watch[field] = stress.mean()
+    for field in (monitor.LOCAL_RADIATED, monitor.RADIATED):
+        watch[field] = radiated
+    # The slow path has radiated nothing: that is the work that was done on it.
+    watch[monitor.WORK] -= radiated_energy(run.friction, nodes, grid, state.fields)
+    watch[monitor.START_ERROR] = missed.max(initial=0.0)
+    return state
