@@ -26,7 +26,7 @@ setting = {"method": st.LocalCriterion(), "load_cell_error": 1e4}
 truth = (h_n, 0.66e6)
 peaks = st.simulator(problem, strength, names, samples=25, seed=7, **setting)(truth)
 
-simulate = st.simulator(problem, strength, names, samples=200, seed=0, method=setting["method"])
+simulate = st.simulator(problem, strength, names, samples=1000, seed=0, method=setting["method"])
 
 
 def transform(u):
@@ -44,7 +44,7 @@ def log_likelihood(theta):
 
 
 sampler = dynesty.NestedSampler(
-    log_likelihood, transform, 2, nlive=30, rstate=np.random.default_rng(1)
+    log_likelihood, transform, 2, nlive=60, rstate=np.random.default_rng(1)
 )
 sampler.run_nested(dlogz=0.5, print_progress=False)
 draws = sampler.results.samples_equal(np.random.default_rng(2))

@@ -62,6 +62,7 @@ def test_slip_converges_with_second_order_in_space():
     assert errors[1] / errors[2] == pytest.approx(4.0, abs=0.8)
 
 
+@pytest.mark.slow
 def test_implicit_steps_approach_the_explicit_solution():
     """The same slow onset by explicit steps only, and by implicit steps of two sizes."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")

@@ -28,6 +28,7 @@ def relative_error(nodes_per_patch, periods):
     return abs(onset.first_instability.item() - (1e6 - DEPTH * mean)) / DEPTH
 
 
+@pytest.mark.slow
 def test_second_order_in_the_spacing():
     # At L = 512 h_n the periodic images add less than 1e-7. The window of a patch is a whole number
     # of nodes, hence the scatter about the ratio of 4 of a second-order method.

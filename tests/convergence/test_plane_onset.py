@@ -32,6 +32,7 @@ def test_lattice_converges_at_second_order_to_the_spectral_onset():
     assert errors[-1] < 2e-4
 
 
+@pytest.mark.slow
 def test_spectral_converges_faster():
     reference = smooth_onset(256, "spectral")
     for nodes in (48, 96):

@@ -203,6 +203,7 @@ def wide(problem, solid):
     return slow, strength.sample(slow.interface, samples=10, seed=4)
 
 
+@pytest.mark.slow
 def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide, solid):
     """A uniform initial stress is a load that is there already."""
     problem, tau_p = wide

@@ -36,15 +36,17 @@ def test_openturns_works_on_the_limit_state(monkeypatch, tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_dynesty_finds_the_same_posterior(monkeypatch, tmp_path, capsys):
-    """Another sampler, likelihood and no affine scaling: 30 live points, half a minute."""
+    """Another sampler, likelihood and no affine scaling: 60 live points, two minutes."""
     pytest.importorskip("dynesty")
     found, _ = run_example("outside_dynesty", monkeypatch, tmp_path, capsys)
     for i, name in enumerate(found["names"]):
         own = found["posterior"].draws[name].ravel()
-        # Two hundred simulated peaks and thirty live points leave a third of the width.
-        assert abs(found["draws"][:, i].mean() - own.mean()) < 0.35 * own.std(), name
-    # Nested sampling: sqrt(information / live points), 0.25 here, and a likelihood from 200.
-    assert found["evidence"] == pytest.approx(found["posterior"].log_evidence, abs=1.0)
+        # Sixty live points leave a tenth of the width; two seeds gave 0.04 to 0.11.
+        assert abs(found["draws"][:, i].mean() - own.mean()) < 0.3 * own.std(), name
+    # Silverman's kernel widens the variance of 1000 peaks by 750^-0.4, which each of the 25 pays.
+    # Nested sampling adds sqrt(information / live points), 0.22 here: three of them.
+    smoothing = 0.5 * 25 * np.log1p(750.0**-0.4)
+    assert found["evidence"] == pytest.approx(found["posterior"].log_evidence - smoothing, abs=0.66)
 
 
 @pytest.mark.slow
@@ -88,6 +90,7 @@ def small_study(folder, more=""):
     return folder / "tests.toml"
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page(tmp_path):
     study = small_study(tmp_path)
     done = command("infer", study, "--peaks", DATA / "peaks.csv", "--out", "told", cwd=tmp_path)

@@ -172,6 +172,7 @@ def test_the_smallest_budgets_are_kept_to(system, algorithm, allowed):
     assert result.interval[0] < 7e-5 < result.interval[1]
 
 
+@pytest.mark.slow
 def test_auto_leaves_a_first_stage_that_picks_others():
     """With a wide range of strength most first instabilities are arrested."""
     base = st.paper.problem(nodes=256)
@@ -191,6 +192,7 @@ def test_auto_leaves_a_first_stage_that_picks_others():
     assert "only" in answer.reason
 
 
+@pytest.mark.slow
 def test_no_run_goes_deeper_than_forty_levels(system):
     """A log-normal strength of 1 MPa is below 1 kPa with P of some 1e-160 at a point."""
     field = st.RandomField(scipy.stats.lognorm(0.25, scale=1e6), system[1].spectrum)

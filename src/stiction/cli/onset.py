@@ -126,7 +126,11 @@ def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any
         elif name == "rupture":
             found.append(cls(loading_rate=loading_rate))
         else:
-            found.append(cls())
+            try:
+                found.append(cls())
+            except (InputError, TypeError):  # options without defaults: only a study has them
+                if names:
+                    raise
     return found
 
 

@@ -47,7 +47,7 @@ def film(
     InputError
         If a variable was not kept, or the file type is not known.
     """
-    need(run, "slip_rate", "shear_stress", "peak_strength")
+    need(run, "slip_rate", "shear_stress", "peak_strength", plane=True)
     check_count("pictures", pictures, 1)
     check_count("rate", rate, 1)
     target = as_path("path", path)

@@ -116,8 +116,8 @@ def front(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = 
     return axes
 
 
-def need(run: xr.Dataset, *names: str) -> None:
-    """Refuse a run without these variables, or of a plane.
+def need(run: xr.Dataset, *names: str, plane: bool = False) -> None:
+    """Refuse a run without these variables, or of a plane where that cannot be drawn.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def need(run: xr.Dataset, *names: str) -> None:
             f"run: has no {', '.join(missing)}; keep it with simulate_rupture(variables=...), or "
             "read a stored run with open_rupture"
         )
-    if "y" in run.dims:
+    if "y" in run.dims and not plane:
         raise InputError("run: is of a plane; choose one line of it with run.isel(y=...)")
 
 

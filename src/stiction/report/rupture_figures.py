@@ -76,7 +76,7 @@ def rupture_figure(run: xr.Dataset, problem: Problem) -> Figure:
     InputError
         If a variable was not kept.
     """
-    need(run, "slip_rate", "step_time", "peak_strength")
+    need(run, "slip_rate", "step_time", "peak_strength", plane=True)
     if problem.interface.is_plane:
         return plane_rupture_figure(run, problem)
     x, times = run["x"].values, run["time"].values
@@ -150,7 +150,7 @@ def front_figure(run: xr.Dataset, problem: Problem) -> Figure:
         front. Patches that grow ahead of it can make it look faster than c_d. Of a plane: both
         along x and along y through the critical position.
     """
-    need(run, "arrival_time", "front_speed", "onset_time")
+    need(run, "arrival_time", "front_speed", "onset_time", plane=True)
     if problem.interface.is_plane:
         return plane_front_figure(run, problem)
     x = run["x"].values * MILLI
