@@ -99,25 +99,26 @@ def interval_of(
     repeated: Sequence[Mapping[str, float]],
     confidence: float,
 ) -> tuple[float, float]:
-    """The basic bootstrap interval of a parameter, on its own scale.
+    """The studentised bootstrap interval of a parameter, on its own scale.
 
-    That of a place, such as the mean, is studentised: its error is as wide as the field's standard
-    deviation and the root of its correlation length, both of which the repetition finds anew.
+    The error of any parameter is as wide as the root of the correlation length, of which a record
+    holds few, and that of a place, such as the mean, also as the field's standard deviation; a
+    repetition finds both anew (Davison and Hinkley, 1997, section 5.2). Of R repetitions the
+    quantile p is the p (R + 1)th: interpolated to the ends, as by default, it lies further inside.
     """
-    place = name in PLACES
     at = _scaled(name, np.array(estimated[name]))
     around = _scaled(name, np.array([one[name] for one in repeated]))
-    widths = np.array([_width(one) if place else 1.0 for one in repeated])
+    widths = np.array([_width(name, one) for one in repeated])
     tail = 0.5 * (1.0 - confidence)
-    low, high = np.quantile((around - at) / widths, [tail, 1.0 - tail])
-    ends = at - (_width(estimated) if place else 1.0) * np.array([high, low])
-    first, last = _unscaled(name, ends)
+    low, high = np.quantile((around - at) / widths, [tail, 1.0 - tail], method="weibull")
+    first, last = _unscaled(name, at - _width(name, estimated) * np.array([high, low]))
     return float(first), float(last)
 
 
-def _width(values: Mapping[str, float]) -> float:
-    """What the error of a mean is proportional to."""
-    return values["standard_deviation"] * math.sqrt(values["efolding_length"])
+def _width(name: str, values: Mapping[str, float]) -> float:
+    """What the error of a parameter, on its own scale, is proportional to."""
+    root = math.sqrt(values["efolding_length"])
+    return root * values["standard_deviation"] if name in PLACES else root
 
 
 def _scaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

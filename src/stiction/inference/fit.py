@@ -265,9 +265,9 @@ def fit_field(
     Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian field z by
     Hermite expansion (Grigoriu, 1995). A likelihood's own curvature understates the error; the
     intervals come from fits to records simulated from the fitted field, reflected about the
-    estimate on the scale on which a parameter's error is about normal (the basic bootstrap, that of
-    a mean studentised; Davison and Hinkley, 1997, section 5.2), so that a bias of the estimate is
-    allowed for.
+    estimate on the scale on which a parameter's error is about normal and measured in units of the
+    error that a record of its correlation length has (the studentised bootstrap; Davison and
+    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for.
 
     Examples
     --------
