@@ -195,4 +195,5 @@ def setup(app):
     app.connect("env-get-outdated", with_other_pages)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)
-    app.connect("builder-inited", write_other_names, priority=1)  # before autosummary looks
+    # Before Sphinx lists the sources, of which autosummary makes a page a name.
+    app.connect("config-inited", lambda app, config: write_other_names(app))
