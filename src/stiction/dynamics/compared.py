@@ -55,7 +55,10 @@ class RuptureMisfit(Rupture):
     """
 
     record: Annotated[
-        Any, BeforeValidator(_record), PlainSerializer(str), WithJsonSchema({"type": "string"})
+        Any,
+        BeforeValidator(_record),
+        PlainSerializer(lambda value: str(value)),  # pydantic 2.7 takes no bare `str`
+        WithJsonSchema({"type": "string"}),
     ]
     frames_every: Count = 5
     type: Literal["rupture_misfit"] = "rupture_misfit"  # type: ignore[assignment]  # its own name
