@@ -86,8 +86,47 @@ def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
         compiled = numba.njit(**options)(function)
     finally:
         numba.config.CACHE_DIR = before
+    if hasattr(compiled, "_cache") and hasattr(compiled._cache, "flush"):
+        _keep_own(compiled._cache)
     result: Kernel = compiled
     return result
+
+
+def _keep_own(cache: Any) -> None:
+    """Keep on disk only what is compiled for types of this package.
+
+    A friction law from elsewhere is part of the kernels that are compiled for it. numba would not
+    notice that the law was edited, and could not read its index where the law's module is missing.
+    """
+    load, save = cache.load_overload, cache.save_overload
+    unreadable = (ImportError, AttributeError)
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target) if _is_own(signature) else None
+        except unreadable:
+            return None
+
+    def save_overload(signature: Any, data: Any) -> None:
+        if not _is_own(signature):
+            return
+        try:
+            save(signature, data)
+        except unreadable:
+            cache.flush()
+            save(signature, data)
+
+    cache.load_overload, cache.save_overload = load_overload, save_overload
+
+
+def _is_own(kind: Any) -> bool:
+    """Whether a numba type, or a tuple of them, names no class from outside the package."""
+    if isinstance(kind, tuple | list):
+        return all(map(_is_own, kind))
+    named = getattr(kind, "instance_class", None)
+    if named is not None and not named.__module__.startswith("stiction."):
+        return False
+    return _is_own(getattr(kind, "types", ()))
 
 
 def jit(function: Kernel) -> Kernel:

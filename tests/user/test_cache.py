@@ -51,3 +51,57 @@ def test_kernels_are_kept_where_that_is_possible(tmp_path, writable):
     assert run(code, copy, cache) == "8.0"
     kept = list(cache.rglob("*.nbc")) if writable else []
     assert bool(kept) == writable
+
+
+OWN_LAW = """
+from typing import NamedTuple
+import numpy as np
+from stiction._jit import jit
+from stiction.friction import kernels
+
+class OwnParameters(NamedTuple):
+    scale: float
+
+@jit
+def strength(law, peak, residual, rate, slip):
+    return law.scale * peak
+
+@jit
+def slope(law, peak, residual, rate, slip):
+    return 0.0
+
+kernels.register(OwnParameters, strength, slope)
+ones = np.ones(3)
+print(kernels.strengths(OwnParameters({scale}), ones, ones, ones, ones))
+"""
+LINEAR = """
+import numpy as np, stiction as st
+from stiction.friction import kernels
+ones = np.ones(3)
+law = st.SlipWeakening(weakening_rate=1.0).parameters
+print(kernels.strengths(law, ones, 0.0 * ones, ones, 0.5 * ones))
+"""
+
+
+def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path):
+    """Its module may be missing in the next process, or changed; numba would notice neither."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(code):
+        (tmp_path / "own_module.py").write_text(code)
+        command = [sys.executable, "-c", "import own_module"]
+        if code == LINEAR:
+            command = [sys.executable, tmp_path / "own_module.py"]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    assert run(OWN_LAW.format(scale=2.0)) == "[2. 2. 2.]"
+    assert run(LINEAR) == "[0.5 0.5 0.5]"
+    edited = OWN_LAW.format(scale=2.0).replace("law.scale * peak", "3.0 * law.scale * peak")
+    assert run(edited) == "[6. 6. 6.]"
+    kept = b"".join(path.read_bytes() for path in (tmp_path / "cache").rglob("*.nbi"))
+    assert kept
+    assert b"own_module" not in kept
