@@ -24,7 +24,7 @@ from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
 from stiction.ensemble.files import cannot_write
 from stiction.ensemble.manifest import MANIFEST, refuse_another
-from stiction.ensemble.monte_carlo import check_run, warn_of_fields
+from stiction.ensemble.monte_carlo import check_run
 from stiction.ensemble.part import Part
 from stiction.ensemble.points import variables_in
 from stiction.ensemble.resume import run_stored
@@ -340,8 +340,6 @@ def run_into(
     with writing(folder, plain, versions(), lock=lock) as store:
         if before is not None and not store.chunks and FAILED not in before.attrs:
             store.add(_outcomes_of(before, len(plans)), variables_in(plans))
-        if store.missing(len(plans), ensemble.samples, ensemble.first, retry=retry, part=part):
-            warn_of_fields(plans)
         run_stored(
             store,
             plans,

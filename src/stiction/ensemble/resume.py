@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 
 from stiction._progress import Meter, Show
-from stiction.ensemble.monte_carlo import method_name
+from stiction.ensemble.monte_carlo import method_name, warn_of_fields
 from stiction.ensemble.part import Part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import variables_in
@@ -54,6 +54,8 @@ def run_stored(
         If workers are lost.
     """
     spans = store.missing(len(plans), samples, first, retry=retry, part=part)
+    if spans:
+        warn_of_fields(plans)
     to_do = sum(span.samples for span in spans)
     variables = variables_in(plans)
     alive = {point for chunk in store.chunks for point in chunk.done[:, 0].tolist()}
