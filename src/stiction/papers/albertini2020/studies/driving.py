@@ -77,15 +77,11 @@ def compute(context: Context) -> xr.Dataset:
         energy = _energy(problem, profiles)
         length, stress = found["event_length"].values, found["event_stress"].values
         griffith = np.full_like(length, np.nan)
-        for at in np.argwhere(np.isfinite(length)):
-            event = tuple(at)
-            griffith[event] = griffith_length(
-                problem,
-                float(stress[event]),
-                energy,
-                centre=0.5 * problem.interface.extent,
-                arrest=True,
-            )
+        there = np.isfinite(length)
+        centre = 0.5 * problem.interface.extent
+        griffith[there] = griffith_length(
+            problem, stress[there], energy, centre=centre, arrest=True
+        )
         arrested = np.flatnonzero(np.isfinite(length[:, 0]))
         dynamic = np.full(SAMPLES, np.nan)
         dynamic[arrested] = context.map(
@@ -119,9 +115,7 @@ def curve(setting: Setting, case: str, loads: Array) -> Array:
     field = setting.field(setting.correlation_ratios[1])
     energy = _energy(problem, field.sample(problem.interface, samples=64, seed=0))
     centre = 0.5 * problem.interface.extent
-    return np.array(
-        [griffith_length(problem, float(t), energy, centre=centre, arrest=True) for t in loads]
-    )
+    return griffith_length(problem, loads, energy, centre=centre, arrest=True)
 
 
 def _with_inertia(problem: Problem, profiles: Array, stresses: Array, sample: int) -> float:
