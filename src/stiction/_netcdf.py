@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ import xarray as xr
 from stiction._files import write_atomically
 
 GROUP, DIGEST = "checksum", "sha256"
+ONE_AT_A_TIME = threading.RLock()
+"""The NetCDF library knows no threads: one may look at a run that another one writes."""
 
 
 class DamagedError(ValueError):
@@ -44,7 +47,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
         with netCDF4.Dataset(aside, "a") as file:
             file.createGroup(GROUP).setncattr(DIGEST, mark)
 
-    write_atomically(path, write)
+    with ONE_AT_A_TIME:
+        write_atomically(path, write)
 
 
 def read_dataset(path: Path) -> xr.Dataset:
@@ -57,11 +61,12 @@ def read_dataset(path: Path) -> xr.Dataset:
         If it is no such file, or not what was written.
     """
     try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            dataset = opened.load()
-        with netCDF4.Dataset(path) as file:
-            marked = GROUP in file.groups and DIGEST in file[GROUP].ncattrs()
-            mark = str(file[GROUP].getncattr(DIGEST)) if marked else ""
+        with ONE_AT_A_TIME:
+            with xr.open_dataset(path, engine="netcdf4") as opened:
+                dataset = opened.load()
+            with netCDF4.Dataset(path) as file:
+                marked = GROUP in file.groups and DIGEST in file[GROUP].ncattrs()
+                mark = str(file[GROUP].getncattr(DIGEST)) if marked else ""
         found = digest_of(dataset)
     except (FileNotFoundError, PermissionError):
         raise

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from difflib import get_close_matches
+from typing import NamedTuple
 
 _OURS = ("stiction", "pydantic", "dataclasses")
 
@@ -65,8 +68,37 @@ def warn_accuracy(message: str) -> None:
     warn_user(message, AccuracyWarning)
 
 
+class Warned(NamedTuple):
+    """A warning that was collected instead of issued."""
+
+    message: str
+    category: type[Warning]
+
+
+_collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=None)
+
+
+@contextmanager
+def collect_warnings() -> Iterator[list[Warned]]:
+    """What this package warns of meanwhile, in the order in which it comes up.
+
+    In this thread, and in those that run in its context. `warnings.catch_warnings` is for one
+    thread at a time: it changes the whole process, and two threads would take each other's.
+    """
+    found: list[Warned] = []
+    token = _collected.set(found)
+    try:
+        yield found
+    finally:
+        _collected.reset(token)
+
+
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the caller's own line, outside this package."""
+    collected = _collected.get()
+    if collected is not None:
+        collected.append(Warned(message, category))
+        return
     level = 1
     frame = sys._getframe(1)
     # Objects are validated by pydantic, whose frames lie between ours.

@@ -38,20 +38,27 @@ def test_parameters_decide_the_printed_numbers():
     assert _judge("effective-modulus", paper).verdict is Verdict.FAILS
 
 
+PAPER = Setting(problem=st.paper.problem(nodes=256))
+MIRROR = Setting(
+    problem=st.paper.problem(nodes=256),
+    marginal=st.Beta(alpha=3.0, beta=1.5, low=0.66e6, high=1.66e6),
+)
+
+
 @pytest.fixture(scope="module")
-def findings() -> dict[str, dict[str, Finding]]:
-    """All claims at 256 nodes and few samples, for the paper's strength and for its mirror."""
-    result = {}
-    for name, marginal in (
-        ("paper", st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)),
-        ("mirror", st.Beta(alpha=3.0, beta=1.5, low=0.66e6, high=1.66e6)),
-    ):
-        setting = Setting(problem=st.paper.problem(nodes=256), marginal=marginal)
-        context = Context(setting, 300, 0, ruptures=6, dynamic=24)
-        studies = compute(STUDIES if name == "paper" else ["monte_carlo"], context)
-        data = Data(setting, 300, 0, studies)
-        result[name] = {claim.name: finding for claim, finding in judged(data)}
-    return result
+def studies() -> dict[str, xr.Dataset]:
+    """All studies at 256 nodes and few samples."""
+    return compute(STUDIES, Context(PAPER, 300, 0, ruptures=6, dynamic=24))
+
+
+@pytest.fixture(scope="module")
+def findings(studies) -> dict[str, dict[str, Finding]]:
+    """All claims for the paper's strength, and those about the onset for its mirror."""
+    mirrored = compute(["monte_carlo"], Context(MIRROR, 300, 0))
+    return {
+        name: {claim.name: finding for claim, finding in judged(Data(setting, 300, 0, found))}
+        for name, setting, found in (("paper", PAPER, studies), ("mirror", MIRROR, mirrored))
+    }
 
 
 def test_every_claim_has_a_verdict(findings):
@@ -178,3 +185,32 @@ def test_misplaced_counts_the_shorter_way_round():
     }
     found = misplaced(Data(setting, 4, 0, studies), 0.5)
     np.testing.assert_array_equal(found, [False, True, False, True])
+
+
+def test_statements_about_onsets_are_judged_by_elastodynamics_too(findings):
+    """Where as many ruptures were run; elsewhere there is nothing to judge by."""
+    paper, mirror = findings["paper"], findings["mirror"]
+    twice = {name for name, finding in paper.items() if finding.by_elastodynamics}
+    assert twice == {claim.name for claim in CLAIMS.values() if claim.onsets_of}
+    assert len(twice) >= 15
+    assert paper["more-variable"].by_elastodynamics.verdict in (Verdict.HOLDS, Verdict.OPEN)
+    assert not any(finding.by_elastodynamics for finding in mirror.values())
+
+
+def test_the_second_verdict_follows_from_the_ruptures(studies):
+    """Ruptures turned round turn the second verdict, and leave the first as it is."""
+    data = Data(PAPER, 300, 0, studies)
+    turned = studies["dynamic"].isel(correlation_ratio=slice(None, None, -1))
+    turned = turned.assign_coords(correlation_ratio=studies["dynamic"]["correlation_ratio"])
+    other = Data(PAPER, 300, 0, studies | {"dynamic": turned})
+    claim = CLAIMS["lower-friction"]
+    assert claim.judge(data).verdict is claim.judge(other).verdict is Verdict.HOLDS
+    assert claim.judge(data).by_elastodynamics.verdict is Verdict.HOLDS
+    assert claim.judge(other).by_elastodynamics.verdict is Verdict.FAILS
+    # The same samples by the same method: no difference is left.
+    exact = studies["interaction"]
+    same = Data(PAPER, 300, 0, studies | {"dynamic": exact})
+    share = CLAIMS["arrest-against-length"].judge(same)
+    assert [each.estimate for each in share.computed] == [
+        each.estimate for each in share.by_elastodynamics.computed
+    ]

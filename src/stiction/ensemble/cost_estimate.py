@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from stiction.ensemble.monte_carlo import wide_bytes
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.work import Failure, do_work
+from stiction.errors import collect_warnings
 
 PROBED = 5
 
@@ -53,8 +53,7 @@ def probe_time(
     chosen = np.unique(np.linspace(0, len(plans) - 1, PROBED).round().astype(int))
     rates: list[float] = []
     failures: list[Failure] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with collect_warnings():  # the run itself will say so
         for point in chosen:
             plan = plans[point]
             failures += do_work(plan, int(point), first, 1).failures  # compiles and prepares

@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import socket
-import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -20,13 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._files import write_atomically
+from stiction._netcdf import ONE_AT_A_TIME
 from stiction.errors import StoreError
 from stiction.results import Variable
 
 Arrays = dict[str, NDArray[Any]]
-
-_ONE_AT_A_TIME = threading.Lock()
-"""The NetCDF library knows no threads: one may look at a run that another one writes."""
 
 
 def digest(data: bytes) -> str:
@@ -225,7 +222,7 @@ def encode(
     the time.
     """
     attributes = dict(attributes, content=_digest_of(values, attributes))
-    with _ONE_AT_A_TIME:
+    with ONE_AT_A_TIME:
         return _encode(values, variables, attributes)
 
 
@@ -267,7 +264,7 @@ def decode(data: bytes) -> tuple[Arrays, dict[str, Any]]:
     """
     result: Arrays = {}
     try:
-        with _ONE_AT_A_TIME, netCDF4.Dataset("chunk.nc", "r", memory=data) as file:
+        with ONE_AT_A_TIME, netCDF4.Dataset("chunk.nc", "r", memory=data) as file:
             file.set_auto_maskandscale(False)
             attributes = {name: json.loads(file.getncattr(name)) for name in file.ncattrs()}
             for name, variable in file.variables.items():

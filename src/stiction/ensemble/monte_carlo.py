@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
@@ -27,7 +26,13 @@ from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import differing_in
 from stiction.ensemble.scheduler import Span, share_out, usable_cores
 from stiction.ensemble.work import raise_failure
-from stiction.errors import InputError, unknown_name, warn_accuracy, warn_user
+from stiction.errors import (
+    InputError,
+    collect_warnings,
+    unknown_name,
+    warn_accuracy,
+    warn_user,
+)
 from stiction.evaluation import Method, check_method
 from stiction.plausible import warn_of_units
 from stiction.problem import Problem
@@ -180,18 +185,17 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
             for field in plan.random.properties.values()
         )
     )
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        with Meter("checking the fields", len(pairs) + len(plans), unit="fields") as meter:
-            for field, interface in pairs:
-                warn_if_inaccurate(field, interface)
-                meter.advance()
-            for plan in plans:
-                problem, fields = plan.problem, plan.random.properties
-                warn_of_units(problem, mean_in_stress(problem, fields, "strength"))
-                check_residual(problem, fields)
-                meter.advance()
-    found_warnings = list(dict.fromkeys((str(w.message), w.category) for w in caught))
+    meter = Meter("checking the fields", len(pairs) + len(plans), unit="fields")
+    with collect_warnings() as caught, meter:
+        for field, interface in pairs:
+            warn_if_inaccurate(field, interface)
+            meter.advance()
+        for plan in plans:
+            problem, fields = plan.problem, plan.random.properties
+            warn_of_units(problem, mean_in_stress(problem, fields, "strength"))
+            check_residual(problem, fields)
+            meter.advance()
+    found_warnings = list(dict.fromkeys(caught))
     for text, category in found_warnings[:FEW]:
         warn_user(text, category)
     if len(found_warnings) > FEW:

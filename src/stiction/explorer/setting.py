@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -18,7 +17,7 @@ from stiction.criterion.nucleation import nucleation_stress
 from stiction.ensemble.monte_carlo import monte_carlo
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
-from stiction.errors import InputError
+from stiction.errors import InputError, collect_warnings
 from stiction.evaluation import onset
 from stiction.friction.linear import SlipWeakening
 from stiction.interface import Interface
@@ -248,14 +247,13 @@ class Cached:
         InputError
             If the numbers do not fit together.
         """
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with collect_warnings() as caught:
             problem, strength = setting.problem(), setting.strength()
             coefficients = self._coefficients(problem, strength)
             tau_p, average, exact = self._profile(problem, strength, setting.sample)
             load = setting.load * float(exact.first_instability[0])
             path = equilibrium_path(problem, tau_p, [load])
-        doubts = tuple(dict.fromkeys(str(warning.message) for warning in caught))
+        doubts = tuple(dict.fromkeys(warning.message for warning in caught))
         return Answer(
             x=problem.interface.x * 1e3,
             strength=tau_p * 1e-6,

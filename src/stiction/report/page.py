@@ -62,6 +62,8 @@ class ShownClaim:
     verdict : str
     rule : str
         What the verdict follows from.
+    again : tuple of str
+        A second verdict and what it follows from; empty if there is none.
     """
 
     where: str
@@ -71,6 +73,7 @@ class ShownClaim:
     verdict: str
     comment: str
     rule: str
+    again: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import os
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+
+import xarray as xr
 
 from stiction._files import write_atomically
 from stiction._model import describe
@@ -116,15 +119,9 @@ def run(
     total = studies.cost(needed, context) + _DRAWING * len(figures)
     with Meter("paper", total, progress, unit="steps") as meter:
         context.report = meter.advance
-        results = studies.compute(needed, context)
-        data = Data(context.setting, context.samples, seed, results)
-        findings = judged(data, claims)
-        (folder / "figures").mkdir(parents=True, exist_ok=True)
-        (folder / "tables").mkdir(exist_ok=True)
-        shown = []
-        for figure in figures:
-            shown.append(_draw(figure, data, folder))
-            context.report(_DRAWING)
+        data, drawn = _compute_and_draw(needed, figures, context, folder)
+    shown = [drawn[figure.name] for figure in figures]
+    findings = judged(data, claims)
     for table in (table for figure in shown for table in figure.tables):
         table.write_csv(folder / "tables")
     claims_table(findings).write_csv(folder / "tables")
@@ -167,6 +164,31 @@ def _claims_of(figures: list[Figure]) -> list[Claim]:
     """Claims that the studies of these figures can judge; those that need none come with all."""
     there = {need for figure in figures for need in figure.needs}
     return [claim for claim in CLAIMS.values() if claim.needs and there.issuperset(claim.needs)]
+
+
+def _compute_and_draw(
+    needed: set[str], figures: list[Figure], context: Context, folder: Path
+) -> tuple[Data, dict[str, ShownFigure]]:
+    """The studies, and each figure as soon as those are done that it shows."""
+    for name in ("figures", "tables"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    found: dict[str, xr.Dataset] = {}
+    data = Data(context.setting, context.samples, context.seed, found)
+    drawn: dict[str, ShownFigure] = {}
+
+    def draw_ready() -> None:
+        for figure in figures:
+            shows = {*figure.needs, *needed.intersection(getattr(figure, "may_show", ()))}
+            if figure.name not in drawn and found.keys() >= shows:
+                drawn[figure.name] = _draw(figure, data, folder)
+                context.report(_DRAWING)
+
+    for name, dataset in studies.results(needed, context):
+        found[name] = dataset
+        draw_ready()
+    draw_ready()  # what needs no study
+    ordered = {name: found[name] for name in studies.STUDIES if name in found}
+    return dataclasses.replace(data, studies=ordered), drawn
 
 
 def _draw(figure: Figure, data: Data, folder: Path) -> ShownFigure:

@@ -32,7 +32,10 @@ class Study(Protocol):
 
 
 class Figure(Protocol):
-    """A figure, with the numbers behind it."""
+    """A figure, with the numbers behind it.
+
+    A module may also have `may_show`, the names of studies that it shows if they are computed.
+    """
 
     name: str
     number: str

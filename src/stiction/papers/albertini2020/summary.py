@@ -56,7 +56,12 @@ def assemble(
         exceptions=_exceptions(findings),
         key_tables=[
             table
-            for table in (_key_table(data), _scatter_table(data), _reading_table(findings))
+            for table in (
+                _key_table(data),
+                _few_table(data),
+                _scatter_table(data),
+                _reading_table(findings),
+            )
             if table is not None
         ],
         figures=figures,
@@ -88,7 +93,10 @@ def claims_table(findings: Judged) -> Table:
     return Table.of(
         "claims",
         "Claims",
-        ("claim", "where", "what it says", "printed", "computed", "verdict", "rule", "comment"),
+        (
+            "claim", "where", "what it says", "printed", "computed", "verdict", "rule", "comment",
+            "verdict by elastodynamics", "computed by elastodynamics",
+        ),
         (
             (
                 claim.name,
@@ -99,10 +107,13 @@ def claims_table(findings: Judged) -> Table:
                 str(finding.verdict),
                 claim.rule.text,
                 finding.comment,
+                str(other.verdict) if other else "",
+                "; ".join(quantity.text for quantity in other.computed) if other else "",
             )
             for claim, finding in findings
+            for other in [finding.by_elastodynamics]
         ),
-    )
+    )  # fmt: skip
 
 
 def limits_table() -> Table:
@@ -160,6 +171,9 @@ def _points(data: Data, findings: Judged) -> list[str]:
         points.append(_about_ruptures(data))
     if {"dynamic", "interaction", "abundant"} <= set(data.studies):
         points.append(_about_dynamics(data))
+    twice = [(claim, finding) for claim, finding in findings if finding.by_elastodynamics]
+    if twice:
+        points.append(_about_both_verdicts(twice))
     if "arrest" in data.studies and data["arrest"].sizes["event"]:
         stay = data["arrest"]["dynamic_arrests"].values > 0
         points.append(
@@ -198,6 +212,19 @@ def _about_dynamics(data: Data) -> str:
         f" the loading rate raise the critical stress by {min(gaps):.2g} to {max(gaps):.2g} % over"
         " exact equilibrium (median); with the cheap methods as control variates they"
         f" fix the mean as well as {min(savings):,.0f} to {max(savings):,.0f} times as many would."
+    )
+
+
+def _about_both_verdicts(twice: Judged) -> str:
+    others = [
+        f"\N{LEFT DOUBLE QUOTATION MARK}{claim.says.rstrip('.')}\N{RIGHT DOUBLE QUOTATION MARK}"
+        f" ({claim.where}) {found.verdict} by the paper's method, {other.verdict} by elastodynamics"
+        for claim, found in twice
+        if (other := found.by_elastodynamics) and other.verdict is not found.verdict
+    ]
+    same = f"{len(twice) - len(others)} of {len(twice)} statements"
+    return f"{same} about the onset of many samples get the same verdict from as many ruptures" + (
+        f"; not so: {'; '.join(others)}." if others else "."
     )
 
 
@@ -298,6 +325,52 @@ def _key_table(data: Data) -> Table | None:
     )
 
 
+def _again(finding: Finding) -> tuple[str, ...]:
+    """What elastodynamics says of the same statement."""
+    other = finding.by_elastodynamics
+    if other is None:
+        return ()
+    numbers = "; ".join(quantity.text for quantity in other.computed)
+    return (f"By elastodynamics: {other.verdict}.", numbers)
+
+
+def _few_table(data: Data) -> Table | None:
+    """What as few simulations as the paper's say of the distribution, and what many samples say."""
+    many = [
+        (label, data[study])
+        for label, study in (("equilibrium", "interaction"), ("elastodynamics", "dynamic"))
+        if study in data.studies
+    ]
+    ratios = [ratio for ratio in data.setting.simulated_ratios if ratio in data.ratios]
+    if "ruptures" not in data.studies or not many or not ratios:
+        return None
+    rows = []
+    for ratio in ratios:
+        runs = data["ruptures"].sel(correlation_ratio=ratio)["critical_stress"].values
+        if runs.size < 3:
+            return None
+        for label, study in many:
+            every = study["critical_stress"].sel(correlation_ratio=ratio).values
+            row = [f"{ratio:g}", f"{runs.size} against {every.size:,} by {label}"]
+            for of in (mean, standard_deviation):
+                few, all_of_them = of(runs).scaled(1e-3), of(every).scaled(1e-3)
+                apart = few - all_of_them
+                row += [
+                    rounded(few), rounded(all_of_them), f"{apart.value / apart.error:+.1f}"
+                ]  # fmt: skip
+            rows.append(tuple(row))
+    return Table.of(
+        "few-and-many",
+        "What few ruptures tell of the critical stress, and what many samples do (kPa)",
+        (
+            "xi_0/h_n", "ruptures", "mean of the few", "mean of the many",
+            "means apart by (errors)", "st. dev. of the few", "st. dev. of the many",
+            "deviations apart by (errors)",
+        ),
+        rows,
+    )  # fmt: skip
+
+
 def _claims(findings: Judged) -> list[tuple[str, list[ShownClaim]]]:
     groups: dict[str, list[ShownClaim]] = {subject: [] for subject in SUBJECTS}
     for claim, finding in findings:
@@ -310,6 +383,7 @@ def _claims(findings: Judged) -> list[tuple[str, list[ShownClaim]]]:
                 str(finding.verdict),
                 finding.comment,
                 claim.rule.text,
+                _again(finding),
             )
         )
     return [(SUBJECTS.get(key, key), members) for key, members in groups.items() if members]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from stiction.papers.albertini2020.claims.combined_rules import EachReading
@@ -70,12 +70,15 @@ class Finding:
         The correction, or what else should be known.
     by_reading : tuple of Verdict
         Under each reading of the text, where it leaves several.
+    by_elastodynamics : Finding, optional
+        The same statement judged by the Monte Carlo study by elastodynamics.
     """
 
     computed: tuple[Quantity, ...]
     verdict: Verdict
     comment: str = ""
     by_reading: tuple[Verdict, ...] = ()
+    by_elastodynamics: Finding | None = None
 
 
 Measure = Callable[[Data], Measured]
@@ -100,6 +103,10 @@ class Claim:
     rule : Rule
     measure : callable
         From data to what the rule judges.
+    onsets_of : str
+        The study whose onsets it is about: where elastodynamics was run for as many samples, the
+        statement is judged a second time by its onsets in their place. Empty if it is about
+        something else.
     """
 
     name: str
@@ -109,6 +116,7 @@ class Claim:
     needs: tuple[str, ...]
     rule: Rule
     measure: Measure
+    onsets_of: str = ""
 
     @property
     def subject(self) -> str:
@@ -116,7 +124,14 @@ class Claim:
         return self.measure.__module__.rpartition(".")[2]
 
     def judge(self, data: Data) -> Finding:
-        """Measure, and apply the rule."""
+        """Measure, and apply the rule; again by elastodynamics where there is enough of it."""
+        finding = self._judge(data)
+        runs = data.by_elastodynamics(self.onsets_of) if self.onsets_of else None
+        if runs is None:
+            return finding
+        return replace(finding, by_elastodynamics=self._judge(runs))
+
+    def _judge(self, data: Data) -> Finding:
         found = self.measure(data)
         numbers = _numbers(found.judged)
         verdict = self.rule(numbers)
@@ -161,7 +176,13 @@ SUBJECTS = {
 
 
 def claim(
-    *, where: str, says: str, rule: Rule, printed: str = "", needs: tuple[str, ...] = ()
+    *,
+    where: str,
+    says: str,
+    rule: Rule,
+    printed: str = "",
+    needs: tuple[str, ...] = (),
+    onsets_of: str = "",
 ) -> Callable[[Measure], Measure]:
     """Decorator that makes a function from data to `Measured` a claim of the function's name."""
 
@@ -169,7 +190,7 @@ def claim(
         name = measure.__name__.replace("_", "-")
         if name in CLAIMS:
             raise ValueError(f"two claims are called {name}")
-        CLAIMS[name] = Claim(name, where, says, printed, needs, rule, measure)
+        CLAIMS[name] = Claim(name, where, says, printed, needs, rule, measure, onsets_of)
         return measure
 
     return register

@@ -46,6 +46,7 @@ def _three(data: Data) -> Measured:
     where="Abstract, Sec. 4.2, Conclusion",
     says="A longer correlation length lowers the critical stress, over the range studied.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Falling(),
 )
 def lower_friction(data: Data) -> Measured:
@@ -79,6 +80,7 @@ def lower_friction_always(data: Data) -> Measured:
     where="Abstract, Secs. 1 and 5.3",
     says="A shorter correlation length makes the critical stress vary less.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Rising(),
 )
 def less_variable(data: Data) -> Measured:
@@ -90,6 +92,7 @@ def less_variable(data: Data) -> Measured:
     where="Sec. 5.4",
     says="A shorter correlation length makes the critical stress vary more.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Falling(),
 )
 def more_variable(data: Data) -> Measured:
@@ -176,6 +179,7 @@ def near_the_bound(data: Data) -> Measured:
     where="Sec. 5.3",
     says="With strength skewed to low values the critical stress is close to the lower bound.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Below(limits.CLOSE_TO_BOUND),
 )
 def close_to_bound(data: Data) -> Measured:
@@ -197,6 +201,7 @@ def close_to_bound(data: Data) -> Measured:
     says="Taking the minimum amplifies the skewness, so that the mean critical stress falls with"
     " the correlation length.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Above(0.0, partly=True),
 )
 def skewness_amplified(data: Data) -> Measured:
@@ -221,6 +226,7 @@ def skewness_amplified(data: Data) -> Measured:
     where="Secs. 3.3 and 4.2, Fig. 5g",
     says="The onset may come anywhere: its position is uniformly distributed.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Chance(limits.CERTAIN),
 )
 def uniform_position(data: Data) -> Measured:
@@ -238,6 +244,7 @@ def uniform_position(data: Data) -> Measured:
     where="Sec. 4.2",
     says="The position of onset is distributed alike at all correlation lengths.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Chance(limits.CERTAIN),
 )
 def position_independent(data: Data) -> Measured:
@@ -258,6 +265,7 @@ def position_independent(data: Data) -> Measured:
     where="Secs. 3.1 and 5.2, Conclusion",
     says="Sliding need not set in where the interface is weakest.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=Above(limits.COMMON, partly=True),
 )
 def weakest_does_not_govern(data: Data) -> Measured:

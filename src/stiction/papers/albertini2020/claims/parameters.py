@@ -244,6 +244,7 @@ def griffith_length(data: Data) -> Measured:
     where="Sec. 4.1",
     says="10,000 samples describe the distribution of the critical stress accurately.",
     needs=("monte_carlo",),
+    onsets_of="monte_carlo",
     rule=All(Below(limits.AS_ONE), Below(limits.RESOLVED)),
 )
 def enough_samples(data: Data) -> Measured:

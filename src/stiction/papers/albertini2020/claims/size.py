@@ -26,6 +26,7 @@ QUOTED_VARIATION = (QUOTED[1] - QUOTED[0]) / 4.0 / (0.5 * (QUOTED[0] + QUOTED[1]
     says="Random local strength may be the origin of scatter such as from 0.32 to 0.80.",
     printed="0.32 to 0.80",
     needs=("monte_carlo", "size"),
+    onsets_of="monte_carlo",
     rule=Graded(
         limits.Limit("such as 0.32 to 0.80", QUOTED_VARIATION, "", "a quarter of the range over"
                      " its middle"),

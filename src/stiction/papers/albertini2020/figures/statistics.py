@@ -19,6 +19,7 @@ name = "statistics"
 number = "6"
 title = "Statistics against correlation length"
 needs: tuple[str, ...] = ("monte_carlo", "theory", "trend", "window")
+may_show = ("ruptures", "interaction")
 
 PROBABILITIES = (0.25, 0.5, 0.75)
 

@@ -6,8 +6,7 @@ here.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import xarray as xr
 
@@ -41,6 +40,7 @@ from stiction.papers.albertini2020.studies import (
     window,
 )
 from stiction.papers.albertini2020.studies.context import Context
+from stiction.papers.albertini2020.studies.side_by_side import side_by_side
 from stiction.papers.albertini2020.studies.study_cache import keep, kept
 
 STUDIES: dict[str, Study] = by_name(
@@ -94,23 +94,28 @@ def cost(names: Iterable[str], context: Context) -> int:
 
 
 def compute(names: Iterable[str], context: Context) -> dict[str, xr.Dataset]:
-    """The named studies, in the order of the registry, each with the time that it took.
+    """The named studies and those that they need, in the order of the registry."""
+    found = dict(results(names, context))
+    return {name: found[name] for name in STUDIES if name in found}
+
+
+def results(names: Iterable[str], context: Context) -> Iterator[tuple[str, xr.Dataset]]:
+    """The named studies and those that they need, as they are done.
 
     With a folder in the context, what is kept there from an earlier run is not computed again.
     """
     wanted = with_needs(names)
+    missing = []
     for name, study in STUDIES.items():
         if name not in wanted:
             continue
         dataset = kept(study, context)
-        if dataset is not None:
-            context.report(study.cost(context))
-        else:
-            started = time.perf_counter()
-            context.title = study.title
-            dataset = study.compute(context)
-            dataset.attrs["title"] = study.title
-            dataset.attrs["seconds"] = time.perf_counter() - started
-            keep(study, context, dataset)
+        if dataset is None:
+            missing.append(study)
+            continue
+        context.report(study.cost(context))
         context.results[name] = dataset
-    return {name: context.results[name] for name in STUDIES if name in wanted}
+        yield name, dataset
+    for study, dataset in side_by_side(missing, context):
+        keep(study, context, dataset)
+        yield study.name, dataset

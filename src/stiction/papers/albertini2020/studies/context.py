@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import warnings
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +12,8 @@ from typing import Any, TypeVar
 import xarray as xr
 
 from stiction.ensemble.monte_carlo import monte_carlo
-from stiction.errors import AccuracyWarning
+from stiction.ensemble.scheduler import usable_cores
+from stiction.errors import AccuracyWarning, collect_warnings, warn_user
 from stiction.papers.albertini2020.setting import Setting
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -46,6 +46,9 @@ class Context:
         For each point of the main study; side studies take a quarter.
     seed : int
     workers : int, optional
+        Threads; all cores by default.
+    executor : Executor, optional
+        Threads that studies side by side share; each has its own if it is left out.
     ruptures : int
         Elastodynamic runs at each of the setting's `simulated_ratios`.
     dynamic : int
@@ -66,6 +69,7 @@ class Context:
     samples: int
     seed: int
     workers: int | None = None
+    executor: Executor | None = None
     ruptures: int = 20
     dynamic: int = 0
     folder: Path | None = None
@@ -101,6 +105,7 @@ class Context:
                 seed=self.seed,
                 first=first,
                 workers=self.workers,
+                executor=self.executor,
                 progress=tell,
             ),
             weight * work(method, 1),
@@ -109,7 +114,8 @@ class Context:
     def map(self, work: Callable[[Item], Found], items: Iterable[Item], each: int) -> list[Found]:
         """`work` of every item, in threads, in the order of the items; each counts as `each`."""
         found = []
-        with ThreadPoolExecutor(self.workers or os.cpu_count()) as pool:
+        threads = ThreadPoolExecutor(self.workers or usable_cores())
+        with threads if self.executor is None else nullcontext(self.executor) as pool:
             for result in pool.map(work, items):
                 found.append(result)
                 self.report(each)
@@ -126,15 +132,12 @@ class Context:
             self.report((done - seen) * each)
             seen = done
 
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with collect_warnings() as caught:
             result = compute(tell)
-        for warning in caught:
-            if issubclass(warning.category, AccuracyWarning):
-                text = f"{self.title}: {warning.message}"
+        for message, category in caught:
+            if issubclass(category, AccuracyWarning):
+                text = f"{self.title}: {message}"
                 self.warnings[text] = self.warnings.get(text, 0) + 1
             else:
-                warnings.warn_explicit(
-                    warning.message, warning.category, warning.filename, warning.lineno
-                )
+                warn_user(message, category)
         return result

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import xarray as xr
 
 from stiction.criterion.method import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
 from stiction.papers.albertini2020.studies.context import Context, work
+from stiction.papers.albertini2020.studies.ruptures import printed_problem
 
 name = "interaction"
 title = "Exact equilibrium on the same samples"
@@ -27,9 +26,7 @@ def compute(context: Context) -> xr.Dataset:
     strain, which is how the paper predicts its plane-stress simulations.
     """
     setting = context.setting
-    printed = dataclasses.replace(
-        setting.problem, solid=dataclasses.replace(setting.problem.solid, plane="strain")
-    )
+    printed = printed_problem(setting.problem)
     parts = []
     for ratio in setting.correlation_ratios:
         field = setting.field(ratio)

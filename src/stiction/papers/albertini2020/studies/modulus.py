@@ -13,11 +13,13 @@ from stiction.equilibrium.method import Equilibrium
 from stiction.papers.albertini2020.derived import apart
 from stiction.papers.albertini2020.setting import Setting
 from stiction.papers.albertini2020.studies.context import Context, work
+from stiction.papers.albertini2020.studies.ruptures import printed_problem
 from stiction.problem import Problem
 from stiction.statistics.estimates import Estimate, mean, share
 
 name = "modulus"
 title = "Plane stress, plane strain, or one for the other"
+needs = ("monte_carlo", "interaction")
 
 MOST = 2000
 READINGS = {
@@ -55,14 +57,35 @@ def cost(context: Context) -> int:
     return len(READINGS) * each * _count(context) * len(context.setting.correlation_ratios)
 
 
+def _key(problem: Problem, unit: float, ratio: float, method: Any) -> Any:
+    return problem.solid.plane, unit, ratio, method.type
+
+
+def _from_other_studies(context: Context) -> dict[Any, xr.Dataset]:
+    """Onsets of the setting's own reading, which other studies have."""
+    setting, local, exact = context.setting, LocalCriterion(), Equilibrium()
+    own, strain = setting.problem, printed_problem(setting.problem)
+    known = {}
+    for ratio in setting.correlation_ratios:
+        first = {"correlation_ratio": ratio, "sample": slice(0, _count(context) - 1)}
+        many, every = (context.results[study].sel(first) for study in needs)
+        told = every[["printed_first_instability", "printed_critical_position"]]
+        told = told.rename({str(name): str(name).removeprefix("printed_") for name in told})
+        unit = own.nucleation_length
+        known[_key(strain, unit, ratio, local)] = told
+        known[_key(own, unit, ratio, local)] = many
+        known[_key(own, unit, ratio, exact)] = every
+    return known
+
+
 def compute(context: Context) -> xr.Dataset:
     """Bias and misplaced onsets of the prediction, its share of interaction, and patches."""
     setting, count = context.setting, _count(context)
-    known: dict[Any, xr.Dataset] = {}
+    known = _from_other_studies(context)
 
     def onsets(problem: Problem, unit: float, ratio: float, method: Any) -> xr.Dataset:
         """What two readings have in common is computed once."""
-        key = (problem.solid.plane, unit, ratio, method.type)
+        key = _key(problem, unit, ratio, method)
         if key in known:
             context.report(work(method, count))
         else:

@@ -1,0 +1,137 @@
+"""Studies side by side: needs first, the same results, failures and interruptions that end it."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+from stiction.errors import warn_accuracy
+from stiction.papers.albertini2020.setting import Setting
+from stiction.papers.albertini2020.studies import compute
+from stiction.papers.albertini2020.studies.context import Context
+from stiction.papers.albertini2020.studies.side_by_side import side_by_side
+
+
+def _study(name, compute, needs=(), cost=1):
+    return SimpleNamespace(
+        name=name, title=f"Study {name}", needs=needs, cost=lambda context: cost, compute=compute
+    )
+
+
+def _context(**options):
+    return Context(Setting(problem=st.paper.problem(nodes=256)), 64, 0, **options)
+
+
+def test_two_studies_are_under_way_at_once():
+    """Each waits for the other: one after the other they would never end."""
+    meet = threading.Barrier(2, timeout=20)
+
+    def wait(context):
+        meet.wait()
+        return xr.Dataset()
+
+    found = list(side_by_side([_study("a", wait), _study("b", wait)], _context(workers=2)))
+    assert {study.name for study, _ in found} == {"a", "b"}
+
+
+def test_a_study_begins_when_those_that_it_needs_are_done():
+    def second(context):
+        return xr.Dataset({"twice": 2.0 * context.results["first"]["x"]})
+
+    studies = [
+        _study("second", second, needs=("first",), cost=100),
+        _study("first", lambda context: xr.Dataset({"x": 21.0})),
+    ]
+    found = {study.name: dataset for study, dataset in side_by_side(studies, _context(workers=2))}
+    assert list(found) == ["first", "second"]
+    assert float(found["second"]["twice"]) == 42.0
+    assert found["second"].attrs["title"] == "Study second"
+
+
+def test_the_costliest_begins_first():
+    order = []
+
+    def of(name):
+        def note(context):
+            order.append(name)
+            return xr.Dataset()
+
+        return note
+
+    studies = [_study(name, of(name), cost=cost) for name, cost in (("a", 1), ("b", 9), ("c", 5))]
+    list(side_by_side(studies, _context(workers=1)))
+    assert order == ["b", "c", "a"]
+
+
+def test_warnings_and_progress_belong_to_their_study():
+    def warns(context):
+        def run(tell):
+            warn_accuracy(f"so says {context.title}")
+            list(context.executor.map(lambda i: warn_accuracy(f"sample {i % 1}"), range(3)))
+            tell(1, 1)
+            return xr.Dataset()
+
+        return context.listen(run, 7)
+
+    told = []
+    context = _context(workers=2, report=told.append)
+    list(side_by_side([_study("a", warns), _study("b", warns)], context))
+    assert context.warnings == {
+        "Study a: so says Study a": 1, "Study a: sample 0": 3,
+        "Study b: so says Study b": 1, "Study b: sample 0": 3,
+    }  # fmt: skip
+    assert told == [7, 7]
+
+
+def test_a_failure_ends_the_others_and_is_raised():
+    stopped = threading.Event()
+
+    def fails(context):
+        raise ValueError("this one")
+
+    def endless(context):
+        try:
+            for _ in range(2000):
+                context.report(0)
+                time.sleep(0.01)
+        finally:
+            stopped.set()
+        raise AssertionError("was not abandoned")
+
+    with pytest.raises(ValueError, match="this one"):
+        list(side_by_side([_study("a", fails), _study("b", endless)], _context(workers=2)))
+    assert stopped.is_set()
+
+
+def test_seconds_are_processor_time_wherever_it_was_spent():
+    def burn(seconds):
+        begin = time.thread_time()
+        while time.thread_time() - begin < seconds:
+            pass
+
+    def busy(context):
+        burn(0.05)
+        list(context.executor.map(burn, [0.05, 0.05]))
+        time.sleep(0.3)
+        return xr.Dataset()
+
+    ((_, found),) = side_by_side([_study("a", busy)], _context(workers=2))
+    # 0.15 s of work; half of it again for what surrounds it. The wait is no work.
+    assert 0.15 <= found.attrs["seconds"] < 0.225
+
+
+def test_results_are_the_same_whatever_runs_beside_them():
+    """To the bit: one worker, and more than there are cores."""
+    names = ["monte_carlo", "interaction", "disorder", "free_end", "trend"]
+    one, many = (
+        compute(names, Context(Setting(problem=st.paper.problem(nodes=256)), 64, 3, workers=w))
+        for w in (1, 5)
+    )
+    assert list(one) == list(many)
+    for name, dataset in one.items():
+        for key, variable in dataset.variables.items():
+            np.testing.assert_array_equal(variable.values, many[name][key].values)
