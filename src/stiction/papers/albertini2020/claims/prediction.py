@@ -217,8 +217,9 @@ def daunting(data: Data) -> Measured:
     return Measured(
         one("10,000 at each correlation length", float(f"{hours:.2g}"), "h"),
         one("processor time of one rupture", float(f"{seconds:.2g}"), "s"),
-        comment=f"hours on the {cores} cores of this machine with memory of constant size; {most:,}"
-        " ruptures at each correlation length were computed for this page",
+        comment=f"{hours:.2g} hours on {cores} core{'s' * (cores > 1)} of this machine, with memory"
+        f" of constant size; {most:,} ruptures at each correlation length were computed for this"
+        " page",
     )
 
 

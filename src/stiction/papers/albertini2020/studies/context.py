@@ -22,7 +22,7 @@ from stiction.random.random_interface import RandomInterface
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
-WORK = {"equilibrium": 15, "rupture": 4000}
+WORK = {"equilibrium": 6, "rupture": 900}
 """Cost of a sample by method, in samples by the local criterion (about 50 microseconds)."""
 
 

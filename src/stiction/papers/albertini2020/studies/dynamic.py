@@ -7,13 +7,15 @@ import sys
 
 import xarray as xr
 
-from stiction.papers.albertini2020.studies.context import Context, work
+from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.studies.ruptures import METHOD as WHOLE
 from stiction.papers.albertini2020.studies.study_cache import place_of
 from stiction.study.study import Ensemble, Study
 
 METHOD = dataclasses.replace(WHOLE, stop="runaway")
 """Loads and arrested events are what is asked for; the rest of each rupture would take as long."""
+_COST = 500
+"""Of such a run, in samples by the local criterion."""
 
 name = "dynamic"
 title = "Monte Carlo study by elastodynamics"
@@ -22,7 +24,7 @@ depends = ("seed", "dynamic")
 
 def cost(context: Context) -> int:
     """Every run."""
-    return len(context.setting.correlation_ratios) * work(METHOD, context.dynamic)
+    return len(context.setting.correlation_ratios) * context.dynamic * _COST
 
 
 def compute(context: Context) -> xr.Dataset:
@@ -48,9 +50,12 @@ def compute(context: Context) -> xr.Dataset:
         parts.append(
             context.listen(
                 lambda tell, study=study, out=out: study.run(  # type: ignore[misc]  # bound now
-                    out=out, workers=context.workers, progress=tell
+                    out=out,
+                    workers=context.workers,
+                    executor=context.executor,
+                    progress=tell,
                 ),
-                work(METHOD, 1),
+                _COST,
             )
         )
     dataset = xr.concat(parts, dim="correlation_ratio", combine_attrs="drop")
