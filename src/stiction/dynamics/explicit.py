@@ -20,17 +20,16 @@ from stiction.friction.kernels import strength_at
 @jit
 def _transfer(grid: Grid, slip_hat: Array, carried: Array, tables: ExplicitTables) -> None:
     """Stress `tables.moved` along the interface if the rate, in `rate_hat`, acts for a step."""
-    rate_hat, packed, fresh, shared = tables.rate_hat, tables.packed, tables.fresh, tables.shared
+    rate_hat, fresh, shared = tables.rate_hat, tables.fresh, tables.shared
     place, step = grid.place, tables.step
     static, dynamic = grid.stiffness[0], grid.stiffness[1]
-    pack(place, rate_hat, packed)
     shared[0] = 0.0
     for q in range(1, shared.size):
-        o = place[q]
+        o, rate = place[q], rate_hat[q]
         g, b, c = static[q], fresh[q], dynamic[q]
-        slip = slip_hat[q] + step * rate_hat[q]
-        real = c * (carried[o] + b * packed[o]) - g * slip.real
-        imaginary = c * (carried[o + 64] + b * packed[o + 64]) - g * slip.imag
+        slip = slip_hat[q] + step * rate
+        real = c * (carried[o] + b * rate.real) - g * slip.real
+        imaginary = c * (carried[o + 64] + b * rate.imag) - g * slip.imag
         shared[q] = complex(real, imaginary)
     backward(grid.transform, shared, tables.moved)
 
@@ -163,6 +162,7 @@ def explicit_steps(
         top, node, slip_sum = _arrive(fields, setting.nodes.critical, half, tables, time)
         for q in range(rate_hat.size):
             slip_hat[q] += step * rate_hat[q]
+        pack(grid.place, rate_hat, tables.packed)
         advance_memory(
             fields.memory, tables.table, tables.packed, fields.carried, grid.poles.size, grid.copies
         )
