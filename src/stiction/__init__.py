@@ -28,7 +28,7 @@ _HOMES = {
     "PowerLawSpectrum": "random.spectra",
     "SquaredExponentialSpectrum": "random.spectra",
     "ExponentialSpectrum": "random.spectra",
-    "CustomSpectrum": "random.spectra",
+    "CustomSpectrum": "random.custom_spectrum",
     "LocalCriterion": "criterion.method",
     "nucleation_stress": "criterion.nucleation",
     "energy_release_rate": "criterion.griffith",
