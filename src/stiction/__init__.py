@@ -64,7 +64,7 @@ _HOMES = {
     "infer": "inference.infer",
     "Posterior": "inference.posterior",
     "design_of_tests": "inference.design",
-    "Ensemble": "study.study",
+    "Ensemble": "study.ensemble",
     "Study": "study.study",
     "Cluster": "ensemble.distributed",
     "open_run": "stored_run",

@@ -109,9 +109,7 @@ from stiction.stored_run import (
 from stiction.stored_run import (
     open_run as open_run,
 )
-from stiction.study.study import (
-    Ensemble as Ensemble,
-)
+from stiction.study.ensemble import Ensemble as Ensemble
 from stiction.study.study import (
     Study as Study,
 )

@@ -76,7 +76,8 @@ def rupture(
     from stiction.plot.films import film as write_film
     from stiction.plot.style import save_figure
     from stiction.report.rupture_figures import front_figure, rupture_figure
-    from stiction.study.study import Study, read_setup
+    from stiction.study.setup import read_setup
+    from stiction.study.study import Study
 
     writable_folder(out)
     profiles: Any
