@@ -16,13 +16,7 @@ from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.algorithms import advice, ran_out, short_of
-from stiction.reliability.design import (
-    TailRequest,
-    check_probability,
-    stress_interval,
-    subset_tail,
-)
+from stiction.reliability.design import check_probability
 from stiction.reliability.effort import budget_of, refused_chains
 from stiction.reliability.estimate import check_target
 from stiction.reliability.limit_state import (
@@ -31,7 +25,9 @@ from stiction.reliability.limit_state import (
     make_limit_state,
 )
 from stiction.reliability.plain_monte_carlo import BATCH
+from stiction.reliability.request import advice, ran_out, short_of
 from stiction.reliability.result import say
+from stiction.reliability.tail_runs import TailRequest, stress_interval, subset_tail
 from stiction.reliability.uncertainty import binomial_interval, lognormal_interval
 from stiction.results import Variable, to_dataset
 from stiction.statistics.rice import rice_distribution

@@ -17,7 +17,6 @@ from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.algorithms import (
-    Request,
     by_counting,
     by_importance,
     by_subset,
@@ -32,6 +31,7 @@ from stiction.reliability.limit_state import (
     make_limit_state,
 )
 from stiction.reliability.plain_monte_carlo import tally
+from stiction.reliability.request import Request
 from stiction.reliability.result import FailureProbability
 from stiction.reliability.two_level import agreement
 
