@@ -18,7 +18,8 @@ from stiction.ensemble.distributed import Cluster, dask_executor
 from stiction.ensemble.slurm import slurm_cluster, slurm_jobs
 from stiction.ensemble.work import do_work
 from stiction.errors import WorkerError
-from stiction.stored_run import StoredRun, run_into
+from stiction.stored_run import StoredRun
+from stiction.study_run import run_into
 
 STUDY = small_study(
     nodes=256,

@@ -17,11 +17,12 @@ import xarray as xr
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction import stored_run
+from stiction import study_run
 from stiction.ensemble import resume, scheduler, work
 from stiction.ensemble.files import Lock
 from stiction.errors import StoreError, WorkerError
-from stiction.stored_run import StoredRun, folder_beside, run_into
+from stiction.stored_run import StoredRun, folder_beside
+from stiction.study_run import run_into
 
 STUDY = small_study(
     ensemble={"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
@@ -372,7 +373,7 @@ def test_a_read_only_disk(small_disk, monkeypatch):
 
 def test_a_version_that_differs_is_said(tmp_path, often, monkeypatch):
     make_study(samples=40).run(out=tmp_path / "run")
-    monkeypatch.setattr(stored_run, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
+    monkeypatch.setattr(study_run, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
     with pytest.warns(UserWarning, match=r"begun with stiction .*, this is stiction 99\.0, numpy"):
         make_study(samples=60).run(out=tmp_path / "run")
     with warnings.catch_warnings():

@@ -21,8 +21,9 @@ from stiction.ensemble.files import Lock
 from stiction.ensemble.store import Store, sealed
 from stiction.ensemble.store_writer import StoreWriter
 from stiction.errors import StoreError
-from stiction.stored_run import StoredRun, folder_beside, run_into
+from stiction.stored_run import StoredRun, folder_beside
 from stiction.study.study import Study
+from stiction.study_run import run_into
 
 STUDY = small_study(
     ensemble={"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
@@ -291,7 +292,7 @@ def test_two_writers_without_a_lock_damage_nothing(tmp_path, reference, monkeypa
         "resume.FLUSH_SECONDS = 0.0; from stiction.ensemble import store_writer;"
         "store_writer.MANY = 3;"
         "scheduler.Sizer.next = lambda sizer, plan, span, *rest: min(20, span.samples);"
-        "from stiction.study.study import Study; from stiction.stored_run import run_into;"
+        "from stiction.study.study import Study; from stiction.study_run import run_into;"
         "run_into(Study.from_dict(json.loads(sys.argv[1])), sys.argv[2], lock=False, workers=1)"
     )
     command = [sys.executable, "-W", "ignore", "-c", code, json.dumps(STUDY), tmp_path / "run"]

@@ -259,7 +259,7 @@ class Study:
         if part is not None and out is None:
             raise InputError("part: a part is stored; say where with out=")
         if out is not None:
-            from stiction.stored_run import run_into
+            from stiction.study_run import run_into
 
             stored = run_into(
                 self,
