@@ -200,6 +200,8 @@ def test_the_command_writes_a_page_and_a_field(tmp_path):
     page = (out / "page.html").read_text("utf-8")
     assert "spectrum.correlation_length" in page
     assert "data:image/png;base64," in page
+    assert "<code>fit.png</code>." in page
+    assert (out / "field.toml").read_text("utf-8").splitlines()[0] in page
     field = tomllib.loads((out / "field.toml").read_text("utf-8"))["random"]["strength"]
     found = st.RandomField(**field)
     stated = re.search(r"mean +([\d.e+]+)", result.output)
