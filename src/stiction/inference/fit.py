@@ -33,7 +33,7 @@ from stiction.inference.records import Record, check_quantity, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.profiles import UNITS
+from stiction.quantities import UNITS
 from stiction.random.random_field import RandomField, warn_if_inaccurate
 
 if TYPE_CHECKING:

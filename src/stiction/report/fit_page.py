@@ -11,7 +11,7 @@ import jinja2
 
 from stiction.ensemble.files import write_whole
 from stiction.inference.fit import FieldFit, unit_of
-from stiction.profiles import UNITS
+from stiction.quantities import UNITS
 
 CAPTION = (
     "(a) Values and the fitted marginal. (b) Quantiles of the data against those of the fit."
