@@ -13,7 +13,8 @@ from stiction.errors import InputError, unknown_name
 from stiction.interface import FEWEST, Interface
 from stiction.profile_files import read_npy
 from stiction.profile_nodes import check_gaps
-from stiction.profiles import UNITS, Points, labelled, points_of
+from stiction.profiles import Points, labelled, points_of
+from stiction.quantities import UNITS
 
 _READ = ("x", "value", "unit", "x_unit")
 _PUT = ("interpolate", "gaps")

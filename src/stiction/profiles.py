@@ -23,40 +23,12 @@ from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
 from stiction.profile_text import Table, read_table
+from stiction.quantities import UNITS, choose, factor_of, mapped_by
 from stiction.topographies import is_topography, mapped
-from stiction.units import factor_to, parse
 
 if TYPE_CHECKING:
     import xarray as xr
 
-UNITS = {
-    "strength": "Pa",
-    "residual_strength": "Pa",
-    "residual_ratio": "1",
-    "initial_stress": "Pa",
-    "normal_pressure": "Pa",
-    "weakening_rate": "Pa/m",
-    "critical_slip": "m",
-    "fracture_energy": "J/m2",
-    "load_profile": "1",
-    "slip": "m",
-    "friction_coefficient": "1",
-}
-"""What can be a profile, and its SI unit."""
-
-_NAMES = {
-    "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
-    "residual_strength": ("tau_r", "taur"),
-    "residual_ratio": (),
-    "initial_stress": ("tau_i", "taui"),
-    "normal_pressure": ("pressure", "normal_stress", "sigma_n", "sigma"),
-    "weakening_rate": ("w",),
-    "critical_slip": ("d_c", "dc"),
-    "fracture_energy": ("gamma",),
-    "load_profile": ("profile", "load"),
-    "slip": ("d", "delta"),
-    "friction_coefficient": ("mu", "coefficient"),
-}
 _PLACES = ("x", "position", "pos", "distance", "coordinate")
 _SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
@@ -128,7 +100,7 @@ def read_profile(
         'weakening_rate' (Pa/m), 'critical_slip' (m), 'load_profile' or 'friction_coefficient' (1).
     strength : callable, optional
         Map from another measured quantity, such as heights in SI units, to the strength in Pa;
-        nothing is taken for a strength without one.
+        nothing is taken for a strength without one. On a plane it gets an array (nx, ny).
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
         in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
@@ -190,8 +162,9 @@ def read_profile(
         if interface is None:
             return source
     if interface is not None and interface.is_plane:
-        others = (x, x_unit, strength)
-        return _of_plane(name, source, quantity, interface, value, unit, others, gaps)
+        if x is not None or x_unit is not None:
+            raise InputError("x and x_unit: are options of profiles of a line")
+        return _of_plane(name, source, quantity, interface, value, unit, strength, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
@@ -203,6 +176,12 @@ def read_profile(
         elif place is not None:
             order = np.argsort(place, kind="stable")
             values, place = values[order], place[order]
+            again = np.flatnonzero(np.diff(place) == 0.0)
+            if again.size:
+                raise InputError(
+                    f"x repeats: {place[again[0]]:.9g} m stands beside two values; a map over x and"
+                    " y is read with the plane it belongs to, interface=..."
+                )
             measured = None if measured is None else measured[order]
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
@@ -222,14 +201,12 @@ def _of_plane(
     interface: Interface,
     value: Any,
     unit: str | None,
-    others: tuple[Any, ...],
+    strength: Callable[[Array], Array] | None,
     gaps: Gaps,
 ) -> xr.DataArray:
     """`read_profile` of a plane, which takes values at the nodes only."""
     import xarray as xr
 
-    if any(other is not None for other in others):
-        raise InputError("x, x_unit and strength: are options of profiles of a line")
     read = read_plane if isinstance(source, str | Path) else on_plane
     given = Path(source) if isinstance(source, str | Path) else source
     if read is on_plane and not is_labelled(source):
@@ -237,9 +214,11 @@ def _of_plane(
             f"source: must be a path, a DataArray or a Dataset, got {describe(source)}"
         )
     try:
-        values = read(given, quantity, UNITS[quantity], interface, value, unit)
+        values = read(given, quantity, interface, value, unit, strength is not None)
         if values.shape != interface.shape:
             raise InputError(f"must hold one profile, got shape {values.shape}")
+        if strength is not None:
+            values = mapped_by(strength, values)
         values, measured = close_gaps(values, interface, gaps)
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
@@ -270,7 +249,10 @@ def points_of(
     if isinstance(source, str | Path):
         path = Path(source)
         if path.suffix.lower() not in ENDINGS:
-            raise InputError(f"a profile must end in {', '.join(ENDINGS)}, got {path.name!r}")
+            raise InputError(
+                f"a profile must end in {', '.join(ENDINGS)}, got {path.name!r}; files of"
+                " instruments: give what SurfaceTopography.read_topography(path) returns"
+            )
         if path.suffix.lower() in NETCDF:
             source = read_netcdf(path)
         elif path.suffix.lower() in TEXT:
@@ -279,8 +261,8 @@ def points_of(
             source = _table_of(read_npy(path), x, value)
     if isinstance(source, Table):
         column, place, stated, x_stated = _choose_columns(source, quantity, x, value, strength)
-        factor = _factor(unit, stated, quantity, strength is not None)
-        at = None if place is None else place * _factor(x_unit, x_stated, "x")
+        factor = factor_of(unit, stated, quantity, strength is not None)
+        at = None if place is None else place * factor_of(x_unit, x_stated, "x")
         points = Points(column * factor, at)
     elif is_labelled(source):
         points = labelled(source, quantity, x, value, unit, x_unit, strength is not None)
@@ -288,37 +270,7 @@ def points_of(
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
     if strength is None:
         return points
-    mapped = np.asarray(strength(points.values), dtype=np.float64)
-    if mapped.shape != points.values.shape:
-        raise InputError(
-            f"strength: must return one value a point, shape {points.values.shape}, got shape"
-            f" {mapped.shape}"
-        )
-    return dataclasses.replace(points, values=mapped)
-
-
-def _factor(
-    given: str | None, stated: str | None, quantity: str, any_dimension: bool = False
-) -> float:
-    """To SI, from what the caller says and what the source states."""
-    si, what = ("m", "x") if quantity == "x" else (UNITS[quantity], quantity)
-
-    def factor(text: str) -> float:
-        if not any_dimension:
-            return factor_to(si, text)
-        unit = parse(text)
-        return unit.factor if unit is not None else factor_to(si, text)
-
-    try:
-        if given is None:
-            return 1.0 if stated is None else factor(stated)
-        result = factor(given)
-        known = None if stated is None else parse(stated)
-        if known is not None and not np.isclose(factor(str(stated)), result, rtol=1e-12):
-            raise InputError(f"is said to be in {given}, the source states {stated}")
-    except InputError as error:
-        raise InputError([f"{what} {text}" for text in error.problems]) from None
-    return result
+    return dataclasses.replace(points, values=mapped_by(strength, points.values))
 
 
 def _table_of(array: Array, x: Any, value: Any) -> Table:
@@ -351,7 +303,7 @@ def _choose_columns(
     others = [i for i in range(width) if i != place]
     if value is None:
         known = [(names[i], table.units[i]) for i in others]
-        value = others[_choose(known, quantity, strength is not None)]
+        value = others[choose(known, quantity, strength is not None)]
     at = None if place is None else table.columns[place]
     x_unit = None if place is None else table.units[place]
     return table.columns[value], at, table.units[value], x_unit
@@ -375,33 +327,6 @@ def _listed(names: Sequence[str | None]) -> str:
     return ", ".join(repr(name) for name in names if name) or "without names"
 
 
-def _choose(known: Sequence[tuple[str | None, str | None]], quantity: str, mapped: bool) -> int:
-    """Which of several variables (name, unit) is the quantity, if that is beyond doubt."""
-    if len(known) == 1 and (mapped or known[0][0] is None):
-        return 0
-    for name in (quantity, *_NAMES[quantity], *(("value", "values") if len(known) == 1 else ())):
-        for number, (own, _) in enumerate(known):
-            if own is not None and own.casefold().replace(" ", "_") == name:
-                return number
-    wanted = parse(UNITS[quantity])
-    assert wanted is not None
-    units = [None if unit is None else parse(unit) for _, unit in known]
-    # Any number is dimensionless: for such a quantity a unit says nothing.
-    fitting = [
-        number
-        for number, unit in enumerate(units)
-        if unit and unit.dimension == wanted.dimension and any(wanted.dimension)
-    ]
-    if len(fitting) == 1:
-        return fitting[0]
-    described = ", ".join(f"{n!r} in {u}" if u else f"{n!r}" for n, u in known) or "none"
-    raise InputError(
-        f"holds no variable that is plainly the {quantity} ({UNITS[quantity]}): got {described}."
-        f" Call it {quantity!r}, state its unit, or say which it is with value=... (--value) and"
-        " unit=... (--unit)"
-    )
-
-
 def is_labelled(value: Any) -> bool:
     """Whether it is an xarray object, told without importing xarray."""
     return hasattr(value, "dims") and hasattr(value, "coords")
@@ -416,7 +341,7 @@ def simplified(value: Any, quantity: str) -> Any:
     try:
         if is_labelled(value):
             plain = not value.dims and not hasattr(value, "data_vars")
-            factor = _factor(None, _unit_of(value), quantity) if plain else 1.0
+            factor = factor_of(None, _unit_of(value), quantity) if plain else 1.0
             return _magnitude(value.data, UNITS[quantity]) * factor if plain else value
         index = getattr(value, "index", None)
         if (
@@ -447,7 +372,7 @@ def labelled(
         chosen = names.index(value) if value in names else None
         if value is not None and chosen is None:
             raise InputError(unknown_name("value", str(value), names))
-        number = _choose(known, quantity, any_dimension) if chosen is None else chosen
+        number = choose(known, quantity, any_dimension) if chosen is None else chosen
         extra = {x: source[x]} if x is not None and x in source.data_vars else {}
         source = source[names[number]].assign_coords(extra)
     nodes = _dimension_along(source, x)
@@ -457,13 +382,13 @@ def labelled(
         raise InputError(f"must have one dimension beside x, got ({sizes}); select one point")
     if nodes is None:  # one value a sample
         values = real_array(_magnitude(source.data, UNITS[quantity]))[:, np.newaxis]
-        return Points(values * _factor(unit, _unit_of(source), quantity, any_dimension))
+        return Points(values * factor_of(unit, _unit_of(source), quantity, any_dimension))
     source = source.transpose(*samples, nodes)
     try:
         values = real_array(_magnitude(source.data, UNITS[quantity]))
     except TypeError as error:
         raise InputError(f"must be numbers; {error}") from None
-    values = values * _factor(unit, _unit_of(source), quantity, any_dimension)
+    values = values * factor_of(unit, _unit_of(source), quantity, any_dimension)
     measured = None
     if MEASURED in source.coords and nodes in source.coords[MEASURED].dims:
         mask = source.coords[MEASURED].broadcast_like(source).transpose(*samples, nodes)
@@ -471,7 +396,7 @@ def labelled(
     place = _coordinate(source, nodes, x)
     if place is None:
         return Points(values, None, measured)
-    at = real_array(_magnitude(place.data, "m")) * _factor(x_unit, _unit_of(place), "x")
+    at = real_array(_magnitude(place.data, "m")) * factor_of(x_unit, _unit_of(place), "x")
     return Points(values, at, measured)
 
 
@@ -553,7 +478,7 @@ def at_nodes(
     try:
         value = simplified(value, quantity)
         if is_labelled(value) and interface.is_plane:
-            found = on_plane(value, quantity, UNITS[quantity], interface)
+            found = on_plane(value, quantity, interface)
             if found.shape[-2:] != interface.shape:
                 return AtNodes(found, None)
             filled = close_gaps(found, interface, gaps)

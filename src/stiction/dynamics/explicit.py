@@ -135,7 +135,8 @@ def explicit_steps(
     grid, setting
     tables : ExplicitTables
         Their room to work is overwritten.
-    record : (>= count, columns) array, or with no rows to keep nothing.
+    record : (>= count, columns) array, or with no rows to keep nothing. Three more columns for
+        each station: slip, slip rate and stress.
     """
     n, impedance, step = fields.slip.size, grid.impedance, tables.step
     watch, control, rate_hat = fields.watch, setting.control, tables.rate_hat
@@ -170,7 +171,7 @@ def explicit_steps(
         watch[monitor.EXPLICIT_STEPS] += 1.0
         radiated = impedance * total / n
         done = Taken(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
-        fall = finish_step(watch, setting, record, taken, done)
+        fall = finish_step(fields, setting, record, taken, done)
         if slid >= control[monitor.SLID_STOP]:
             return taken + 1, monitor.ALL_SLID
         if control[monitor.EVENT_STOP] > 0.0 and fall > watch[monitor.EVENT_DROP]:

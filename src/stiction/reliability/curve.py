@@ -40,6 +40,7 @@ FEWEST_CROSSINGS = 5
 VARIABLES: dict[str, Variable] = {
     "stress": Variable("Pa", "stress", ("point",)),
     "stress_above_bound": Variable("Pa", "stress above the least possible one", ("point",)),
+    "friction_coefficient": Variable("1", "stress over the mean normal pressure", ("point",)),
     "probability": Variable("1", "probability of an onset below the stress", ("point",)),
     "probability_low": Variable("1", "lower end of its interval", ("point",)),
     "probability_high": Variable("1", "upper end of its interval", ("point",)),
@@ -132,7 +133,8 @@ def failure_curve(
         Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
         `probability_high` and `coefficient_of_variation`, `stress_low`, `stress_high` (Pa),
         `plain_probability` with interval (NaN where fewer than three samples fail) and, where the
-        interface is alike everywhere, `rice_probability`. `stress_above_bound` means little where
+        interface is alike everywhere, `rice_probability`; with a normal pressure
+        `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
         the attribute `lower_bound` is zero or less.
 
     Raises
@@ -221,6 +223,8 @@ def failure_curve(
         "stress_low": sides[:, 0],
         "stress_high": sides[:, 1],
     }
+    if np.isfinite(state.pressure):
+        values["friction_coefficient"] = stress / state.pressure
     if state.not_alike_everywhere() is None:
         values["rice_probability"] = _rice(problem, state.random.strength, stress, int(seed))
     if onsets.size:

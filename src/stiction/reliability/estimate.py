@@ -73,6 +73,13 @@ def check_stress(name: str, value: Any) -> list[str]:
     return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
 
 
+def check_coefficient(name: str, value: Any) -> list[str]:
+    """Why a number is no friction coefficient."""
+    if is_finite(value) and value > 0.0:
+        return []
+    return [f"{name}: must be a positive number, got {describe(value)}"]
+
+
 def check_algorithm(
     state: LimitState, algorithm: str, valid: tuple[str, ...], max_evaluations: int | None
 ) -> list[str]:
@@ -225,9 +232,8 @@ def failure_probability(
         problems.append("stress: give either stress (Pa) or friction_coefficient")
     elif stress is not None:
         problems += check_stress("stress", stress)
-    elif not (is_finite(friction_coefficient) and float(friction_coefficient or 0.0) > 0.0):
-        given = describe(friction_coefficient)
-        problems.append(f"friction_coefficient: must be a positive number, got {given}")
+    else:
+        problems += check_coefficient("friction_coefficient", friction_coefficient)
     meter = Meter("failure_probability", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,
