@@ -80,8 +80,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
     In TOML also a path to a profile, or a table {file, ...} with the options of `read_profile`.
     """
+    from stiction.labelled_arrays import simplified
     from stiction.placed import Placed, placed_profile, quantity_of
-    from stiction.profiles import simplified
 
     if isinstance(value, Placed):
         return value

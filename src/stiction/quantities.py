@@ -38,6 +38,8 @@ _NAMES = {
     "slip": ("d", "delta"),
     "friction_coefficient": ("mu", "coefficient"),
 }
+PLACES = ("x", "position", "pos", "distance", "coordinate")
+"""Names of the coordinate along the interface."""
 
 
 def factor_of(

@@ -13,7 +13,7 @@ from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.profiles import MEASURED, is_labelled, labelled, simplified
+from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
 from stiction.quantities import UNITS
 from stiction.units import factor_to
 
