@@ -31,7 +31,9 @@ def rupture(
     out: Annotated[Path, typer.Option(help="Folder for the result and its figures.")] = Path(
         "stiction-rupture"
     ),
-    sample: Annotated[int, typer.Option(help="Number of the sample of the study's strength.")] = 0,
+    sample: Annotated[
+        int, typer.Option(min=0, help="Number of the sample of the study's strength.")
+    ] = 0,
     strength: Annotated[
         Path | None,
         typer.Option(
