@@ -80,11 +80,6 @@ def share_of(events: Any) -> str:
     return f"{rounded(share(np.asarray(events) > 0).scaled(100.0))} %"
 
 
-def signed(value: float) -> str:
-    """A number with a minus sign as in print."""
-    return f"{value:.2f}".replace("-", "\u2212")
-
-
 def change(new: Any, old: Any) -> str:
     """Of the mean, signed, in per cent."""
     return f"{100.0 * (np.mean(new) / np.mean(old) - 1.0):+.2g} %".replace("-", "\u2212")

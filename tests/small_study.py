@@ -7,6 +7,7 @@ from typing import Any
 
 def small_study(
     nodes: Any = 128,
+    length: Any = 0.1,
     weakening_rate: float = 0.25e12,
     correlation_length: float = 4e-3,
     **tables: Any,
@@ -15,7 +16,7 @@ def small_study(
     plain = {
         "problem": {
             "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-            "interface": {"length": 0.1, "nodes": nodes},
+            "interface": {"length": length, "nodes": nodes},
             "friction": {"weakening_rate": weakening_rate},
         },
         "random": {

@@ -56,6 +56,7 @@ from stiction.merge import (
 from stiction.papers import albertini2020 as _albertini2020
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
+from stiction.random.custom_spectrum import CustomSpectrum as CustomSpectrum
 from stiction.random.families import (
     Gamma as Gamma,
 )
@@ -71,9 +72,6 @@ from stiction.random.families import (
 from stiction.random.marginals import Beta as Beta
 from stiction.random.random_field import RandomField as RandomField
 from stiction.random.random_interface import RandomInterface as RandomInterface
-from stiction.random.spectra import (
-    CustomSpectrum as CustomSpectrum,
-)
 from stiction.random.spectra import (
     ExponentialSpectrum as ExponentialSpectrum,
 )
@@ -111,9 +109,7 @@ from stiction.stored_run import (
 from stiction.stored_run import (
     open_run as open_run,
 )
-from stiction.study.study import (
-    Ensemble as Ensemble,
-)
+from stiction.study.ensemble import Ensemble as Ensemble
 from stiction.study.study import (
     Study as Study,
 )

@@ -32,7 +32,8 @@ class _FirstCompilation(event.Listener):
     def on_start(self, event: event.Event) -> None:
         dispatcher = (event.data or {}).get("dispatcher")
         function = getattr(dispatcher, "py_func", None)
-        ours = getattr(function, "__module__", "").startswith("stiction.")
+        # A function made by exec has no module, its __module__ is None.
+        ours = str(getattr(function, "__module__", "")).startswith("stiction.")
         if ours and not self.said:
             self.said = True
             logger.warning("compiling kernels on first use (up to 20 s, then cached)")

@@ -80,8 +80,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
     In TOML also a path to a profile, or a table {file, ...} with the options of `read_profile`.
     """
+    from stiction.labelled_arrays import simplified
     from stiction.placed import Placed, placed_profile, quantity_of
-    from stiction.profiles import simplified
 
     if isinstance(value, Placed):
         return value
@@ -274,7 +274,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
-    bare = cls.__repr__ is object.__repr__
+    bare = cls.__repr__ in (object.__repr__, brief)  # its own, if it has one, stays
     wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
     validated_init = wrapped.__init__
 

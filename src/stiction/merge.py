@@ -13,14 +13,9 @@ from stiction.ensemble.part import Part, part_of_name
 from stiction.ensemble.store import Store
 from stiction.ensemble.store_writer import writing
 from stiction.errors import StoreError, warn_user
-from stiction.stored_run import (
-    StoredRun,
-    check_target,
-    folder_beside,
-    parts_folder,
-    write_result,
-)
+from stiction.stored_run import StoredRun, folder_beside
 from stiction.study.study import Study
+from stiction.study_run import check_target, parts_folder, write_result
 
 SHOWN = 8
 

@@ -11,9 +11,11 @@ import numpy as np
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import FEWEST, Interface
+from stiction.labelled_arrays import labelled
 from stiction.profile_files import read_npy
-from stiction.profile_nodes import check_gaps
-from stiction.profiles import UNITS, Points, labelled, points_of
+from stiction.profile_nodes import Points, check_gaps
+from stiction.profiles import points_of
+from stiction.quantities import UNITS
 
 _READ = ("x", "value", "unit", "x_unit")
 _PUT = ("interpolate", "gaps")

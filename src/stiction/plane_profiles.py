@@ -13,14 +13,19 @@ from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.profile_files import NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_text import Table, read_table
-from stiction.units import factor_to
+from stiction.quantities import choose, factor_of
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 
 
 def on_plane(
-    source: Any, quantity: str, si: str, interface: Interface, value: Any = None, unit: Any = None
+    source: Any,
+    quantity: str,
+    interface: Interface,
+    value: Any = None,
+    unit: str | None = None,
+    any_dimension: bool = False,
 ) -> Array:
     """Values of a labelled array at the nodes of a plane, in SI.
 
@@ -29,29 +34,33 @@ def on_plane(
     source : DataArray or Dataset
         Over 'x' and 'y', in any order, and at most one dimension more, of samples. Coordinates, if
         it has any, must be those of the nodes.
-    quantity, si : str
-        What it is called in a dataset, and its SI unit.
+    quantity : str
+        One of `stiction.quantities.UNITS`.
     interface : Interface
     value, unit : str, optional
         Name of the variable; unit where the source states none.
+    any_dimension : bool
+        Whether the values are something else, such as heights, of which a user makes `quantity`.
 
     Returns
     -------
     (samples, nx, ny) or (nx, ny) array; (samples, 1) of one value a sample
     """
     if hasattr(source, "data_vars"):
-        name = quantity if value is None else value
         names = [str(one) for one in source.data_vars]
-        if len(names) == 1 and value is None:
-            name = names[0]
-        if name not in names:
-            raise InputError(unknown_name("value", str(name), names))
+        if value is not None and value not in names:
+            raise InputError(unknown_name("value", str(value), names))
+        if not names:
+            raise InputError("holds no map (a variable of numbers along two dimensions)")
+        known = [(one, _stated(source[one])) for one in names]
+        name = names[choose(known, quantity, any_dimension)] if value is None else value
         source = source[name]
+    factor = factor_of(unit, _stated(source), quantity, any_dimension)
     dims = [str(dim) for dim in source.dims]
     samples = [dim for dim in dims if dim not in interface.dims]
     if len(samples) <= 1 and len(samples) == len(dims):  # one value a sample
         values = real_array(source.values)[..., np.newaxis]
-        return values * _factor(source, si, unit)
+        return values * factor
     if len(samples) > 1 or len(dims) - len(samples) != 2:
         raise InputError(
             f"which dimensions run along the plane is not clear from ({', '.join(dims)}); call them"
@@ -64,30 +73,35 @@ def on_plane(
                 f"has {source.sizes[dim]} values along {dim}, the plane has {nodes.size} nodes"
             )
         if dim in source.coords:
-            place = real_array(source[dim].values) * _factor(source[dim], "m", None)
+            place = real_array(source[dim].values) * factor_of(None, _stated(source[dim]), dim)
             if np.abs(place - nodes).max() > TOLERANCE * nodes[1]:
                 raise InputError(
                     f"{dim} reaches from {place[0]:g} to {place[-1]:g} m, the nodes from"
                     f" {nodes[0]:g} to {nodes[-1]:g} m; on a plane values are taken at the nodes"
                     " only"
                 )
-    return real_array(source.values) * _factor(source, si, unit)
+    return real_array(source.values) * factor
 
 
-def _factor(source: Any, si: str, given: str | None) -> float:
-    stated = str(source.attrs.get("units", source.attrs.get("unit", ""))).strip()
-    text = given or stated
-    return factor_to(si, text) if text else 1.0
+def _stated(source: Any) -> str | None:
+    return str(source.attrs.get("units", source.attrs.get("unit", ""))).strip() or None
 
 
 def read_plane(
-    path: Path, quantity: str, si: str, interface: Interface, value: Any, unit: Any
+    path: Path,
+    quantity: str,
+    interface: Interface,
+    value: Any,
+    unit: str | None,
+    any_dimension: bool,
 ) -> Array:
-    """The same from a .npy file of shape (nx, ny), in SI or in `unit`, or a NetCDF file."""
+    """The same from a .npy file of shape (nx, ny), in SI or in `unit`, a NetCDF file or text."""
     if path.suffix.lower() in NETCDF:
-        return on_plane(read_netcdf(path, 2), quantity, si, interface, value, unit)
+        return on_plane(read_netcdf(path, 2), quantity, interface, value, unit, any_dimension)
     if path.suffix.lower() in TEXT:
-        return _from_table(read_table(decoded(path)), quantity, si, interface, value, unit)
+        return _from_table(
+            read_table(decoded(path)), quantity, interface, value, unit, any_dimension
+        )
     if path.suffix.lower() != ".npy":
         raise InputError(
             "a profile of a plane is an array (nx, ny) in a .npy or .nc file, or text with the"
@@ -101,11 +115,16 @@ def read_plane(
         )
     if array.shape != interface.shape:
         raise InputError(f"must have shape {interface.shape}, got shape {array.shape}")
-    return array * (factor_to(si, unit) if unit else 1.0)
+    return array * factor_of(unit, None, quantity, any_dimension)
 
 
 def _from_table(
-    table: Table, quantity: str, si: str, interface: Interface, value: Any, unit: str | None
+    table: Table,
+    quantity: str,
+    interface: Interface,
+    value: Any,
+    unit: str | None,
+    any_dimension: bool,
 ) -> Array:
     """Values at the nodes from columns x, y and value; NaN where there is none."""
     names = [str(name).casefold() for name in table.names]
@@ -115,26 +134,21 @@ def _from_table(
             f" {', '.join(repr(name) for name in table.names)}"
         )
     rest = [i for i, name in enumerate(names) if name not in ("x", "y")]
+    if not rest:
+        raise InputError("holds places only; a map has a column of values beside x and y")
     chosen = [i for i in rest if table.names[i] == value or i == value]
-    called = [i for i in rest if names[i] == quantity]
     if value is not None and not chosen:
         raise InputError(unknown_name("value", str(value), [str(table.names[i]) for i in rest]))
-    column = (chosen or called or rest)[0]
-    if len(rest) > 1 and not chosen and not called:
-        raise InputError("holds several columns beside x and y; say which is meant: value=...")
-    stated = table.units[column]
-    if not (chosen or called or unit or stated):
-        raise InputError(
-            f"its column {table.names[column]!r} is not plainly the {quantity} ({si}): call it so,"
-            " state its unit, or say which it is with value=..."
-        )
+    known = [(table.names[i], table.units[i] or unit) for i in rest]
+    column = chosen[0] if chosen else rest[choose(known, quantity, any_dimension)]
+    factor = factor_of(unit, table.units[column], quantity, any_dimension)
     found = np.full(interface.shape, np.nan)
     index = []
     for dim, spacing, count in zip(
         interface.dims, interface.spacings, interface.shape, strict=True
     ):
         at = names.index(dim)
-        place = table.columns[at] * factor_to("m", table.units[at] or "m") / spacing
+        place = table.columns[at] * factor_of(None, table.units[at], dim) / spacing
         off = np.abs(place - np.round(place))
         if not np.all(off <= TOLERANCE):
             raise InputError(
@@ -151,7 +165,4 @@ def _from_table(
     if np.unique(flat).size < flat.size:
         raise InputError("repeats a place: two lines have the same x and y")
     found.ravel()[flat] = table.columns[column]
-    given = None if unit is None or stated is None else factor_to(si, stated)
-    if given is not None and not np.isclose(given, factor_to(si, str(unit)), rtol=1e-12):
-        raise InputError(f"{quantity} is said to be in {unit}, the source states {stated}")
-    return found * factor_to(si, unit or stated or si)
+    return found * factor

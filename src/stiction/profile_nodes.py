@@ -6,7 +6,8 @@ they are taken modulo L.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+import dataclasses
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -246,3 +247,34 @@ def describe_gaps(missing: NDArray[np.bool_], interface: Interface) -> str:
         f"are no values (NaN) at x = {places}{more} ({int(missing[row].sum())} of"
         f" {interface.size} nodes{which}{also})"
     )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Points:
+    """Values of one quantity in SI, and where they belong.
+
+    Attributes
+    ----------
+    values : (points,) or (samples, points) array
+    x : (points,) array or None
+        m; None if they come in the order of the nodes.
+    measured : array of bool or None
+        Of the shape of `values`, or (points,); from an earlier filling of gaps.
+    """
+
+    values: Array
+    x: Array | None = None
+    measured: NDArray[np.bool_] | None = None
+
+    def on(self, interface: Interface, *, interpolate: bool, gaps: Gaps) -> AtNodes:
+        """The same at the nodes of an interface."""
+        if self.x is None:
+            found, measured = in_order(self.values, interface, gaps), self.measured
+        else:
+            options: dict[str, Any] = {"interpolate": interpolate, "gaps": gaps}
+            found, measured = by_coordinate(self.x, self.values, interface, **options), None
+            if self.measured is not None:
+                share = by_coordinate(self.x, self.measured * 1.0, interface, **options)
+                measured = share.values > 0.999
+        both = [mask for mask in (found.measured, measured) if mask is not None]
+        return AtNodes(found.values, np.logical_and.reduce(both) if both else None)

@@ -12,86 +12,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
 from stiction.plane_gaps import close_gaps
 from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
-from stiction.profile_nodes import AtNodes, Gaps, by_coordinate, check_gaps, in_order
+from stiction.profile_nodes import AtNodes, Gaps, Points, check_gaps, in_order
 from stiction.profile_text import Table, read_table
+from stiction.quantities import PLACES, UNITS, choose, factor_of, mapped_by
 from stiction.topographies import is_topography, mapped
-from stiction.units import factor_to, parse
 
 if TYPE_CHECKING:
     import xarray as xr
-
-UNITS = {
-    "strength": "Pa",
-    "residual_strength": "Pa",
-    "residual_ratio": "1",
-    "initial_stress": "Pa",
-    "normal_pressure": "Pa",
-    "weakening_rate": "Pa/m",
-    "critical_slip": "m",
-    "fracture_energy": "J/m2",
-    "load_profile": "1",
-    "slip": "m",
-    "friction_coefficient": "1",
-}
-"""What can be a profile, and its SI unit."""
-
-_NAMES = {
-    "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
-    "residual_strength": ("tau_r", "taur"),
-    "residual_ratio": (),
-    "initial_stress": ("tau_i", "taui"),
-    "normal_pressure": ("pressure", "normal_stress", "sigma_n", "sigma"),
-    "weakening_rate": ("w",),
-    "critical_slip": ("d_c", "dc"),
-    "fracture_energy": ("gamma",),
-    "load_profile": ("profile", "load"),
-    "slip": ("d", "delta"),
-    "friction_coefficient": ("mu", "coefficient"),
-}
-_PLACES = ("x", "position", "pos", "distance", "coordinate")
-_SAMPLES = ("sample", "samples", "kept_sample")
-MEASURED = "measured"
-"""Coordinate along x of a profile with gaps: False where there was no value."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Points:
-    """Values of one quantity in SI, and where they belong.
-
-    Attributes
-    ----------
-    values : (points,) or (samples, points) array
-    x : (points,) array or None
-        m; None if they come in the order of the nodes.
-    measured : array of bool or None
-        Of the shape of `values`, or (points,); from an earlier filling of gaps.
-    """
-
-    values: Array
-    x: Array | None = None
-    measured: NDArray[np.bool_] | None = None
-
-    def on(self, interface: Interface, *, interpolate: bool, gaps: Gaps) -> AtNodes:
-        """The same at the nodes of an interface."""
-        if self.x is None:
-            found, measured = in_order(self.values, interface, gaps), self.measured
-        else:
-            options: dict[str, Any] = {"interpolate": interpolate, "gaps": gaps}
-            found, measured = by_coordinate(self.x, self.values, interface, **options), None
-            if self.measured is not None:
-                share = by_coordinate(self.x, self.measured * 1.0, interface, **options)
-                measured = share.values > 0.999
-        both = [mask for mask in (found.measured, measured) if mask is not None]
-        return AtNodes(found.values, np.logical_and.reduce(both) if both else None)
 
 
 def read_profile(
@@ -128,7 +64,7 @@ def read_profile(
         'weakening_rate' (Pa/m), 'critical_slip' (m), 'load_profile' or 'friction_coefficient' (1).
     strength : callable, optional
         Map from another measured quantity, such as heights in SI units, to the strength in Pa;
-        nothing is taken for a strength without one.
+        nothing is taken for a strength without one. On a plane it gets an array (nx, ny).
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
         in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
@@ -190,8 +126,9 @@ def read_profile(
         if interface is None:
             return source
     if interface is not None and interface.is_plane:
-        others = (x, x_unit, strength)
-        return _of_plane(name, source, quantity, interface, value, unit, others, gaps)
+        if x is not None or x_unit is not None:
+            raise InputError("x and x_unit: are options of profiles of a line")
+        return _of_plane(name, source, quantity, interface, value, unit, strength, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
@@ -203,6 +140,12 @@ def read_profile(
         elif place is not None:
             order = np.argsort(place, kind="stable")
             values, place = values[order], place[order]
+            again = np.flatnonzero(np.diff(place) == 0.0)
+            if again.size:
+                raise InputError(
+                    f"x repeats: {place[again[0]]:.9g} m stands beside two values; a map over x and"
+                    " y is read with the plane it belongs to, interface=..."
+                )
             measured = None if measured is None else measured[order]
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
@@ -222,14 +165,12 @@ def _of_plane(
     interface: Interface,
     value: Any,
     unit: str | None,
-    others: tuple[Any, ...],
+    strength: Callable[[Array], Array] | None,
     gaps: Gaps,
 ) -> xr.DataArray:
     """`read_profile` of a plane, which takes values at the nodes only."""
     import xarray as xr
 
-    if any(other is not None for other in others):
-        raise InputError("x, x_unit and strength: are options of profiles of a line")
     read = read_plane if isinstance(source, str | Path) else on_plane
     given = Path(source) if isinstance(source, str | Path) else source
     if read is on_plane and not is_labelled(source):
@@ -237,9 +178,11 @@ def _of_plane(
             f"source: must be a path, a DataArray or a Dataset, got {describe(source)}"
         )
     try:
-        values = read(given, quantity, UNITS[quantity], interface, value, unit)
+        values = read(given, quantity, interface, value, unit, strength is not None)
         if values.shape != interface.shape:
             raise InputError(f"must hold one profile, got shape {values.shape}")
+        if strength is not None:
+            values = mapped_by(strength, values)
         values, measured = close_gaps(values, interface, gaps)
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
@@ -270,7 +213,10 @@ def points_of(
     if isinstance(source, str | Path):
         path = Path(source)
         if path.suffix.lower() not in ENDINGS:
-            raise InputError(f"a profile must end in {', '.join(ENDINGS)}, got {path.name!r}")
+            raise InputError(
+                f"a profile must end in {', '.join(ENDINGS)}, got {path.name!r}; files of"
+                " instruments: give what SurfaceTopography.read_topography(path) returns"
+            )
         if path.suffix.lower() in NETCDF:
             source = read_netcdf(path)
         elif path.suffix.lower() in TEXT:
@@ -279,8 +225,8 @@ def points_of(
             source = _table_of(read_npy(path), x, value)
     if isinstance(source, Table):
         column, place, stated, x_stated = _choose_columns(source, quantity, x, value, strength)
-        factor = _factor(unit, stated, quantity, strength is not None)
-        at = None if place is None else place * _factor(x_unit, x_stated, "x")
+        factor = factor_of(unit, stated, quantity, strength is not None)
+        at = None if place is None else place * factor_of(x_unit, x_stated, "x")
         points = Points(column * factor, at)
     elif is_labelled(source):
         points = labelled(source, quantity, x, value, unit, x_unit, strength is not None)
@@ -288,37 +234,7 @@ def points_of(
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
     if strength is None:
         return points
-    mapped = np.asarray(strength(points.values), dtype=np.float64)
-    if mapped.shape != points.values.shape:
-        raise InputError(
-            f"strength: must return one value a point, shape {points.values.shape}, got shape"
-            f" {mapped.shape}"
-        )
-    return dataclasses.replace(points, values=mapped)
-
-
-def _factor(
-    given: str | None, stated: str | None, quantity: str, any_dimension: bool = False
-) -> float:
-    """To SI, from what the caller says and what the source states."""
-    si, what = ("m", "x") if quantity == "x" else (UNITS[quantity], quantity)
-
-    def factor(text: str) -> float:
-        if not any_dimension:
-            return factor_to(si, text)
-        unit = parse(text)
-        return unit.factor if unit is not None else factor_to(si, text)
-
-    try:
-        if given is None:
-            return 1.0 if stated is None else factor(stated)
-        result = factor(given)
-        known = None if stated is None else parse(stated)
-        if known is not None and not np.isclose(factor(str(stated)), result, rtol=1e-12):
-            raise InputError(f"is said to be in {given}, the source states {stated}")
-    except InputError as error:
-        raise InputError([f"{what} {text}" for text in error.problems]) from None
-    return result
+    return dataclasses.replace(points, values=mapped_by(strength, points.values))
 
 
 def _table_of(array: Array, x: Any, value: Any) -> Table:
@@ -339,7 +255,7 @@ def _choose_columns(
     value = _column("value", value, names)
     place = _column("x", x, names)
     if place is None and width > 1:
-        called = [i for i, name in enumerate(names) if str(name).casefold() in _PLACES]
+        called = [i for i, name in enumerate(names) if str(name).casefold() in PLACES]
         if len(called) == 1:
             place = called[0]
         elif width == 2 and value != 0:
@@ -351,7 +267,7 @@ def _choose_columns(
     others = [i for i in range(width) if i != place]
     if value is None:
         known = [(names[i], table.units[i]) for i in others]
-        value = others[_choose(known, quantity, strength is not None)]
+        value = others[choose(known, quantity, strength is not None)]
     at = None if place is None else table.columns[place]
     x_unit = None if place is None else table.units[place]
     return table.columns[value], at, table.units[value], x_unit
@@ -375,166 +291,6 @@ def _listed(names: Sequence[str | None]) -> str:
     return ", ".join(repr(name) for name in names if name) or "without names"
 
 
-def _choose(known: Sequence[tuple[str | None, str | None]], quantity: str, mapped: bool) -> int:
-    """Which of several variables (name, unit) is the quantity, if that is beyond doubt."""
-    if len(known) == 1 and (mapped or known[0][0] is None):
-        return 0
-    for name in (quantity, *_NAMES[quantity], *(("value", "values") if len(known) == 1 else ())):
-        for number, (own, _) in enumerate(known):
-            if own is not None and own.casefold().replace(" ", "_") == name:
-                return number
-    wanted = parse(UNITS[quantity])
-    assert wanted is not None
-    units = [None if unit is None else parse(unit) for _, unit in known]
-    # Any number is dimensionless: for such a quantity a unit says nothing.
-    fitting = [
-        number
-        for number, unit in enumerate(units)
-        if unit and unit.dimension == wanted.dimension and any(wanted.dimension)
-    ]
-    if len(fitting) == 1:
-        return fitting[0]
-    described = ", ".join(f"{n!r} in {u}" if u else f"{n!r}" for n, u in known) or "none"
-    raise InputError(
-        f"holds no variable that is plainly the {quantity} ({UNITS[quantity]}): got {described}."
-        f" Call it {quantity!r}, state its unit, or say which it is with value=... (--value) and"
-        " unit=... (--unit)"
-    )
-
-
-def is_labelled(value: Any) -> bool:
-    """Whether it is an xarray object, told without importing xarray."""
-    return hasattr(value, "dims") and hasattr(value, "coords")
-
-
-def simplified(value: Any, quantity: str) -> Any:
-    """`value` as one of the kinds that are told apart here: labelled, or plain numbers in SI.
-
-    A pandas Series over numbers that are no count is labelled; a quantity of pint or astropy and
-    a labelled number are plain.
-    """
-    try:
-        if is_labelled(value):
-            plain = not value.dims and not hasattr(value, "data_vars")
-            factor = _factor(None, _unit_of(value), quantity) if plain else 1.0
-            return _magnitude(value.data, UNITS[quantity]) * factor if plain else value
-        index = getattr(value, "index", None)
-        if (
-            hasattr(value, "to_xarray")
-            and getattr(getattr(index, "dtype", None), "kind", "") == "f"
-        ):
-            return value.to_xarray()
-    except TypeError as error:
-        raise InputError(f"must be numbers; {error}") from None
-    return _magnitude(value, UNITS[quantity])
-
-
-def labelled(
-    source: Any,
-    quantity: str,
-    x: Any = None,
-    value: Any = None,
-    unit: str | None = None,
-    x_unit: str | None = None,
-    any_dimension: bool = False,
-) -> Points:
-    """Values and coordinates of a DataArray, or of one variable of a Dataset; names decide."""
-    if hasattr(source, "data_vars"):
-        names = [str(name) for name in source.data_vars if str(name) != str(x)]
-        known = [(name, _unit_of(source[name])) for name in names]
-        if not names:
-            raise InputError("holds no profile (a variable of numbers along one dimension)")
-        chosen = names.index(value) if value in names else None
-        if value is not None and chosen is None:
-            raise InputError(unknown_name("value", str(value), names))
-        number = _choose(known, quantity, any_dimension) if chosen is None else chosen
-        extra = {x: source[x]} if x is not None and x in source.data_vars else {}
-        source = source[names[number]].assign_coords(extra)
-    nodes = _dimension_along(source, x)
-    samples = [name for name in source.dims if name != nodes]
-    if len(samples) > 1:
-        sizes = ", ".join(f"{name}: {size}" for name, size in source.sizes.items())
-        raise InputError(f"must have one dimension beside x, got ({sizes}); select one point")
-    if nodes is None:  # one value a sample
-        values = real_array(_magnitude(source.data, UNITS[quantity]))[:, np.newaxis]
-        return Points(values * _factor(unit, _unit_of(source), quantity, any_dimension))
-    source = source.transpose(*samples, nodes)
-    try:
-        values = real_array(_magnitude(source.data, UNITS[quantity]))
-    except TypeError as error:
-        raise InputError(f"must be numbers; {error}") from None
-    values = values * _factor(unit, _unit_of(source), quantity, any_dimension)
-    measured = None
-    if MEASURED in source.coords and nodes in source.coords[MEASURED].dims:
-        mask = source.coords[MEASURED].broadcast_like(source).transpose(*samples, nodes)
-        measured = mask.values.astype(bool)
-    place = _coordinate(source, nodes, x)
-    if place is None:
-        return Points(values, None, measured)
-    at = real_array(_magnitude(place.data, "m")) * _factor(x_unit, _unit_of(place), "x")
-    return Points(values, at, measured)
-
-
-def _unit_of(array: Any) -> str | None:
-    for key in ("units", "unit"):
-        if key in array.attrs and str(array.attrs[key]).strip():
-            return str(array.attrs[key]).strip()
-    return None
-
-
-def _dimension_along(source: Any, x: Any) -> Any:
-    """The dimension along the interface; None if there is none, only one of samples."""
-    dims = list(source.dims)
-    if x is not None and x in source.coords and source.coords[x].ndim == 1:
-        return source.coords[x].dims[0]
-    if x is not None:
-        raise InputError(unknown_name("x", str(x), [str(name) for name in source.coords]))
-    called = [name for name in dims if str(name).casefold() in _PLACES]
-    called = called or [
-        coordinate.dims[0]
-        for name, coordinate in source.coords.items()
-        if str(name).casefold() in _PLACES and coordinate.ndim == 1
-    ]
-    if called:
-        return called[0]
-    rest = [name for name in dims if str(name).casefold() not in _SAMPLES]
-    if len(rest) == 1:
-        return rest[0]
-    if not rest and len(dims) == 1:
-        return None
-    if dims and all(str(name).startswith("dim_") for name in dims):  # never named: order counts
-        return dims[-1]
-    raise InputError(
-        f"which dimension runs along the interface is not clear from ({', '.join(map(str, dims))});"
-        " call it 'x', and the other 'sample'"
-    )
-
-
-def _coordinate(source: Any, nodes: Any, x: Any) -> Any:
-    if x is not None:
-        return source.coords[x]
-    if nodes in source.coords:
-        return source.coords[nodes]
-    named = [
-        coordinate
-        for name, coordinate in source.coords.items()
-        if str(name).casefold() in _PLACES and coordinate.dims == (nodes,)
-    ]
-    return named[0] if named else None
-
-
-def _magnitude(value: Any, si: str) -> Any:
-    """The plain number of a pint or astropy quantity in an SI unit; anything else as it is."""
-    try:
-        if hasattr(value, "magnitude") and hasattr(value, "to"):
-            return value.to(si).magnitude
-        if hasattr(value, "to_value") and hasattr(value, "unit"):
-            return value.to_value(si)
-    except Exception as error:  # each library has its own for 'no such unit'
-        raise InputError(f"cannot be converted to {si}: {error}") from None
-    return value
-
-
 def _and_own_gaps(measured: Any, source: Any) -> Any:
     """Where a map was measured, those that were filled earlier taken into account."""
     if MEASURED not in getattr(source, "coords", {}):
@@ -553,7 +309,7 @@ def at_nodes(
     try:
         value = simplified(value, quantity)
         if is_labelled(value) and interface.is_plane:
-            found = on_plane(value, quantity, UNITS[quantity], interface)
+            found = on_plane(value, quantity, interface)
             if found.shape[-2:] != interface.shape:
                 return AtNodes(found, None)
             filled = close_gaps(found, interface, gaps)

@@ -12,6 +12,7 @@ import numpy as np
 
 from stiction._typing import Array
 from stiction.errors import InputError
+from stiction.quantities import mapped_by
 from stiction.units import factor_to
 
 if TYPE_CHECKING:
@@ -45,9 +46,7 @@ def mapped(
         raise InputError("states no unit of its lengths; set it (topography.scale_height, unit=)")
     scale = factor_to("m", str(unit))
     heights = np.ma.filled(np.ma.asarray(source.heights(), dtype=np.float64), np.nan) * scale
-    values = np.asarray(strength(heights), dtype=np.float64)
-    if values.shape != heights.shape:
-        raise InputError(f"strength: must return shape {heights.shape}, got shape {values.shape}")
+    values = mapped_by(strength, heights)
     dims = ("x", "y")[: heights.ndim]
     uniform = bool(getattr(source, "is_uniform", True))
     places = {

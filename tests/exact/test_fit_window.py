@@ -5,6 +5,8 @@ import pytest
 
 import stiction as st
 from stiction.inference.spectral_model import Grid
+from stiction.inference.spectrum_fit import spectrum_family
+from stiction.inference.whittle import make_observed
 from stiction.inference.window import make_window
 
 SPACING = 1e-4
@@ -39,6 +41,27 @@ def test_expectation_of_a_line(degree, gap):
     np.testing.assert_allclose(found[17:], expected[17:], rtol=0.02)
     # And the correlation is that of the spectrum on an infinite line; it fades where it is cut.
     np.testing.assert_allclose(rho[:count], SPECTRUM.correlation(lag), atol=1e-3)
+
+
+def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
+    """A long correlation whose usual truncation lies among the wavenumbers of the record.
+
+    A rough spectrum falls as (k xi_0)^-2 there: twice the correlation length is a constant factor
+    and nothing else, unless it moves the truncation, which then tells the correlation length.
+    """
+    window = make_window((128,), (SPACING,), np.ones(128, dtype=bool), 0)
+    observed = make_observed(window, np.ones((1, 65)))
+
+    def high(length, **given):
+        family = spectrum_family({"type": "exponential"} | given, 1.0, 0.0, (1e-4, 1.0))
+        model = family.model(np.log([1.0, length]), np.array([0.0, 1.0]))
+        return model.signal(observed)[20:-1]
+
+    with_default = high(6.4e-3) / high(3.2e-3)
+    cut = high(6.4e-3, truncation=10.0) / high(3.2e-3, truncation=10.0)
+    # k xi_0 is 31 at the lowest of these wavenumbers; to that come leaks of the taper.
+    np.testing.assert_allclose(with_default / with_default.mean(), 1.0, atol=0.01)
+    assert cut.min() < 0.1 * cut.max()
 
 
 def test_power_above_the_sampling_wavenumber_is_folded_back():

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from stiction.reliability.design import stress_interval
 from stiction.reliability.pooling import Tail, run_until_precise
 from stiction.reliability.subset import descend
+from stiction.reliability.tail_runs import stress_interval
 from stiction.reliability.two_level import agreement, bridge
 from stiction.reliability.uncertainty import generator, log_width
 

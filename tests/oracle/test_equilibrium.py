@@ -14,7 +14,7 @@ import stiction as st
 from stiction.elasticity.line_stiffness import stiffness_column
 from stiction.equilibrium.continuation import at_rest
 from stiction.equilibrium.events import equilibrium_events
-from stiction.equilibrium.instability_jump import SLIDING, escape_run, jump, step_to_corner
+from stiction.equilibrium.instability_jump import SLIDING, griffith_length, jump, step_to_corner
 from stiction.equilibrium.linear_program_cg import LargeProgram
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
@@ -269,12 +269,12 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
         if np.any(found.slip > sample.critical):
             continue
         step_to_corner(sample, found.slip, found.multiplier, np.inf)
-        escape = 1.5 * escape_run(sample, found.load, setting.spacing, setting.modulus)
+        griffith = 1.5 * griffith_length(sample, found.load, setting.spacing, setting.modulus)
         part = runs_away_frozen(
-            setting.grid, sample, found.load, found.slip, found.multiplier, escape, 4000
+            setting.grid, sample, found.load, found.slip, found.multiplier, griffith, 4000
         )
         whole = jump(
-            sample, setting.grid, found.load, found.slip, found.stiff, escape, 4000,
+            sample, setting.grid, found.load, found.slip, found.stiff, griffith, 4000,
             make_workspace(4096),
         )  # fmt: skip
         # Only a lower bound: what slides in the window slides.

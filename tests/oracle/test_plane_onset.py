@@ -90,7 +90,7 @@ def by_local_relaxation(plane, sample, load, slip, limit=60_000):
     step = 1.0 / np.fft.irfft2(symbol, slip.shape)[0, 0]
     for _ in range(limit):
         stress = load * sample.profile - np.fft.irfft2(symbol * np.fft.rfft2(slip), slip.shape)
-        drive = stress - np.maximum(sample.excess - sample.rate * slip, sample.floor)
+        drive = stress - np.maximum(sample.excess - sample.rate * slip, sample.residual)
         if drive.max() < 1e-8 * sample.excess.mean():
             return slip
         if (slip > sample.critical).all():

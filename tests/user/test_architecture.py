@@ -18,8 +18,8 @@ PAGE = ROOT / "docs" / "architecture.md"
 
 DEFERRED = {
     ("stiction._model", "stiction.placed"),
-    ("stiction._model", "stiction.profiles"),
-    ("stiction.study.study", "stiction.stored_run"),
+    ("stiction._model", "stiction.labelled_arrays"),
+    ("stiction.study.study", "stiction.study_run"),
     ("stiction.ensemble.distributed", "stiction.ensemble.slurm"),
     ("stiction.papers.albertini2020.studies.study_cache", "stiction.papers.albertini2020.studies"),
 }

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from stiction._jit import jit
+
 SOURCES = Path(__file__).parents[2] / "src"
 
 
@@ -105,3 +107,10 @@ def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path):
     kept = b"".join(path.read_bytes() for path in (tmp_path / "cache").rglob("*.nbi"))
     assert kept
     assert b"own_module" not in kept
+
+
+def test_functions_of_no_module_compile():
+    """As libraries make them by exec; the package looks at the module of what is compiled."""
+    made: dict = {"__name__": None}
+    exec("def one_more(x):\n    return x + 1", made)
+    assert jit(made["one_more"])(1) == 2

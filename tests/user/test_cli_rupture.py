@@ -1,61 +1,29 @@
 """The command that simulates one rupture."""
 
-import sys
-
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
+from small_study import small_study
 
 import stiction as st
-from stiction.cli import app as room
 
-TEXT = """
-[problem.solid]
-shear_modulus = 1e9
-poisson_ratio = 0.33
-density = 1170.0
-plane = "stress"
-[problem.interface]
-length = 0.05
-nodes = 128
-[problem.friction]
-weakening_rate = 0.25e12
-[random.strength.marginal]
-type = "beta"
-alpha = 1.5
-beta = 3.0
-low = 0.66e6
-high = 1.66e6
-[random.strength.spectrum]
-type = "power_law"
-correlation_length = 6e-3
-[method]
-type = "local_criterion"
-[ensemble]
-samples = 2
-seed = 3
-"""
-
-
-def run(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        room.main()
-    return ended.value.code
+STUDY = small_study(length=0.05, correlation_length=6e-3, ensemble={"samples": 2, "seed": 3})
+STUDY["problem"]["solid"]["plane"] = "stress"
 
 
 @pytest.fixture
 def study(tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text(TEXT)
+    path.write_text(tomli_w.dumps(STUDY))
     return path
 
 
 @pytest.mark.slow
-def test_writes_result_figures_and_film(monkeypatch, capsys, study, tmp_path):
+def test_writes_result_figures_and_film(command, study, tmp_path):
     out = tmp_path / "rupture"
-    assert run(monkeypatch, "rupture", study, "--out", out, "--film", "--sample", 1) == 0
-    text = capsys.readouterr().out
+    code, text, _ = command("rupture", study, "--out", out, "--film", "--sample", 1)
+    assert code == 0
     assert "onset at x" in text
     assert "ended by: sliding" in text
     for name in ("rupture.png", "rupture.pdf", "front.png", "front.pdf", "rupture.gif"):
@@ -69,11 +37,17 @@ def test_writes_result_figures_and_film(monkeypatch, capsys, study, tmp_path):
         assert float(result.critical_stress) == float(expected.critical_stress[0])
 
 
-def test_mistakes_end_with_a_message(monkeypatch, capsys, study, tmp_path):
-    assert run(monkeypatch, "rupture", study, "--out", study) == 2
-    assert "--out" in capsys.readouterr().err
-    assert run(monkeypatch, "rupture", study, "--out", tmp_path / "r", "--loading-rate", -1) == 2
-    assert "loading_rate" in capsys.readouterr().err
-    assert run(monkeypatch, "rupture", study, "--out", tmp_path / "r", "--strength", "no.npy") == 2
-    assert "no.npy" in capsys.readouterr().err
-    assert run(monkeypatch, "rupture", study, "--out", tmp_path / "r", "--sample", -1) == 2
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--out", "study.toml"], "--out"),
+        (["--loading-rate", -1], "loading_rate"),
+        (["--strength", "no.npy"], "no.npy"),
+        (["--sample", -1], "--sample"),
+    ],
+)
+def test_mistakes_end_with_a_message(command, study, tmp_path, monkeypatch, options, named):
+    monkeypatch.chdir(tmp_path)
+    code, _, said = command("rupture", study, "--out", "run", *options)
+    assert code == 2
+    assert named in said

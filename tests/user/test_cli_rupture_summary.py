@@ -1,5 +1,6 @@
 """What the command prints of a rupture, and films where there is no ffmpeg."""
 
+import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,7 +8,7 @@ import xarray as xr
 import stiction as st
 from stiction import InputError
 from stiction.cli.rupture import _summary
-from stiction.plot import film_writer, films
+from stiction.plot import films
 
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
@@ -44,8 +45,10 @@ def test_what_is_not_known_is_not_printed():
     assert "kinetic" not in text
 
 
-def test_a_film_as_mp4_without_ffmpeg_says_what_is_missing(monkeypatch, tmp_path):
-    monkeypatch.setattr(film_writer, "can_write_mp4", lambda: False)
+def test_a_film_as_mp4_without_ffmpeg_says_what_is_missing(tmp_path):
     run = xr.Dataset({name: ((), 0.0) for name in ("slip_rate", "shear_stress", "peak_strength")})
-    with pytest.raises(InputError, match="film.mp4' needs the program ffmpeg"):
+    with (
+        matplotlib.rc_context({"animation.ffmpeg_path": "no-such-program"}),
+        pytest.raises(InputError, match="film.mp4' needs the program ffmpeg"),
+    ):
         films.film(run, tmp_path / "film.mp4")

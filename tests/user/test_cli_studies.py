@@ -13,7 +13,7 @@ import xarray as xr
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.study.study import read_setup
+from stiction.study.setup import read_setup
 
 STUDY = small_study(
     title="a small sweep",

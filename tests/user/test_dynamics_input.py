@@ -17,7 +17,7 @@ from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
-from stiction.elasticity import kernel_cache
+from stiction.elasticity.kernel_cache import KernelCache
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES = 128
@@ -297,22 +297,19 @@ def test_cache_that_cannot_be_written_is_kept_in_memory(tmp_path, monkeypatch, c
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("STICTION_CACHE_DIR", str(blocked))
-    monkeypatch.setattr(kernel_cache, "_memory", {})
-    monkeypatch.setattr(kernel_cache, "_said", False)
+    cache = KernelCache()
     with caplog.at_level(logging.INFO, logger="stiction"):
-        first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
-        kernel_cache.kernel_sum("III", 1.0, 1e-4, 1e3)
-    assert kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3) is first
+        first = cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+        cache.kernel_sum("III", 1.0, 1e-4, 1e3)
+    assert cache.kernel_sum("III", 1.0, 1e-3, 1e3) is first
     assert caplog.text.count("cannot write the kernel cache") == 1
 
 
 def test_damaged_cache_file_is_built_again(tmp_path, monkeypatch):
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(kernel_cache, "_memory", {})
-    first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    first = KernelCache().kernel_sum("III", 1.0, 1e-3, 1e3)
     (path,) = tmp_path.iterdir()
     path.write_bytes(path.read_bytes()[:50])
-    kernel_cache._memory.clear()
-    second = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    second = KernelCache().kernel_sum("III", 1.0, 1e-3, 1e3)
     assert np.array_equal(first.poles, second.poles)
     assert path.stat().st_size > 500

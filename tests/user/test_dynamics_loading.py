@@ -11,7 +11,7 @@ from stiction._archive import UNREADABLE, read_arrays
 from stiction.dynamics import monitor
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
-from stiction.elasticity import kernel_cache
+from stiction.elasticity.kernel_cache import KernelCache
 
 NODES = 128
 PROBLEM = st.Problem(
@@ -187,8 +187,8 @@ def test_damaged_checkpoints_are_refused(tmp_path):
 
 def test_a_cache_file_with_other_content_is_built_again(tmp_path, monkeypatch):
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(kernel_cache, "_memory", {})
-    first = kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3)
+    kernel = ("III", 1.0, 1e-3, 1e3)
+    first = KernelCache().kernel_sum(*kernel)
     (path,) = tmp_path.iterdir()
     contents = [
         {"poles": first.poles, "weights": first.weights[1:], "error": 0.0, "t_max": 1.0},
@@ -197,12 +197,10 @@ def test_a_cache_file_with_other_content_is_built_again(tmp_path, monkeypatch):
     ]
     for content in contents:
         np.savez(path, **content)
-        kernel_cache._memory.clear()
-        assert np.array_equal(kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
+        assert np.array_equal(KernelCache().kernel_sum(*kernel).poles, first.poles)
     with path.open("wb") as stream:
         np.save(stream, np.zeros(3))
-    kernel_cache._memory.clear()
-    assert np.array_equal(kernel_cache.kernel_sum("III", 1.0, 1e-3, 1e3).poles, first.poles)
+    assert np.array_equal(KernelCache().kernel_sum(*kernel).poles, first.poles)
 
 
 def test_a_restart_has_every_step_and_frame_with_an_interval(tmp_path):

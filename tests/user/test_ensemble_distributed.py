@@ -11,14 +11,14 @@ import pytest
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.cli import app as room
 from stiction.ensemble import distributed as dask_room
 from stiction.ensemble import resume
 from stiction.ensemble.distributed import Cluster, dask_executor
 from stiction.ensemble.slurm import slurm_cluster, slurm_jobs
 from stiction.ensemble.work import do_work
 from stiction.errors import WorkerError
-from stiction.stored_run import StoredRun, run_into
+from stiction.stored_run import StoredRun
+from stiction.study_run import run_into
 
 STUDY = small_study(
     nodes=256,
@@ -109,15 +109,12 @@ def test_all_workers_gone_and_back(cluster, tmp_path, reference, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_command_line_on_a_running_scheduler(cluster, tmp_path, reference, monkeypatch, capsys):
+def test_the_command_line_on_a_running_scheduler(cluster, tmp_path, reference, command):
     st.Study.from_dict(STUDY).to_toml(tmp_path / "study.toml")
-    command = ["run", tmp_path / "study.toml", "--out", tmp_path / "run"]
-    command += ["--scheduler", cluster.scheduler_address]
-    monkeypatch.setattr(sys, "argv", ["stiction", *map(str, command)])
-    with pytest.raises(SystemExit) as ended:
-        room.main()
-    assert not ended.value.code
-    assert "120000 samples in" in capsys.readouterr().out
+    arguments = ["run", tmp_path / "study.toml", "--out", tmp_path / "run"]
+    code, said, _ = command(*arguments, "--scheduler", cluster.scheduler_address)
+    assert code == 0
+    assert "120000 samples in" in said
     assert StoredRun(tmp_path / "run").dataset().identical(reference)
 
 

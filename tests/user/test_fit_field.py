@@ -163,6 +163,25 @@ def test_noise_that_hides_the_spectrum_is_warned_of():
         st.fit_field(labelled(noisy), **QUICK | {"noise": 3e6})
 
 
+@pytest.mark.parametrize("seed", [2, 6, 10])
+def test_no_noise_found_is_not_no_noise(seed):
+    """Of these rough records none is the best estimate; the noise was a tenth of the deviation.
+
+    Repetitions without noise mostly find none either: their intervals would end at next to nothing.
+    """
+    rough = st.RandomField(
+        st.Lognormal(mean=1e6, cov=0.3), st.ExponentialSpectrum(2e-3), mean_mode=True
+    )
+    record = rough.sample(st.Interface(length=0.12, nodes=600), seed=seed)[0, :200]
+    record = record + 3e4 * np.random.default_rng(seed).standard_normal(200)
+    fit = st.fit_field(
+        record, st.Interface(length=0.04, nodes=200), **QUICK | {"noise": True, "bootstrap": 40}
+    )
+    low, high = fit.interval["noise"]
+    assert fit.parameters["noise"] == low == 0.0
+    assert high > 3e4
+
+
 def test_outliers_are_warned_of():
     values = VALUES.copy()
     values[7] = 2e7
@@ -200,6 +219,8 @@ def test_the_command_writes_a_page_and_a_field(tmp_path):
     page = (out / "page.html").read_text("utf-8")
     assert "spectrum.correlation_length" in page
     assert "data:image/png;base64," in page
+    assert "<code>fit.png</code>." in page
+    assert (out / "field.toml").read_text("utf-8").splitlines()[0] in page
     field = tomllib.loads((out / "field.toml").read_text("utf-8"))["random"]["strength"]
     found = st.RandomField(**field)
     stated = re.search(r"mean +([\d.e+]+)", result.output)

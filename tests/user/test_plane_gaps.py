@@ -79,3 +79,66 @@ def test_an_onset_in_a_gap_of_a_map_says_so():
     assert bool(found["in_gap"].item())
     whole = st.onset(problem, VALUES, method=st.LocalCriterion())
     assert "in_gap" not in whole
+
+
+def heights_in(folder, ending):
+    """VALUES as heights of micrometres, one for each MPa, and what must be said to read them."""
+    path, heights = folder / f"heights{ending}", VALUES * 1e-6
+    if ending == ".npy":
+        np.save(path, heights)
+        return path, {"unit": "um"}
+    if ending == ".nc":
+        coords = {name: (name, at, {"units": "m"}) for name, at in PLANE.coordinates.items()}
+        array = xr.DataArray(heights, dims=("x", "y"), coords=coords, attrs={"units": "um"})
+        array.transpose("y", "x").to_dataset(name="z").to_netcdf(path)
+        return path, {}
+    text(path)
+    path.write_text(path.read_text().replace("strength (MPa)", "z (um)"))
+    return path, {}
+
+
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".npy"])
+def test_heights_of_a_map_are_mapped_from_metres(tmp_path, ending):
+    path, said = heights_in(tmp_path, ending)
+    with pytest.raises(st.InputError, match="plainly the strength|no unit of stress"):
+        st.read_profile(path, interface=PLANE, **said)
+    found = st.read_profile(path, interface=PLANE, strength=lambda h: 1e12 * h, **said)
+    np.testing.assert_allclose(found, VALUES, rtol=1e-8)
+    assert found.attrs["units"] == "Pa"
+    unit = "banana" if ending == ".npy" else "mm"
+    with pytest.raises(st.InputError, match="said to be in mm, the source states um|unknown unit"):
+        st.read_profile(path, interface=PLANE, strength=lambda h: h, unit=unit)
+    with pytest.raises(st.InputError, match="strength: must return one value a point"):
+        st.read_profile(path, interface=PLANE, strength=lambda h: h.mean(), **said)
+
+
+def test_heights_whose_axes_changed_places_are_refused(tmp_path):
+    np.save(tmp_path / "turned.npy", VALUES.T * 1e-6)
+    turned = PLANE.coordinates["x"], PLANE.coordinates["y"]
+    with pytest.raises(st.InputError, match="x and y have changed places"):
+        st.read_profile(tmp_path / "turned.npy", interface=PLANE, strength=lambda h: h, unit="um")
+    array = xr.DataArray(VALUES.T, dims=("x", "y"), coords={"x": turned[1], "y": turned[0]})
+    with pytest.raises(st.InputError, match="has 16 values along x, the plane has 32 nodes"):
+        st.read_profile(array, interface=PLANE, strength=lambda h: h)
+
+
+def test_missing_heights_stay_gaps(tmp_path):
+    path = text(tmp_path / "heights.csv", without=3)
+    path.write_text(path.read_text().replace("strength (MPa)", "z (um)"))
+    found = st.read_profile(path, interface=PLANE, strength=lambda h: 1e12 * h, gaps="skip")
+    assert int(np.isnan(found).sum()) == 3
+
+
+def test_a_variable_that_says_nothing_is_no_strength(tmp_path):
+    """As on a line: one variable alone is not taken for a strength because it is alone."""
+    heights = xr.Dataset({"z": (("x", "y"), VALUES)})
+    heights.to_netcdf(tmp_path / "map.nc")
+    with pytest.raises(st.InputError, match="plainly the strength"):
+        st.read_profile(tmp_path / "map.nc", interface=PLANE)
+    found = st.read_profile(tmp_path / "map.nc", interface=PLANE, value="z", unit="kPa")
+    np.testing.assert_allclose(found, 1e3 * VALUES)
+
+
+def test_a_map_is_not_read_as_a_line(tmp_path):
+    with pytest.raises(st.InputError, match="x repeats.*interface="):
+        st.read_profile(text(tmp_path / "map.csv"))

@@ -4,8 +4,10 @@ import os
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
 from PIL import Image
+from small_study import small_study
 from typer.testing import CliRunner
 
 import stiction as st
@@ -13,39 +15,21 @@ from stiction.cli.app import app
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
-STUDY = """
-[problem.solid]
-shear_modulus = 1e9
-poisson_ratio = 0.33
-density = 1170.0
-[problem.interface]
-length = [0.016, 0.012]
-nodes = [40, 36]
-[problem.friction]
-weakening_rate = 0.5e12
-residual_strength = 1e5
-[random.strength.marginal]
-type = "beta"
-alpha = 1.5
-beta = 3.0
-low = 0.66e6
-high = 1.66e6
-[random.strength.spectrum]
-type = "power_law"
-correlation_length = 2e-3
-[method]
-type = "rupture"
-loading_rate = 1e8
-[ensemble]
-samples = 3
-seed = 4
-"""
+STUDY = small_study(
+    nodes=[40, 36],
+    length=[0.016, 0.012],
+    weakening_rate=0.5e12,
+    correlation_length=2e-3,
+    method={"type": "rupture", "loading_rate": 1e8},
+    ensemble={"samples": 3, "seed": 4},
+)
+STUDY["problem"]["friction"]["residual_strength"] = 1e5
 
 
 @pytest.fixture
 def path(tmp_path):
     path = tmp_path / "plane.toml"
-    path.write_text(STUDY)
+    path.write_text(tomli_w.dumps(STUDY))
     return path
 
 

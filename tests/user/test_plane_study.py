@@ -4,50 +4,28 @@ import csv
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
+from small_study import lengths, small_study
 from typer.testing import CliRunner
 
 import stiction as st
 from stiction.cli.app import app
 
-STUDY = """
-[problem.solid]
-shear_modulus = 1e9
-poisson_ratio = 0.33
-density = 1170.0
-[problem.interface]
-length = [0.02, 0.014]
-nodes = [72, 60]
-[problem.friction]
-weakening_rate = 0.5e12
-[random.strength]
-anisotropy = 1.5
-mean_mode = true
-[random.strength.marginal]
-type = "beta"
-alpha = 1.5
-beta = 3.0
-low = 0.66e6
-high = 1.66e6
-[random.strength.spectrum]
-type = "power_law"
-correlation_length = 2e-3
-[method]
-type = "local_criterion"
-[ensemble]
-samples = 30
-seed = 3
-keep = ["strength"]
-keep_samples = [0, 4]
-[sweep]
-"random.strength.spectrum.correlation_length" = [2e-3, 4e-3]
-"""
+STUDY = small_study(
+    nodes=[72, 60],
+    length=[0.02, 0.014],
+    weakening_rate=0.5e12,
+    ensemble={"samples": 30, "seed": 3, "keep": ["strength"], "keep_samples": [0, 4]},
+    sweep=lengths(2e-3, 4e-3),
+)
+STUDY["random"]["strength"] |= {"anisotropy": 1.5, "mean_mode": True}
 
 
 @pytest.fixture
 def path(tmp_path):
     path = tmp_path / "plane.toml"
-    path.write_text(STUDY)
+    path.write_text(tomli_w.dumps(STUDY))
     return path
 
 
@@ -75,7 +53,7 @@ def test_stored_run_is_that_in_memory(path, tmp_path):
 
 def test_run_that_was_left_and_goes_on(path, tmp_path):
     few = tmp_path / "few.toml"
-    few.write_text(STUDY.replace("samples = 30", "samples = 11"))
+    few.write_text(tomli_w.dumps(STUDY | {"ensemble": STUDY["ensemble"] | {"samples": 11}}))
     command("run", few, "--out", tmp_path / "run")
     command("run", path, "--out", tmp_path / "run")
     xr.testing.assert_equal(
@@ -163,9 +141,7 @@ def test_load_of_a_plane_from_a_file(path, tmp_path):
     profile = 1.0 + 0.1 * np.random.default_rng(0).random((72, 60))
     np.save(tmp_path / "load.npy", profile)
     np.save(tmp_path / "turned.npy", profile.T)
-    text = STUDY.replace(
-        "[random.strength]", '[problem.load]\nprofile = "load.npy"\n[random.strength]', 1
-    )
+    text = tomli_w.dumps(STUDY | {"problem": STUDY["problem"] | {"load": {"profile": "load.npy"}}})
     path.write_text(text)
     study = st.Study.from_toml(path)
     assert np.array_equal(study.plans[0].problem.load.profile, profile)

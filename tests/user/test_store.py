@@ -8,20 +8,21 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import warnings
 
 import numpy as np
 import pytest
 import xarray as xr
+from executors import Counting, Forbidding, SlowFrom
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction import stored_run
 from stiction.ensemble import resume, scheduler, work
 from stiction.ensemble.files import Lock
+from stiction.ensemble.manifest import write_manifest
 from stiction.errors import StoreError, WorkerError
-from stiction.stored_run import StoredRun, folder_beside, run_into
+from stiction.stored_run import StoredRun, folder_beside
+from stiction.study_run import run_into
 
 STUDY = small_study(
     ensemble={"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
@@ -72,21 +73,13 @@ def test_export_is_the_same_again(tmp_path, often, reference):
 
 
 @pytest.mark.parametrize("name", ["run", "result.nc"])
-def test_growing_computes_only_the_new_samples(tmp_path, often, reference, name, monkeypatch):
+def test_growing_computes_only_the_new_samples(tmp_path, often, reference, name):
     make_study(samples=500).run(out=tmp_path / name)
-    computed = []
-    original = work.compute
-    monkeypatch.setattr(
-        work,
-        "compute",
-        lambda plan, first, n: (computed.append((first, n)), original(plan, first, n))[1],
-    )
-    assert make_study().run(out=tmp_path / name, workers=1).identical(reference)
-    assert min(first for first, _ in computed) == 500
-    assert sum(n for _, n in computed) == 4 * 400
-    computed.clear()
-    assert make_study().run(out=tmp_path / name).identical(reference)
-    assert computed == []
+    counting = Counting()
+    assert make_study().run(out=tmp_path / name, executor=counting).identical(reference)
+    assert min(first for first, _ in counting.pieces) == 500
+    assert sum(count for _, count in counting.pieces) == 4 * 400
+    assert make_study().run(out=tmp_path / name, executor=Forbidding()).identical(reference)
 
 
 def test_a_run_does_not_shrink(tmp_path):
@@ -197,6 +190,7 @@ HOLD = """
 import sys, time
 from pathlib import Path
 from stiction.ensemble.files import Lock
+from stiction.ensemble.manifest import write_manifest
 with Lock(Path(sys.argv[1])):
     print("locked", flush=True)
     time.sleep(60.0)
@@ -297,23 +291,21 @@ def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
     ],
     ids=["a file", "other files", "a later format"],
 )
-def test_unusable_folders_are_refused_before_any_work(tmp_path, monkeypatch, prepare, words):
+def test_unusable_folders_are_refused_before_any_work(tmp_path, prepare, words):
     prepare(tmp_path / "run")
-    monkeypatch.setattr(work, "compute", lambda *arguments: pytest.fail("work was begun"))
     with pytest.raises(StoreError, match=words):
-        make_study().run(out=tmp_path / "run")
+        make_study().run(out=tmp_path / "run", executor=Forbidding())
 
 
-def test_unusable_places_are_refused_before_any_work(tmp_path, monkeypatch):
-    monkeypatch.setattr(work, "compute", lambda *arguments: pytest.fail("work was begun"))
+def test_unusable_places_are_refused_before_any_work(tmp_path):
     with pytest.raises(StoreError, match="does not exist"):
-        make_study().run(out=tmp_path / "nowhere" / "run")
+        make_study().run(out=tmp_path / "nowhere" / "run", executor=Forbidding())
     (tmp_path / "folder.nc").mkdir()
     with pytest.raises(StoreError, match="is a folder"):
-        make_study().run(out=tmp_path / "folder.nc")
+        make_study().run(out=tmp_path / "folder.nc", executor=Forbidding())
     (tmp_path / "notes.nc").write_text("not NetCDF")
     with pytest.raises(StoreError, match=r"notes\.nc"):
-        make_study().run(out=tmp_path / "notes.nc")
+        make_study().run(out=tmp_path / "notes.nc", executor=Forbidding())
 
 
 def test_a_folder_that_vanishes(tmp_path, often):
@@ -361,19 +353,18 @@ def test_a_full_disk(small_disk, often, reference, monkeypatch):
     assert make_study().run(out=small_disk / "run").identical(reference)
 
 
-def test_a_read_only_disk(small_disk, monkeypatch):
-    monkeypatch.setattr(work, "compute", lambda *arguments: pytest.fail("work was begun"))
+def test_a_read_only_disk(small_disk):
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    with pytest.raises(StoreError, match="read-only"):
-        make_study().run(out=small_disk / "run")
-    with pytest.raises(StoreError, match="read-only"):
-        make_study().run(out=small_disk / "result.nc")
+    for name in ("run", "result.nc"):
+        with pytest.raises(StoreError, match="read-only"):
+            make_study().run(out=small_disk / name, executor=Forbidding())
 
 
-def test_a_version_that_differs_is_said(tmp_path, often, monkeypatch):
-    make_study(samples=40).run(out=tmp_path / "run")
-    monkeypatch.setattr(stored_run, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
-    with pytest.warns(UserWarning, match=r"begun with stiction .*, this is stiction 99\.0, numpy"):
+def test_a_version_that_differs_is_said(tmp_path, often):
+    study = make_study(samples=40)
+    study.run(out=tmp_path / "run")
+    write_manifest(tmp_path / "run", study.to_dict(), ["stiction 99.0, numpy 1.0, numba 0.1"])
+    with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, this is stiction"):
         make_study(samples=60).run(out=tmp_path / "run")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -431,15 +422,9 @@ def test_killed_at_random_moments(tmp_path, monkeypatch):
     assert counts.in_the_middle > 0
 
 
-def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
+def test_time_between_chunks_is_about_a_second(tmp_path):
     """A sample that takes long does not keep finished ones from being stored."""
-    original = work.compute
-
-    def slow(plan, first, count):
-        if first >= 256:
-            time.sleep(1.6)
-        return original(plan, first, count)
-
-    monkeypatch.setattr(work, "compute", slow)
-    make_study(samples=300, sweep=[]).run(out=tmp_path / "run", workers=2)
+    with SlowFrom(256, seconds=1.6) as executor:
+        study = make_study(samples=300, sweep=[])
+        study.run(out=tmp_path / "run", executor=executor, workers=2)
     assert StoredRun(tmp_path / "run").status().chunks >= 2

@@ -14,15 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from executors import Forbidding
 from small_study import lengths, small_study
 
-from stiction.ensemble import files, resume, scheduler, store_writer, work
+from stiction.ensemble import files, resume, scheduler, store_writer
 from stiction.ensemble.files import Lock
 from stiction.ensemble.store import Store, sealed
 from stiction.ensemble.store_writer import StoreWriter
 from stiction.errors import StoreError
-from stiction.stored_run import StoredRun, folder_beside, run_into
+from stiction.stored_run import StoredRun, folder_beside
 from stiction.study.study import Study
+from stiction.study_run import run_into
 
 STUDY = small_study(
     ensemble={"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 299]},
@@ -65,11 +67,11 @@ def flip(path, chance):
     path.write_bytes(data)
 
 
-def again(folder, words=None):
+def again(folder, words=None, executor=None):
     """Run the study again, with a warning if words are given and none if not."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        result = make_study().run(out=folder, workers=1)
+        result = make_study().run(out=folder, workers=1, executor=executor)
     texts = "\n".join(str(w.message) for w in caught if w.category is UserWarning)
     assert bool(texts) == bool(words), texts
     assert all(word in texts for word in words or ()), texts
@@ -164,10 +166,9 @@ def test_what_joining_has_left_is_no_damage(run, reference):
         assert StoredRun(run).dataset().identical(reference)
 
 
-def test_a_lost_list_is_made_of_the_chunks(run, reference, monkeypatch):
+def test_a_lost_list_is_made_of_the_chunks(run, reference):
     (run / "chunks.jsonl").unlink()
-    monkeypatch.setattr(work, "compute", lambda *arguments: pytest.fail("computed again"))
-    assert make_study().run(out=run).identical(reference)
+    assert make_study().run(out=run, executor=Forbidding()).identical(reference)
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda p: p.write_text("{"), Path.touch])
@@ -291,7 +292,7 @@ def test_two_writers_without_a_lock_damage_nothing(tmp_path, reference, monkeypa
         "resume.FLUSH_SECONDS = 0.0; from stiction.ensemble import store_writer;"
         "store_writer.MANY = 3;"
         "scheduler.Sizer.next = lambda sizer, plan, span, *rest: min(20, span.samples);"
-        "from stiction.study.study import Study; from stiction.stored_run import run_into;"
+        "from stiction.study.study import Study; from stiction.study_run import run_into;"
         "run_into(Study.from_dict(json.loads(sys.argv[1])), sys.argv[2], lock=False, workers=1)"
     )
     command = [sys.executable, "-W", "ignore", "-c", code, json.dumps(STUDY), tmp_path / "run"]
@@ -358,9 +359,7 @@ def test_killed_while_chunks_are_joined(run, reference, monkeypatch):
             patch.setattr(files, "write_atomically", dying)
             with suppress(KeyboardInterrupt):
                 opened._join_small()
-        with monkeypatch.context() as patch:
-            patch.setattr(work, "compute", lambda *arguments: pytest.fail("computed again"))
-            assert again(run).identical(reference)
+        assert again(run, executor=Forbidding()).identical(reference)
 
 
 def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):

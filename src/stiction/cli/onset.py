@@ -60,7 +60,7 @@ def onset(
     also draws the profile and where each method sees sliding begin, of a plane its slip patches,
     too. The method of the study keeps its options, the others take their defaults.
     """
-    from stiction.study.study import read_setup
+    from stiction.study.setup import read_setup
 
     if out is not None:
         if out.suffix not in (".png", ".pdf", ".svg"):

@@ -52,6 +52,13 @@ def reliability(
     stress: Annotated[
         float | None, typer.Option(help="Also: probability of letting go below this stress, Pa.")
     ] = None,
+    friction_coefficient: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of --stress: mean shear stress over mean normal pressure. Needs a"
+            " normal pressure."
+        ),
+    ] = None,
     probability: Annotated[
         float | None, typer.Option(help="Also: stress with this failure probability.")
     ] = None,
@@ -72,7 +79,7 @@ def reliability(
         Event,
         typer.Option(
             help="What the curve counts: 'critical_stress', letting go as a whole, or"
-            " 'first_instability'. --stress and --probability say both."
+            " 'first_instability'. --stress, --friction-coefficient and --probability say both."
         ),
     ] = "critical_stress",
     workers: Workers = None,
@@ -86,13 +93,22 @@ def reliability(
 
     The stress is the mean shear stress on the interface, and failure means that the interface as
     a whole slides below it; with --event first_instability, that its first patch does,
-    arrested or not, which is never later. The time limit holds for the curve and each answer.
+    arrested or not, which is never later. With a normal pressure in the study the curve is
+    given in friction coefficients too, stress over mean pressure; where the pressure is random,
+    --friction-coefficient counts each sample's own. The time limit holds for the curve and each
+    answer.
     """
     from stiction.export import write_result
     from stiction.plot.style import save_figure
+    from stiction.random.random_interface import as_random_interface
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import check_probability, design_stress
-    from stiction.reliability.estimate import check_stress, failure_probability
+    from stiction.reliability.estimate import (
+        check_coefficient,
+        check_stress,
+        failure_probability,
+    )
+    from stiction.reliability.limit_state import mean_pressure
     from stiction.reliability.result import bounded
     from stiction.reliability.tails import tail_study
     from stiction.report import reliability_figures as figures
@@ -109,6 +125,15 @@ def reliability(
         events.append("first_instability")
     # What is asked for last is refused first: the curve may take minutes.
     mistakes = [] if stress is None else check_stress("--stress", stress)
+    if friction_coefficient is not None:
+        mistakes += check_coefficient("--friction-coefficient", friction_coefficient)
+        if stress is not None:
+            mistakes.append("--friction-coefficient: give it or --stress, not both")
+        if not mean_pressure(problem, as_random_interface(random)) > 0.0:
+            mistakes.append(
+                "--friction-coefficient: the study has no normal pressure; give"
+                " problem.load.normal_pressure (Pa) or [random.normal_pressure], or ask by --stress"
+            )
     mistakes += [] if probability is None else check_probability("--probability", probability)
     if mistakes:
         raise InputError(mistakes)
@@ -144,10 +169,17 @@ def reliability(
     lowest = curve.attrs["lower_bound"]
     bound = f"bound {lowest:.7g} Pa; " if bounded(lowest) else ""
     echo(f"{bound}{curve.attrs['evaluations']} evaluations; {method.label}, {curve.attrs['event']}")
-    if stress is not None:
+    if stress is not None or friction_coefficient is not None:
         probabilities = {
             event: failure_probability(
-                problem, random, stress, method=method, seed=seed, event=event, **others
+                problem,
+                random,
+                stress,
+                friction_coefficient=friction_coefficient,
+                method=method,
+                seed=seed,
+                event=event,
+                **others,
             )
             for event in events
         }
@@ -156,7 +188,7 @@ def reliability(
         echo(f"  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
             spot = figures.weak_spot_figure(
-                found.failing_profiles, problem.nucleation_length, stress
+                found.failing_profiles, problem.nucleation_length, found.stress
             )
             save(spot, "weak_spots")
     if probability is not None:

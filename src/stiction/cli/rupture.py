@@ -31,7 +31,9 @@ def rupture(
     out: Annotated[Path, typer.Option(help="Folder for the result and its figures.")] = Path(
         "stiction-rupture"
     ),
-    sample: Annotated[int, typer.Option(help="Number of the sample of the study's strength.")] = 0,
+    sample: Annotated[
+        int, typer.Option(min=0, help="Number of the sample of the study's strength.")
+    ] = 0,
     strength: Annotated[
         Path | None,
         typer.Option(
@@ -76,7 +78,8 @@ def rupture(
     from stiction.plot.films import film as write_film
     from stiction.plot.style import save_figure
     from stiction.report.rupture_figures import front_figure, rupture_figure
-    from stiction.study.study import Study, read_setup
+    from stiction.study.setup import read_setup
+    from stiction.study.study import Study
 
     writable_folder(out)
     profiles: Any

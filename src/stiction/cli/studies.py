@@ -87,8 +87,9 @@ def run(
     """
     from stiction._checks import as_path
     from stiction.ensemble.part import as_part
-    from stiction.stored_run import StoredRun, check_target, make_part_folder, run_into
+    from stiction.stored_run import StoredRun
     from stiction.study.study import Study
+    from stiction.study_run import check_target, make_part_folder, run_into
 
     if sum((workers is not None, scheduler is not None, slurm)) > 1:
         raise InputError("--workers, --scheduler, --slurm: give one of them")

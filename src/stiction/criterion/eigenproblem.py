@@ -77,14 +77,6 @@ class Weight:
         value = (factor @ odd_bessel(safe, m.size)).reshape(z.shape) / safe.reshape(z.shape)
         return np.where(z == 0.0, 0.5 * np.pi * self.sine[0], value)
 
-    @property
-    def second_moment(self) -> float:
-        """Integral of s^2 g over [-1, 1]; its half in units of (h_n/2)^2 corrects a smooth dip."""
-        a1 = self.sine[0]
-        a3 = self.sine[2] if self.sine.size > 2 else 0.0
-        # s^2 sin t = cos^2 t sin t = (sin t + sin 3t)/4
-        return float(np.pi / 8.0 * (a1 + a3))
-
 
 @lru_cache(maxsize=4)
 def eigenvalues_and_vector(terms: int = TERMS) -> tuple[float, Array]:

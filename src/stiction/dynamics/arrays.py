@@ -117,6 +117,8 @@ class Setting(NamedTuple):
         Stress scale against the load, Pa.
     control : (monitor.CONTROLS,) array
         Thresholds.
+    stations : array of int
+        Nodes whose slip, slip rate and stress the record of steps holds.
     """
 
     law: Any
@@ -129,6 +131,7 @@ class Setting(NamedTuple):
     scale_loads: Array
     scales: Array
     control: Array
+    stations: Ints
 
 
 class ExplicitTables(NamedTuple):

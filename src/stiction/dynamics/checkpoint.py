@@ -125,7 +125,8 @@ def read_checkpoint(path: str | Path, run: Run) -> State:
             f"restart: {str(path)!r} has format version {given}, this version reads {FORMAT}"
         )
     here = identity(run)
-    fresh = vars(run.start(0.0))
+    state = run.start(0.0)
+    fresh = vars(state)
     expected = {f"run_{name}" for name in here} | {f"state_{name}" for name in fresh}
     if missing := expected - set(arrays):
         raise InputError(
@@ -148,6 +149,8 @@ def read_checkpoint(path: str | Path, run: Run) -> State:
             )
     if problems:
         raise InputError(problems)
-    values["explicit"] = bool(values["explicit"])
-    values["step"] = float(values["step"])
-    return State(**values)
+    state.explicit, state.step = bool(values["explicit"]), float(values["step"])
+    for name, like in fresh.items():
+        if isinstance(like, np.ndarray):  # the arrays stay where steps want them
+            like[...] = values[name]
+    return state

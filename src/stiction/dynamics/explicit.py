@@ -20,17 +20,16 @@ from stiction.friction.kernels import strength_at
 @jit
 def _transfer(grid: Grid, slip_hat: Array, carried: Array, tables: ExplicitTables) -> None:
     """Stress `tables.moved` along the interface if the rate, in `rate_hat`, acts for a step."""
-    rate_hat, packed, fresh, shared = tables.rate_hat, tables.packed, tables.fresh, tables.shared
+    rate_hat, fresh, shared = tables.rate_hat, tables.fresh, tables.shared
     place, step = grid.place, tables.step
     static, dynamic = grid.stiffness[0], grid.stiffness[1]
-    pack(place, rate_hat, packed)
     shared[0] = 0.0
     for q in range(1, shared.size):
-        o = place[q]
+        o, rate = place[q], rate_hat[q]
         g, b, c = static[q], fresh[q], dynamic[q]
-        slip = slip_hat[q] + step * rate_hat[q]
-        real = c * (carried[o] + b * packed[o]) - g * slip.real
-        imaginary = c * (carried[o + 64] + b * packed[o + 64]) - g * slip.imag
+        slip = slip_hat[q] + step * rate
+        real = c * (carried[o] + b * rate.real) - g * slip.real
+        imaginary = c * (carried[o + 64] + b * rate.imag) - g * slip.imag
         shared[q] = complex(real, imaginary)
     backward(grid.transform, shared, tables.moved)
 
@@ -136,7 +135,8 @@ def explicit_steps(
     grid, setting
     tables : ExplicitTables
         Their room to work is overwritten.
-    record : (>= count, columns) array, or with no rows to keep nothing.
+    record : (>= count, columns) array, or with no rows to keep nothing. Three more columns for
+        each station: slip, slip rate and stress.
     """
     n, impedance, step = fields.slip.size, grid.impedance, tables.step
     watch, control, rate_hat = fields.watch, setting.control, tables.rate_hat
@@ -163,6 +163,7 @@ def explicit_steps(
         top, node, slip_sum = _arrive(fields, setting.nodes.critical, half, tables, time)
         for q in range(rate_hat.size):
             slip_hat[q] += step * rate_hat[q]
+        pack(grid.place, rate_hat, tables.packed)
         advance_memory(
             fields.memory, tables.table, tables.packed, fields.carried, grid.poles.size, grid.copies
         )
@@ -170,7 +171,7 @@ def explicit_steps(
         watch[monitor.EXPLICIT_STEPS] += 1.0
         radiated = impedance * total / n
         done = Taken(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
-        fall = finish_step(watch, setting, record, taken, done)
+        fall = finish_step(fields, setting, record, taken, done)
         if slid >= control[monitor.SLID_STOP]:
             return taken + 1, monitor.ALL_SLID
         if control[monitor.EVENT_STOP] > 0.0 and fall > watch[monitor.EVENT_DROP]:

@@ -9,7 +9,7 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.dynamics import monitor
-from stiction.dynamics.arrays import Setting
+from stiction.dynamics.arrays import Fields, Setting
 from stiction.dynamics.scale import follow_scale
 
 
@@ -34,8 +34,9 @@ def arrived(slip: float, threshold: float, increment: float, time: float, size: 
 
 
 @jit
-def finish_step(watch: Array, setting: Setting, record: Array, row: int, step: Taken) -> Any:
+def finish_step(fields: Fields, setting: Setting, record: Array, row: int, step: Taken) -> Any:
     """Tell the monitor, and the record if there is one; return the fall of the mean stress, Pa."""
+    watch = fields.watch
     mean_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     watch[monitor.TIME], watch[monitor.LOAD] = step.time, step.load
     watch[monitor.TOP_RATE], watch[monitor.SLID] = step.top, step.slid
@@ -51,4 +52,9 @@ def finish_step(watch: Array, setting: Setting, record: Array, row: int, step: T
         record[row, monitor.REC_MEAN_SLIP] = step.mean_slip
         record[row, monitor.REC_TOP_RATE], record[row, monitor.REC_STEP] = step.top, step.size
         record[row, monitor.REC_WORK] = watch[monitor.WORK]
+        for s in range(setting.stations.size):
+            node, column = setting.stations[s], monitor.COLUMNS + 3 * s
+            record[row, column] = fields.slip[node]
+            record[row, column + 1] = fields.rate[node]
+            record[row, column + 2] = fields.stress[node]
     return fall

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import as_names
-from stiction.dynamics import monitor
+from stiction.dynamics import monitor, stations
 from stiction.dynamics.energies import fracture_energy, strain_energy
 from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.stations import Stations
 from stiction.dynamics.summary import per_area
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
@@ -56,9 +57,11 @@ FIELDS, SCALARS, STEPS = tuple(_FIELDS), tuple(_SCALARS), tuple(_STEPS)
 def frame_variables(interface: Interface) -> dict[str, Variable]:
     """What all of them mean."""
     fields = {name: along(interface, variable) for name, variable in _FIELDS.items()}
-    return fields | {
-        name: per_area(interface, variable) for name, variable in (_SCALARS | _STEPS).items()
-    }
+    return (
+        fields
+        | stations.VARIABLES
+        | {name: per_area(interface, variable) for name, variable in (_SCALARS | _STEPS).items()}
+    )
 
 
 def check_variables(names: Sequence[str]) -> None:
@@ -72,8 +75,11 @@ def check_variables(names: Sequence[str]) -> None:
 class Frames:
     """Frames and step records gathered so far, until they are taken away."""
 
-    def __init__(self, run: Run, variables: Sequence[str], *, steps: bool) -> None:
-        self.run, self.variables, self.keep_steps = run, tuple(variables), steps
+    def __init__(
+        self, run: Run, variables: Sequence[str], stations: Stations, *, steps: bool
+    ) -> None:
+        self.run, self.variables, self.stations = run, tuple(variables), stations
+        self.step_names = STEPS if steps else STEPS[:1] if stations.nodes.size else ()
         self._frames: list[dict[str, Any]] = []
         self._records: list[Floats] = []
 
@@ -82,12 +88,18 @@ class Frames:
 
     @property
     def pending(self) -> int:
-        """Frames and recorded steps not yet taken away."""
-        return len(self._frames) + sum(record.shape[0] for record in self._records)
+        """Frames and recorded steps not yet taken away; a step with stations counts for more."""
+        numbers = sum(record.size for record in self._records)
+        return len(self._frames) + numbers // monitor.COLUMNS
+
+    def room(self, steps: int) -> Floats:
+        """An array for the record of so many steps; without rows if none is kept."""
+        rows = steps if self.step_names else 0
+        return np.empty((rows, monitor.COLUMNS + self.stations.columns))
 
     def add_steps(self, record: Floats) -> None:
         """Keep the record of some steps."""
-        if self.keep_steps and record.shape[0]:
+        if record.shape[0]:
             self._records.append(record.copy())
 
     def add(self, state: State) -> None:
@@ -135,8 +147,9 @@ class Frames:
         if not self._frames:
             shape = self.run.medium.interface.shape
             values |= {name: np.empty((0, *shape)) for name in self.variables}
-        if self.keep_steps:
-            record = np.concatenate([np.empty((0, monitor.COLUMNS)), *self._records])
-            values |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
+        if self.step_names:
+            record = np.concatenate([self.room(0), *self._records])
+            values |= {name: record[:, i].copy() for i, name in enumerate(self.step_names)}
+            values |= self.stations.of_record(record)
         self._frames, self._records = [], []
         return values

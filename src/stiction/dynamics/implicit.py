@@ -266,7 +266,7 @@ def implicit_steps(
         done = _accept(fields, grid, setting, tables, attempt, outcome.radiated)
         watch[monitor.IMPLICIT_STEPS] += 1.0
         watch[monitor.PAST_STEP], watch[monitor.RADIATED] = size, outcome.radiated
-        fall = finish_step(watch, setting, record, taken, done)
+        fall = finish_step(fields, setting, record, taken, done)
         taken += 1
         if done.slid >= control[monitor.SLID_STOP]:
             return taken, step, monitor.ALL_SLID

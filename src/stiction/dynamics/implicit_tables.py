@@ -9,7 +9,7 @@ import numpy as np
 from stiction._jit import jit
 from stiction._typing import Array
 from stiction.dynamics.arrays import Grid, ImplicitTables
-from stiction.dynamics.memory_layout import LANES, blocks, pack, rooms
+from stiction.dynamics.memory_layout import LANES, blocks, pack, rooms, zeros
 
 
 @jit
@@ -27,7 +27,7 @@ def make_tables(grid: Grid) -> ImplicitTables:
     """Tables that are for no step yet."""
     count, pairs, slots = blocks(grid.pace.size), grid.poles.size, grid.pace.size
     modes, nodes = grid.slot.size, int(np.prod(grid.transform.shape))
-    table, tilt = (np.zeros(count * pairs * rows * LANES) for rows in (4, 2))
+    table, tilt = (zeros(count * pairs * rows * LANES) for rows in (4, 2))
     return ImplicitTables(
         np.array([-1.0, -1.0]),
         *(table, tilt, *rooms(2, slots, float), *rooms(2, modes, float)),

@@ -299,6 +299,7 @@ def make_run(
         scale_loads=scale[0],
         scales=scale[1],
         control=control,
+        stations=np.empty(0, dtype=np.int64),
     )
     return Run(medium, friction, setting, steepest, least)
 

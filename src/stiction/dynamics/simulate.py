@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from stiction.dynamics.checks import (
     warn_if_unresolved,
 )
 from stiction.dynamics.frames import Frames, check_variables
-from stiction.dynamics.integrator import NOTHING, Run, State
+from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import first_reach, load_history, uniform_rate
 from stiction.dynamics.method import (
     Rupture,
@@ -35,6 +35,7 @@ from stiction.dynamics.method import (
 )
 from stiction.dynamics.options import Stop, check_options
 from stiction.dynamics.runaway import refused_stop, runs_away
+from stiction.dynamics.stations import make_stations
 from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
@@ -134,6 +135,7 @@ def simulate_rupture(
     every_near_onset: int | None = None,
     interval: float | None = None,
     steps: bool = True,
+    stations: Mapping[str, Any] | None = None,
     stop: Stop | None = None,
     end_time: float | None = None,
     arrival: float = 0.5,
@@ -171,6 +173,10 @@ def simulate_rupture(
         s; at most one frame in each interval of this length, counted from zero load.
     steps : bool
         Keep time, load, mean stress, ... of every step, over 'step'.
+    stations : mapping of str to float or (float, float), optional
+        Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
+        (traction) are recorded after every step, whatever `every` and `variables`: 24 bytes a step
+        and station. The node nearest to a place is taken.
     stop : {"sliding", "onset", "rest", "runaway", "time"}, optional
         As `method.stop`, which holds if left out; or "time", only at `end_time`. Unless it waits
         for `end_time`, a run also ends where nothing slips and the load has stopped rising for
@@ -196,7 +202,9 @@ def simulate_rupture(
     -------
     xarray.Dataset
         Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, energies and more; over
-        'step' the same scalars at every step; over 'x' `peak_strength`, `arrival_time` and
+        'step' the same scalars at every step; over ('step', 'station') `station_slip`,
+        `station_slip_rate` and `station_shear_stress`, with `step_time`, and `station_x` (and
+        `station_y`), where the nodes are; over 'x' `peak_strength`, `arrival_time` and
         `front_speed`; and the scalars of `Rupture` for the run so far. The attribute `stopped`
         says why it ended.
 
@@ -220,6 +228,8 @@ def simulate_rupture(
     warn_if_coarse(problem, rows)
     run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
     stop = stop or method.stop
+    places = make_stations(stations, problem.interface)
+    run.setting = run.setting._replace(stations=places.nodes)
     set_stop(run.control, stop)
     passed = min(problem.friction.slip_at(1.0 - arrival), problem.friction.reach)
     run.control[monitor.ARRIVAL] = passed / problem.friction.reach
@@ -245,11 +255,12 @@ def simulate_rupture(
         stream = Stream(store, resume=restart is not None)
         if restart is not None:
             stream.drop_after(state.steps)
-    frames = Frames(run, variables, steps=steps)
+    frames = Frames(run, variables, places, steps=steps)
 
     def flush() -> None:
         if stream is not None and frames.pending:
-            stream.append(chunk_dataset(frames.take(), problem.interface, attributes), state.steps)
+            part = chunk_dataset(frames.take(), problem.interface, places, attributes)
+            stream.append(part, state.steps)
 
     if restart is None:
         frames.add(state)
@@ -257,7 +268,7 @@ def simulate_rupture(
     next_checkpoint = state.steps + checkpoint_every
     reason = "max_steps"
     reversed_ = False
-    record = np.empty((max(every, every_implicit, every_near_onset or 1), monitor.COLUMNS))
+    record = frames.room(max(every, every_implicit, every_near_onset or 1))
     meter = Meter("rupture", show=progress is True, unit="steps").start()
     try:
         while state.steps < method.max_steps:
@@ -267,7 +278,7 @@ def simulate_rupture(
             if every_near_onset is not None and state.explicit and falling < near:
                 count = every_near_onset
             count = min(count, method.max_steps - state.steps)
-            part = record[:count] if steps else NOTHING
+            part = record[:count]
             taken, code = run.advance(state, count, part)
             frames.add_steps(part[:taken])
             if code == monitor.NOT_FINITE:
@@ -308,7 +319,7 @@ def simulate_rupture(
         dataset.attrs["stopped"] = reason
         dataset.attrs["store"] = str(stream.folder)
     else:
-        dataset = chunk_dataset(frames.take(), problem.interface, attributes)
+        dataset = chunk_dataset(frames.take(), problem.interface, places, attributes)
     result = _complete(dataset, problem, method, run, state)
     return result if measured is None else with_gaps(problem, result, measured)
 

@@ -12,7 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._checks import as_names, as_path, check_flag
-from stiction.dynamics.frames import FIELDS, STEPS, TIME, frame_variables
+from stiction.dynamics.frames import FIELDS, TIME, frame_variables
+from stiction.dynamics.stations import Stations
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.results import coordinate, to_dataset
@@ -22,12 +23,15 @@ _MANIFEST = "rupture.json"
 
 
 def chunk_dataset(
-    values: Mapping[str, NDArray[Any]], interface: Interface, attributes: Mapping[str, Any]
+    values: Mapping[str, NDArray[Any]],
+    interface: Interface,
+    stations: Stations,
+    attributes: Mapping[str, Any],
 ) -> xr.Dataset:
     """Frames as a labelled dataset."""
     data = {name: value for name, value in values.items() if name != "time"}
     places = {dim: coordinate(interface, dim) for dim in interface.dims}
-    coordinates = {"time": (values["time"], TIME), **places}
+    coordinates = {"time": (values["time"], TIME), **places, **stations.coordinates(interface)}
     return to_dataset(data, frame_variables(interface), coordinates, attributes)
 
 
@@ -128,7 +132,7 @@ def open_rupture(
     variables : sequence of str, optional
         Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were stored if left out.
     steps : bool
-        Load the record of every step too.
+        Load the record of every step too, and that of stations.
 
     Returns
     -------
@@ -146,7 +150,7 @@ def open_rupture(
     parts = []
     for name in _read_manifest(root)["chunks"]:
         with xr.open_dataset(root / name, engine="netcdf4") as data:
-            unwanted = [] if steps else [v for v in STEPS if v in data]
+            unwanted = [] if steps else [v for v in data if "step" in data[v].dims]
             if variables is not None:
                 unwanted += [v for v in FIELDS if v in data and v not in variables]
             parts.append(data.drop_vars(unwanted).load())
@@ -161,7 +165,7 @@ def open_rupture(
         join="override",
     )
     if steps and any("step" in p.sizes for p in parts):
-        names = [v for v in STEPS if v in parts[0]]
+        names = [v for v in parts[0] if "step" in parts[0][v].dims]
         framed = framed.merge(
             xr.concat(
                 [p[names].drop_vars(("time", "x", "y"), errors="ignore") for p in parts],

@@ -16,12 +16,10 @@ from stiction.elasticity.exponential_sum import ExponentialSum, fit_exponentials
 logger = logging.getLogger("stiction")
 
 _FORMAT = 2  # raise when the fit or the file layout changes, so that old files are left alone
-_memory: dict[tuple[str, float, float, float], ExponentialSum] = {}
-_lock = threading.Lock()
-_said = False
+_Key = tuple[str, float, float, float]
 
 
-def _path(key: tuple[str, float, float, float]) -> Path:
+def _path(key: _Key) -> Path:
     mode, eta, tolerance, t_max = key
     text = f"{_FORMAT} {mode} {eta.hex()} {tolerance.hex()} {t_max.hex()}"
     return cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
@@ -38,32 +36,41 @@ def _read(path: Path) -> ExponentialSum | None:
         return None  # not there, or damaged: it is built and written again
 
 
-def _write(path: Path, kernel: ExponentialSum) -> None:
-    global _said
-    try:
-        write_atomically(path, vars(kernel))
-    except OSError as error:
-        if not _said:
-            _said = True
-            logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)
+class KernelCache:
+    """Kernels of one process: in memory, beneath that on disk."""
 
+    def __init__(self) -> None:
+        self._memory: dict[_Key, ExponentialSum] = {}
+        self._lock = threading.Lock()
+        self._said = False
 
-def kernel_sum(
-    mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
-) -> ExponentialSum:
-    """The validated sum of exponentials, from memory, from disk, or built now (about 1 s).
+    def kernel_sum(
+        self, mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
+    ) -> ExponentialSum:
+        """The validated sum of exponentials, from memory, from disk, or built now (about 1 s).
 
-    Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel at
-    once both succeed: each writes aside and renames.
-    """
-    key = (mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max))
-    with _lock:
-        kernel = _memory.get(key)
-        if kernel is None:
-            path = _path(key)
-            kernel = _read(path)
+        Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel at
+        once both succeed: each writes aside and renames.
+        """
+        key = (mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max))
+        with self._lock:
+            kernel = self._memory.get(key)
             if kernel is None:
-                kernel = fit_exponentials(*key)
-                _write(path, kernel)
-            _memory[key] = kernel
-        return kernel
+                path = _path(key)
+                kernel = _read(path)
+                if kernel is None:
+                    kernel = fit_exponentials(*key)
+                    self._write(path, kernel)
+                self._memory[key] = kernel
+            return kernel
+
+    def _write(self, path: Path, kernel: ExponentialSum) -> None:
+        try:
+            write_atomically(path, vars(kernel))
+        except OSError as error:
+            if not self._said:
+                self._said = True
+                logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)
+
+
+kernel_sum = KernelCache().kernel_sum

@@ -38,8 +38,9 @@ from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.random.coefficients import in_stress, mean_in_stress
 from stiction.random.overlap import check_residual
-from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.resolution import warn_if_inaccurate
 from stiction.sample import PROFILES
 
 KEEP_LIMIT = 2.0**30

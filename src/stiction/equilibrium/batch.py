@@ -7,7 +7,7 @@ import numpy as np
 from stiction._jit import ZERO, jit
 from stiction._typing import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
-from stiction.equilibrium.instability_jump import UNDECIDED, escape_run
+from stiction.equilibrium.instability_jump import UNDECIDED, griffith_length
 from stiction.equilibrium.linear_program import solve_program
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.pieces import AT_CORNER, Pieces
@@ -84,7 +84,7 @@ def start_from_bound(
 @jit
 def solve_batch(
     excess: Array,
-    floor: Array,
+    residual: Array,
     profile: Array,
     rate: Array,
     pieces: Pieces,
@@ -109,7 +109,7 @@ def solve_batch(
 
     Parameters
     ----------
-    excess, floor, rate : (samples, n) arrays
+    excess, residual, rate : (samples, n) arrays
         tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
     profile : (n,) array
     pieces : Pieces
@@ -141,7 +141,7 @@ def solve_batch(
     product = np.empty(n)
     work = np.empty((6, n))
     for row in range(samples):
-        sample = make_sample(excess[row], floor[row], profile, rate[row], pieces)
+        sample = make_sample(excess[row], residual[row], profile, rate[row], pieces)
         windows = usual
         for i in range(n):
             workspace.diagonal[i] = grid.column[0] - sample.rate[i]
@@ -171,7 +171,7 @@ def solve_batch(
             if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
                 line[OUTCOME] = CORNER_REACHED
         if line[OUTCOME] == UNDECIDED:
-            escape = caution * escape_run(sample, load, spacing, modulus)
+            griffith = caution * griffith_length(sample, load, spacing, modulus)
             tried = slip.copy()
             line[OUTCOME] = runs_away(
                 sample,
@@ -181,7 +181,7 @@ def solve_batch(
                 stiff,
                 multiplier,
                 product,
-                escape,
+                griffith,
                 block,
                 reach,
                 work,

@@ -65,7 +65,7 @@ class State:
 
 
 def residual_nodes(sample: Sample, slip: Array) -> Array:
-    """Which nodes have reached their floor, (n,) bool; those of constant strength are none."""
+    """Which weakening nodes have reached their residual strength, (n,) bool."""
     reached: Array = (slip >= AT_CORNER * sample.critical) & (sample.critical > 0.0)
     return reached
 
@@ -78,7 +78,7 @@ def present_pieces(sample: Sample, slip: Array) -> tuple[NDArray[np.int64], Arra
     share = pieces.starts[piece]
     return (
         piece,
-        share * sample.excess + (1.0 - share) * sample.floor,
+        share * sample.excess + (1.0 - share) * sample.residual,
         pieces.slopes[piece] * sample.rate,
     )
 
@@ -104,23 +104,23 @@ def fall(setting: Setting, sample: Sample, state: State) -> None:
     before, stiff_before = state.slip.copy(), state.stiff.copy()
     if state.first is None:
         state.first = State(state.load, before, stiff_before, state.direction.copy())
-    escape = setting.escape(sample, state.load)
+    griffith = setting.griffith_length(sample, state.load)
     if state.ahead is None:
         outcome = runs_away(
             sample, setting.wide_column, state.load, state.slip, state.stiff, state.direction,
-            setting.stiffness(state.direction), escape, setting.block, setting.reach,
+            setting.stiffness(state.direction), griffith, setting.block, setting.reach,
             np.empty((6, n)),
         )  # fmt: skip
     else:
         state.slip, state.ahead, outcome = state.ahead, None, UNDECIDED
-    escape *= MARGIN
+    griffith *= MARGIN
     if outcome == UNDECIDED and runs_away_frozen(
-        setting.grid, sample, state.load, state.slip, state.direction, escape, JUMP_STEPS
+        setting.grid, sample, state.load, state.slip, state.direction, griffith, JUMP_STEPS
     ):
         outcome = SLIDING
     if outcome == UNDECIDED:
         outcome = jump(
-            sample, setting.grid, state.load, state.slip, state.stiff, escape, JUMP_STEPS,
+            sample, setting.grid, state.load, state.slip, state.stiff, griffith, JUMP_STEPS,
             make_workspace(n),
         )  # fmt: skip
     if outcome == ARRESTED and not np.any(

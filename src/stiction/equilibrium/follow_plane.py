@@ -16,7 +16,7 @@ from stiction.elasticity.conjugate_gradients import inner
 from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
 from stiction.elasticity.transform_operator import Operator, make_operator
 from stiction.equilibrium.least_equilibrium import (
-    AT_FLOOR,
+    AT_RESIDUAL,
     BALANCED,
     UNDECIDED,
     PlaneSample,
@@ -84,14 +84,14 @@ def programme(plane: Plane, sample: PlaneSample, slip: Array, gap: float) -> Pla
     residual = at_residual(sample, slip)
     found = plane_onset(
         plane,
-        np.where(residual, sample.floor, sample.excess),
+        np.where(residual, sample.residual, sample.excess),
         sample.profile,
         np.where(residual, 0.0, sample.rate),
         gap,
         slip if slip.any() else None,
     )
     weak = ~residual
-    if (found.slip[weak] > (2.0 - AT_FLOOR) * sample.critical[weak]).any():
+    if (found.slip[weak] > (2.0 - AT_RESIDUAL) * sample.critical[weak]).any():
         return None
     return found
 

@@ -39,7 +39,7 @@ PATIENCE = 16
 def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
-    start = start_of(sample.pieces, sample.excess[i], sample.floor[i], piece)
+    start = start_of(sample.pieces, sample.excess[i], sample.residual[i], piece)
     return start - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
 
 
@@ -61,17 +61,18 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
 
 
 @jit
-def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> float:
-    """Nodes of residual strength in a row that no fracture energy of the interface can stop.
+def griffith_length(sample: Sample, load: float, spacing: float, modulus: float) -> float:
+    """Griffith's critical crack length, in nodes: nothing on the interface stops a longer one.
 
-    A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith);
-    the largest fracture energy is max (tau_p - tau_r) d_c times the area under the law.
+    A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith,
+    1921), and grows where that is more than the fracture energy; the largest of the interface is
+    max (tau_p - tau_r) d_c times the area under the law.
     """
     drop = np.inf
     energy = 0.0
     for i in range(sample.excess.shape[0]):
-        drop = min(drop, load * sample.profile[i] - sample.floor[i])
-        fall = sample.excess[i] - sample.floor[i]
+        drop = min(drop, load * sample.profile[i] - sample.residual[i])
+        fall = sample.excess[i] - sample.residual[i]
         energy = max(energy, sample.pieces.area * fall * sample.critical[i])
     if drop <= 0.0:
         return np.inf
@@ -79,7 +80,7 @@ def escape_run(sample: Sample, load: float, spacing: float, modulus: float) -> f
 
 
 @jit
-def floor_runs(sample: Sample, slip: Array) -> tuple[int, int]:
+def residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     """Longest run of residual nodes on the circle, and how many corners are passed in all."""
     n = slip.shape[0]
     longest = 0
@@ -239,7 +240,7 @@ def jump(
     load: float,
     slip: Array,
     stiff: Array,
-    escape: float,
+    griffith: float,
     steps: int,
     workspace: Workspace,
 ) -> int:
@@ -253,8 +254,9 @@ def jump(
     slip, stiff : (n,) arrays, changed
         d of the state that became unstable, moved along the unstable direction as far as
         `step_to_corner` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
-    escape : float
-        Residual nodes in a row that count as global sliding.
+    griffith : float
+        Griffith's critical crack length, in nodes: so many residual nodes in a row count as global
+        sliding.
     steps : int
         Elastic steps to try at most; UNDECIDED if they are not enough.
     workspace : Workspace
@@ -297,8 +299,8 @@ def jump(
             return UNDECIDED
         if size == ALL or unsupported(sample, load, slip):
             return SLIDING
-        run, corners = floor_runs(sample, slip)
-        if run >= escape:
+        run, corners = residual_runs(sample, slip)
+        if run >= griffith:
             return SLIDING
         waited += 1
         # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.

@@ -29,7 +29,7 @@ BALANCED = 0
 SLIDING = 1
 UNDECIDED = 2
 
-AT_FLOOR = 1.0 - 1e-9
+AT_RESIDUAL = 1.0 - 1e-9
 """Share of d_c from which on a node counts as at its residual strength."""
 RELEVANT = 1e-5
 """Share of the largest value below which a node is not part of an unstable direction."""
@@ -47,7 +47,7 @@ class PlaneSample(NamedTuple):
     """One sample: s, r (strengths less initial stress, Pa), p, W (Pa/m), d_c (m); (nx, ny) each."""
 
     excess: Array
-    floor: Array
+    residual: Array
     profile: Array
     rate: Array
     critical: Array
@@ -60,17 +60,17 @@ def contiguous(sample: PlaneSample) -> PlaneSample:
 
 def at_residual(sample: PlaneSample, slip: Array) -> Array:
     """Which nodes are at their residual strength, (nx, ny) bool; those of constant strength are."""
-    reached: Array = slip >= AT_FLOOR * sample.critical
+    reached: Array = slip >= AT_RESIDUAL * sample.critical
     return reached
 
 
 def strength_at(sample: PlaneSample, slip: Array) -> Array:
     """Strength less initial stress at a slip, Pa."""
-    weakened: Array = np.maximum(sample.excess - sample.rate * slip, sample.floor)
+    weakened: Array = np.maximum(sample.excess - sample.rate * slip, sample.residual)
     return weakened
 
 
-def step_to_floor(sample: PlaneSample, slip: Array, direction: Array) -> float:
+def step_to_residual(sample: PlaneSample, slip: Array, direction: Array) -> float:
     """Length along a direction at which the first weakening node reaches its residual strength."""
     weak = ~at_residual(sample, slip) & (direction > 0.0)
     if not weak.any():
@@ -105,7 +105,7 @@ def weakening_step(
     """
     residual = at_residual(sample, slip)
     operator = operator._replace(rate=np.where(residual, 0.0, sample.rate))
-    drive = load * sample.profile - np.where(residual, sample.floor, sample.excess)
+    drive = load * sample.profile - np.where(residual, sample.residual, sample.excess)
     rest, new = np.empty_like(slip), slip.copy()
     workspace = np.empty((3, *slip.shape))
     none = np.zeros_like(slip)
@@ -123,7 +123,7 @@ def weakening_step(
         used += taken
         direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
         longest = np.inf
-    step = min(step_to_floor(sample, slip, direction), longest)
+    step = min(step_to_residual(sample, slip, direction), longest)
     return (slip + step * direction if np.isfinite(step) else slip), used
 
 
@@ -181,7 +181,7 @@ def least_equilibrium(
         residual = at_residual(sample, slip)
         if not patient:
             status, new, taken = _advance(
-                operator, sample, load, np.where(residual, sample.floor, sample.excess),
+                operator, sample, load, np.where(residual, sample.residual, sample.excess),
                 np.where(residual, 0.0, sample.rate), slip, tolerance,
             )  # fmt: skip
             used += taken
@@ -192,7 +192,7 @@ def least_equilibrium(
                 return Relaxed(UNDECIDED, slip, jumped, used)
             if status == SOLVED:
                 new = np.maximum(new, slip)
-                if step_to_floor(sample, slip, new - slip) >= 1.0:
+                if step_to_residual(sample, slip, new - slip) >= 1.0:
                     return Relaxed(BALANCED, new, jumped, used)
             slip, taken = weakening_step(operator, sample, load, slip, tolerance)
             used += taken

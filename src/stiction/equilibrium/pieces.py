@@ -90,7 +90,7 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 
 @jit
-def start_of(pieces: Pieces, excess: float, floor: float, piece: int) -> float:
+def start_of(pieces: Pieces, excess: float, residual: float, piece: int) -> float:
     """What a piece has at zero slip, Pa: tau_p on the first, tau_r on the last, to the bit."""
     share = pieces.starts[piece]
-    return share * excess + (1.0 - share) * floor
+    return share * excess + (1.0 - share) * residual

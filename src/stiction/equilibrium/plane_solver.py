@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stiction._typing import Array
 from stiction.equilibrium import discretization
 from stiction.equilibrium.follow_plane import PlanePath, first_instability, follow_plane
-from stiction.equilibrium.least_equilibrium import AT_FLOOR, SLIDING, PlaneSample
+from stiction.equilibrium.least_equilibrium import AT_RESIDUAL, SLIDING, PlaneSample
 from stiction.equilibrium.plane_onset import Plane
 from stiction.equilibrium.plane_patches import critical_patch, labelled_patches
 from stiction.errors import warn_accuracy
@@ -37,14 +37,14 @@ def plane_of(problem: Problem, wavenumbers: Literal["spectral", "lattice"] = "sp
 def sample_of(rows: Sample, row: int) -> PlaneSample:
     """One sample as the kernels take it."""
     one = rows.one(row)
-    excess, floor = one.strength - one.initial_stress, one.residual_strength - one.initial_stress
+    excess, residual = one.strength - one.initial_stress, one.residual_strength - one.initial_stress
     critical = (one.strength - one.residual_strength) / one.weakening_rate
-    return PlaneSample(excess, floor, one.load_profile, one.weakening_rate, critical)
+    return PlaneSample(excess, residual, one.load_profile, one.weakening_rate, critical)
 
 
 def residual_nodes(sample: PlaneSample, slip: Array) -> NDArray[np.bool_]:
     """Nodes that have reached their residual strength; those of constant strength are none."""
-    reached: NDArray[np.bool_] = (slip >= AT_FLOOR * sample.critical) & (sample.critical > 0.0)
+    reached: NDArray[np.bool_] = (slip >= AT_RESIDUAL * sample.critical) & (sample.critical > 0.0)
     return reached
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from stiction._typing import Array
 from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
 from stiction.equilibrium.batch import certificate, start_from_bound
-from stiction.equilibrium.instability_jump import escape_run
+from stiction.equilibrium.instability_jump import griffith_length
 from stiction.equilibrium.linear_program import OVERFULL, SOLVED, solve_program
 from stiction.equilibrium.linear_program_cg import LargeProgram, Solution
 from stiction.equilibrium.pieces import pieces_of, refused
@@ -94,9 +94,9 @@ class Setting:
             f" every {share}th node or fewer, interface.nodes <= {self.nodes // (2 * share) * 2}"
         )
 
-    def escape(self, sample: Sample, load: float) -> float:
-        """Residual nodes in a row that count as unstoppable."""
-        return self.caution * float(escape_run(sample, load, self.spacing, self.modulus))
+    def griffith_length(self, sample: Sample, load: float) -> float:
+        """Griffith's critical length at a load, in nodes, taken with caution."""
+        return self.caution * float(griffith_length(sample, load, self.spacing, self.modulus))
 
     def stiffness(self, field: Array) -> Array:
         """K times a field, (n,) array."""
@@ -140,7 +140,7 @@ class Setting:
         Parameters
         ----------
         excess, rate : (n,) arrays
-            Strength less initial stress (Pa), weakening rate (Pa/m), 0 where the floor is reached.
+            Strength less initial stress (Pa), weakening rate (Pa/m), 0 where it is residual.
         cap : float
             Load (Pa) not to go beyond.
         """

@@ -72,7 +72,7 @@ def runs_away(
     stiff: Array,
     direction: Array,
     stiff_direction: Array,
-    escape: float,
+    griffith: float,
     factor: Array,
     width: int,
     work: Array,
@@ -92,8 +92,8 @@ def runs_away(
         K d of that state.
     direction, stiff_direction : (n,) arrays
         In which it is unstable, and K times it.
-    escape : float
-        Residual nodes in a row that nothing can stop.
+    griffith : float
+        Griffith's critical crack length, in nodes: so many residual ones in a row nothing stops.
     factor, width : array and int
         From `block_factor`.
     work : (6, n) array
@@ -108,7 +108,7 @@ def runs_away(
     if not np.isfinite(step):
         return SLIDING
     first, length, _ = main_patch(direction)
-    if (np.isfinite(escape) and escape > width) or length > width:
+    if (np.isfinite(griffith) and griffith > width) or length > width:
         return UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     origin = (first - (n - length) // 2) % n
@@ -160,7 +160,7 @@ def runs_away(
             fastest = max(fastest, solution[t])
             run = run + 1 if slip[i] >= AT_CORNER * sample.critical[i] else 0
             longest = max(longest, run)
-        if longest >= escape or unsupported(sample, load, slip):
+        if longest >= griffith or unsupported(sample, load, slip):
             return SLIDING
         if fastest < SHARE * largest:
             return UNDECIDED

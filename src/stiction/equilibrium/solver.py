@@ -40,9 +40,9 @@ def sample_of(rows: Samples, row: int, pieces: Pieces = LINEAR) -> Sample:
     """One row as the kernels take it."""
     initial = rows.initial_stress[row]
     excess = np.ascontiguousarray(rows.strength[row] - initial)
-    floor = np.ascontiguousarray(rows.residual_strength[row] - initial)
+    residual = np.ascontiguousarray(rows.residual_strength[row] - initial)
     rate = np.array(rows.weakening_rate[row])
-    return make_sample(excess, floor, np.array(rows.load_profile), rate, pieces)
+    return make_sample(excess, residual, np.array(rows.load_profile), rate, pieces)
 
 
 class Solver:
@@ -227,7 +227,7 @@ class Solver:
         line[batch.OUTCOME] = runs_away(
             sample, setting.wide_column, solution.load, ahead, solution.stiff,
             solution.multiplier, stiff_multiplier,
-            setting.escape(sample, solution.load), setting.block, setting.reach,
+            setting.griffith_length(sample, solution.load), setting.block, setting.reach,
             np.empty((6, setting.nodes)),
         )  # fmt: skip
         if line[batch.OUTCOME] == SLIDING:
@@ -252,7 +252,7 @@ class Solver:
         _, length, centre = main_patch(multiplier)
         line[batch.POSITION] = centre * self.setting.spacing
         line[batch.LENGTH] = length * self.setting.spacing
-        # Of a piece that starts from share tau_p + (1 - share) tau_r; the floor's share is 0.
+        # Of a piece that starts from share tau_p + (1 - share) tau_r; the share of the last is 0.
         moving = sample.critical > 0.0
         multiplier[moving] *= sample.pieces.starts[piece[moving]]
 

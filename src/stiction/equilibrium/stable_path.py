@@ -43,7 +43,7 @@ def build(
     for i in range(slip.shape[0]):
         workspace.inside[i] = slip[i] > 0.0
         piece[i] = piece_at(pieces, sample.critical[i], slip[i])
-        strength[i] = start_of(pieces, sample.excess[i], sample.floor[i], piece[i])
+        strength[i] = start_of(pieces, sample.excess[i], sample.residual[i], piece[i])
         workspace.diagonal[i] = grid.column[0] - pieces.slopes[piece[i]] * sample.rate[i]
         if workspace.inside[i]:
             workspace.order[count] = i
@@ -98,7 +98,7 @@ def advance(
         return load, CROWDED
     size = append(workspace.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
     if size < count:
-        # Stability was lost exactly as the floor was reached.
+        # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
         return load, UNSTABLE
     extend_forward(workspace.factor, ZERO, size, members, sample.profile, workspace.forward[0])
@@ -141,7 +141,7 @@ def advance(
             slip[i] = pieces.ends[piece[i]] * sample.critical[i]
             before = pieces.slopes[piece[i]] * sample.rate[i]
             piece[i] += 1
-            strength[i] = start_of(pieces, sample.excess[i], sample.floor[i], piece[i])
+            strength[i] = start_of(pieces, sample.excess[i], sample.residual[i], piece[i])
             after = pieces.slopes[piece[i]] * sample.rate[i]
             diagonal[i] = own - after
             if after <= before:

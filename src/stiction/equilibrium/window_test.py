@@ -44,7 +44,7 @@ def runs_away_frozen(
     load: float,
     slip: Array,
     direction: Array,
-    escape: float,
+    griffith: float,
     steps: int,
 ) -> bool:
     """Whether the unstable patch slides even if nothing outside its window moves.
@@ -58,7 +58,7 @@ def runs_away_frozen(
         tau_0, Pa.
     slip : (n,) array, changed
         A lower bound of the next equilibrium, beyond the state that is unstable in `direction`.
-    escape, steps : float, int
+    griffith, steps : float, int
         As for `jump`.
 
     Returns
@@ -79,13 +79,13 @@ def runs_away_frozen(
     beyond = OUT_OF_REACH * float(np.abs(sample.excess).max())
     part = Sample(
         padded(sample.excess[nodes] + outside, beyond),
-        padded(sample.floor[nodes] + outside, beyond),
+        padded(sample.residual[nodes] + outside, beyond),
         padded(sample.profile[nodes], 1e-9 * float(sample.profile.mean())),
         padded(sample.rate[nodes], 1.0),
         padded(sample.critical[nodes], np.inf),
         sample.pieces,
     )
-    outcome = jump(part, small, load, local, stiff, escape, steps, make_workspace(2 * WINDOW))
+    outcome = jump(part, small, load, local, stiff, griffith, steps, make_workspace(2 * WINDOW))
     slip[nodes] = np.maximum(slip[nodes], local[:WINDOW])
     return bool(outcome == SLIDING)
 

@@ -20,14 +20,14 @@ the round-off of K d; an instability of such nodes would be one of nothing, and 
 class Sample(NamedTuple):
     """One strength profile; all arrays of shape (n,).
 
-    `excess` is tau_p - tau_i and `floor` tau_r - tau_i (Pa): stress is counted from the initial
-    one. `profile` is the load profile, `rate` the weakening rate W at zero slip (Pa/m), and
-    `critical` the slip d_c (m) at which the floor is reached. Nodes of constant strength have both
-    0. `pieces` are those of the friction law.
+    Stress is counted from the initial one: `excess` is the strength excess tau_p - tau_i and
+    `residual` is tau_r - tau_i (Pa). `profile` is the load profile, `rate` the weakening rate W at
+    zero slip (Pa/m), and `critical` the slip d_c (m) at which the strength is residual. Nodes of
+    constant strength have both 0. `pieces` are those of the friction law.
     """
 
     excess: Array
-    floor: Array
+    residual: Array
     profile: Array
     rate: Array
     critical: Array
@@ -35,23 +35,25 @@ class Sample(NamedTuple):
 
 
 @jit
-def make_sample(excess: Array, floor: Array, profile: Array, rate: Array, pieces: Pieces) -> Sample:
-    """A sample in which nodes that are at their floor, but for round-off, do not weaken."""
+def make_sample(
+    excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
+) -> Sample:
+    """A sample in which nodes whose strength is residual, but for round-off, do not weaken."""
     n = excess.shape[0]
     scale = 0.0
     for i in range(n):
-        scale += max(abs(excess[i]), abs(floor[i]))
+        scale += max(abs(excess[i]), abs(residual[i]))
     critical = np.empty(n)
     moving = rate.copy()
-    bottom = floor.copy()
+    residual = residual.copy()
     for i in range(n):
-        if excess[i] - floor[i] <= FLAT * scale / n:
-            bottom[i] = excess[i]
+        if excess[i] - residual[i] <= FLAT * scale / n:
+            residual[i] = excess[i]
             moving[i] = 0.0
             critical[i] = 0.0
         else:
-            critical[i] = pieces.first * (excess[i] - floor[i]) / rate[i]
-    return Sample(excess, bottom, profile, moving, critical, pieces)
+            critical[i] = pieces.first * (excess[i] - residual[i]) / rate[i]
+    return Sample(excess, residual, profile, moving, critical, pieces)
 
 
 class Grid(NamedTuple):

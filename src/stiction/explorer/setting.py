@@ -27,7 +27,8 @@ from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
 from stiction.random.spectra import PowerLawSpectrum
 from stiction.solid import Solid
-from stiction.study.study import Ensemble, Study
+from stiction.study.ensemble import Ensemble
+from stiction.study.study import Study
 
 SAMPLES = 1000
 SHOWN_NODES = 20

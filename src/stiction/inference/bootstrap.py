@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._progress import Meter
 from stiction.errors import InputError
@@ -93,26 +92,51 @@ def repeat(
     return [result for result in results if result is not None]
 
 
-def interval_of(
-    name: str,
-    estimated: Mapping[str, float],
-    repeated: Sequence[Mapping[str, float]],
-    confidence: float,
-) -> tuple[float, float]:
-    """The studentised bootstrap interval of a parameter, on its own scale.
+def intervals(
+    found: Estimate, setting: Setting, repeated: Sequence[Repetition], confidence: float
+) -> dict[str, tuple[float, float]]:
+    """Studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
     The error of any parameter is as wide as the root of the correlation length, of which a record
     holds few, and that of a place, such as the mean, also as the field's standard deviation; a
-    repetition finds both anew (Davison and Hinkley, 1997, section 5.2). Of R repetitions the
-    quantile p is the p (R + 1)th: interpolated to the ends, as by default, it lies further inside.
+    repetition finds both anew.
+
+    Of the noise it is the variance that has an interval, with its own standard error, and as if it
+    could be negative: estimates that end at zero would all have the same error, and an interval
+    from them would hold nothing but zero. What is below zero is cut off last.
     """
-    at = _scaled(name, np.array(estimated[name]))
-    around = _scaled(name, np.array([one[name] for one in repeated]))
-    widths = np.array([_width(name, one) for one in repeated])
+    estimated = parameters_of(found, setting)
+    result = {}
+    for name, value in estimated.items():
+        if name == "noise" and found.noise is not None:
+            at, width = found.noise
+            pairs = [one.estimate.noise or (0.0, 1.0) for one in repeated]
+            errors = [(again - found.model.noise**2) / error for again, error in pairs]
+            ends = _ends(at, width, errors, confidence)
+            low, high = (math.sqrt(max(end, 0.0)) for end in ends)
+        else:
+            at = _scaled(name, value)
+            errors = [
+                (_scaled(name, one.parameters[name]) - at) / _width(name, one.parameters)
+                for one in repeated
+            ]
+            ends = _ends(at, _width(name, estimated), errors, confidence)
+            low, high = (_unscaled(name, end) for end in ends)
+        result[name] = (low, high)
+    return result
+
+
+def _ends(
+    at: float, width: float, errors: Sequence[float], confidence: float
+) -> tuple[float, float]:
+    """An estimate less the quantiles of its error, which is in units of its width.
+
+    Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default, it
+    lies further inside.
+    """
     tail = 0.5 * (1.0 - confidence)
-    low, high = np.quantile((around - at) / widths, [tail, 1.0 - tail], method="weibull")
-    first, last = _unscaled(name, at - _width(name, estimated) * np.array([high, low]))
-    return float(first), float(last)
+    low, high = np.quantile(errors, [tail, 1.0 - tail], method="weibull")
+    return float(at - width * high), float(at - width * low)
 
 
 def _width(name: str, values: Mapping[str, float]) -> float:
@@ -121,17 +145,15 @@ def _width(name: str, values: Mapping[str, float]) -> float:
     return root * values["standard_deviation"] if name in PLACES else root
 
 
-def _scaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _scaled(name: str, value: float) -> float:
     if name in PLACES:
-        return values
+        return value
     shift = 0.5 if name.endswith("exponent") else 0.0
-    found: NDArray[np.float64] = np.log(np.maximum(values - shift, 1e-300))
-    return found
+    return math.log(max(value - shift, 1e-300))
 
 
-def _unscaled(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unscaled(name: str, value: float) -> float:
     if name in PLACES:
-        return values
+        return value
     shift = 0.5 if name.endswith("exponent") else 0.0
-    found: NDArray[np.float64] = shift + np.exp(values)
-    return found
+    return shift + math.exp(value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,12 @@ from stiction._typing import Array
 from stiction.inference.marginal_fit import Family, distance
 from stiction.inference.records import Record
 from stiction.inference.spectral_model import Grid
-from stiction.inference.spectrum_fit import SpectrumFamily, coarse, fit_spectrum
+from stiction.inference.spectrum_fit import (
+    SpectrumFamily,
+    coarse,
+    fit_spectrum,
+    noise_variance,
+)
 from stiction.inference.whittle import Model, Observed, hermite_shares, make_observed
 from stiction.inference.window import Window, make_window, without_trend
 from stiction.random.quantile_table import from_normal
@@ -66,12 +71,16 @@ class Estimate:
     roughness : float
         How far the periodogram, averaged over bands, lies from its expectation: mean square of
         the logarithm of the ratio.
+    noise : (float, float), optional
+        Variance of the noise, negative where even less than none would suit better, and its
+        standard error; None if it is known.
     """
 
     marginal: Any
     model: Model
     distance: float
     roughness: float
+    noise: tuple[float, float] | None = None
 
     @property
     def field(self) -> RandomField:
@@ -113,6 +122,7 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None
     observed = observe(rows, setting.windows)
     vector = start
     noise = 0.0 if start is None else family.model(start, np.ones(2)).noise
+    signed = None
     for turn in range(2):
         marginal = setting.marginal.fit(values, noise)
         shares = hermite_shares(marginal)
@@ -120,6 +130,11 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None
             vector = coarse(family, shares, observed)
         vector = fit_spectrum(family, shares, observed, vector)
         model = family.model(vector, shares)
+        if family.noise is None:
+            signed = noise_variance(family, vector, shares, observed)
+        if model.noise_share < 0.0:  # the best there can be is none
+            quiet = replace(family, noise=0.0)
+            model = quiet.model(fit_spectrum(quiet, shares, observed, vector[:-1]), shares)
         if turn == 0 and abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
             break
         noise = model.noise
@@ -128,6 +143,7 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None
         model=model,
         distance=distance(marginal, setting.marginal.quiet(values, model.noise)),
         roughness=_roughness(model, observed),
+        noise=signed,
     )
 
 
@@ -172,7 +188,7 @@ def simulate(found: Estimate, setting: Setting, rng: np.random.Generator) -> lis
     for window in setting.windows:
         grid = Grid(window.shape, window.spacings)
         if window not in power:
-            power[window] = grid.power(found.model.spectrum, found.model.anisotropy)
+            power[window] = found.model.power(grid)
         z = grid.sample(power[window], rng)[window.measured]
         rows.append(
             from_normal(found.marginal, z) + found.model.noise * rng.standard_normal(z.size)

@@ -17,7 +17,7 @@ from stiction._progress import Meter, Show, check_time_limit
 from stiction._typing import Array
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError, warn_accuracy
-from stiction.inference.bootstrap import Repetition, interval_of, parameters_of, repeat
+from stiction.inference.bootstrap import Repetition, intervals, parameters_of, repeat
 from stiction.inference.estimate import (
     Estimate,
     Setting,
@@ -33,7 +33,7 @@ from stiction.inference.records import Record, check_quantity, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.profiles import UNITS
+from stiction.quantities import UNITS
 from stiction.random.random_field import RandomField, warn_if_inaccurate
 
 if TYPE_CHECKING:
@@ -267,7 +267,8 @@ def fit_field(
     intervals come from fits to records simulated from the fitted field, reflected about the
     estimate on the scale on which a parameter's error is about normal and measured in units of the
     error that a record of its correlation length has (the studentised bootstrap; Davison and
-    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for.
+    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. That of the noise is
+    of its variance, by estimates that may be negative, and is cut off at zero last.
 
     Examples
     --------
@@ -422,10 +423,7 @@ def _result(
     cut_short: bool,
 ) -> FieldFit:
     parameters = parameters_of(found, setting)
-    interval = {
-        name: interval_of(name, parameters, [one.parameters for one in repeated], confidence)
-        for name in parameters
-    }
+    interval = intervals(found, setting, repeated, confidence)
     misfit = {
         "marginal": float(np.mean([one.estimate.distance >= found.distance for one in repeated])),
         "spectrum": float(np.mean([one.estimate.roughness >= found.roughness for one in repeated])),

@@ -11,7 +11,7 @@ from scipy import fft
 from stiction._typing import Array
 from stiction.inference.estimate import bands, simulate
 from stiction.inference.whittle import Observed
-from stiction.profiles import UNITS
+from stiction.quantities import UNITS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -25,7 +25,6 @@ from stiction.inference.noisy_marginal import without_noise
 from stiction.random.families import Gamma, Lognormal, TruncatedNormal, Weibull
 from stiction.random.marginals import Beta, ScipyMarginal, _marginal
 
-Fixed = Mapping[str, float]
 WIDEST = 10.0
 """Ranges of the values that free bounds may lie away from them: beyond, they are not seen."""
 INSIDE = 1e-2

@@ -27,8 +27,6 @@ LEAST = 1e-12
 _X, _W = np.polynomial.hermite_e.hermegauss(NODES)
 _W = _W / _W.sum()
 
-Distribution = Callable[[Array], Array]
-
 
 @dataclass(frozen=True)
 class Search:

@@ -13,7 +13,8 @@ from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.profiles import MEASURED, UNITS, is_labelled, labelled, simplified
+from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
+from stiction.quantities import UNITS
 from stiction.units import factor_to
 
 FEWEST = 64
@@ -72,7 +73,7 @@ def records_of(
     interface : Interface, optional
         Says how far the points of plain arrays are apart.
     quantity : str
-        One of `stiction.profiles.UNITS`.
+        One of `stiction.quantities.UNITS`.
     skip_gaps : bool
         Whether missing values are left out or refused.
     """

@@ -41,18 +41,20 @@ class Grid:
         room = ROOM[len(self.shape)]
         return tuple(fft.next_fast_len(room * n, real=True) for n in self.shape)
 
-    def power(self, spectrum: Any, anisotropy: float = 1.0) -> Array:
+    def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Variance of z in each mode of a real transform of the grid; it sums to 1 over all.
 
         The spectrum fades out at its truncation; what lies above the sampling
         wavenumber is folded back, and what lies above `FOLDS` times that, which is flat by then,
-        evenly.
+        evenly. With `end_seen` false it is truncated at the sampling wavenumber at the lowest.
         """
         plane = len(self.shape) == 2
         cutoff = spectrum.plane_cutoff if plane else spectrum.cutoff
         sampling = [2.0 * math.pi / d for d in self.spacings]
         steps = [s / n for s, n in zip(sampling, self.whole, strict=True)]
         stretch = (1.0, anisotropy)[: len(self.shape)]
+        if not end_seen:
+            cutoff = max(cutoff, *(a * s for a, s in zip(stretch, sampling, strict=True)))
         ranges = [
             min(FOLDS, math.ceil(cutoff / (a * s) + 0.5))
             for a, s in zip(stretch, sampling, strict=True)

@@ -30,7 +30,9 @@ CLASSES: dict[str, Any] = {
 POWER_KEPT = {"power_law": 0.9997, "squared_exponential": 0.9997, "exponential": 0.99}
 EXPONENTS = (0.65, 16.0)
 """Beyond the upper one a power law looks like a squared exponential."""
-NOISE = (1e-6, 0.95)
+NOISE = (-0.5, 0.95)
+"""Shares of the variance. A negative one stands for less at high wavenumbers than the field alone
+would have, by chance; were it cut at zero, the errors of small noises could not be told."""
 VARIANCES = (1e-200, 1e200)
 ANISOTROPIES = (0.05, 20.0)
 STEPS = 40
@@ -89,6 +91,11 @@ class SpectrumFamily:
         }
         return np.array([[_forth(n, end) for end in ranges[n]] for n in self.free])
 
+    @property
+    def end_given(self) -> bool:
+        """Whether the truncation was given; otherwise only simulation needs one."""
+        return not {"truncation", "power_kept"}.isdisjoint(dict(self.fixed))
+
     def model(self, vector: Array, shares: Array) -> Model:
         """The model of a vector of parameters."""
         found = {n: _back(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
@@ -105,6 +112,7 @@ class SpectrumFamily:
             noise_share=noise,
             variance=variance,
             shares=shares,
+            end_seen=self.end_given,
         )
 
     def vector(self, model: Model) -> Array:
@@ -123,17 +131,13 @@ def _forth(name: str, value: float) -> float:
     """To the scale on which a parameter is searched for and its error is about normal."""
     if name == "exponent":
         return math.log(value - 0.5)
-    if name == "noise_share":
-        return math.log(value / (1.0 - value))
-    return math.log(value)
+    return value if name == "noise_share" else math.log(value)
 
 
 def _back(name: str, value: float) -> float:
     if name == "exponent":
         return 0.5 + math.exp(value)
-    if name == "noise_share":
-        return 1.0 / (1.0 + math.exp(-value))
-    return math.exp(value)
+    return value if name == "noise_share" else math.exp(value)
 
 
 def spectrum_family(
@@ -178,7 +182,7 @@ def coarse(family: SpectrumFamily, shares: Array, observed: Sequence[Observed]) 
         "correlation_length": [float(v) for v in np.geomspace(*family.lengths, 17)[:-2]],
         "exponent": [1.0, 2.0, 4.0],
         "anisotropy": [0.5, 1.0, 2.0],
-        "noise_share": [1e-4, 0.01, 0.1, 0.4],
+        "noise_share": [0.0, 0.01, 0.1, 0.4],
     }
     power = sum(float(np.sum(one.weights * one.average)) for one in observed)
     best, least = np.zeros(0), math.inf
@@ -223,13 +227,7 @@ def fit_spectrum(
     value = loss_of(at, signal)
     damping = 1e-3
     for _ in range(STEPS):
-        score, information = np.zeros(at.size), np.zeros((at.size, at.size))
-        slopes = _slopes(family, at, shares, observed, signal)
-        for one, (expected, slope) in zip(observed, slopes, strict=True):
-            weight = len(one.periodograms) * one.weights.ravel()
-            d = slope / (expected + one.floor).ravel()
-            score += d @ (weight * ((one.average - expected) / (expected + one.floor)).ravel())
-            information += (d * weight) @ d.T
+        score, information = _score(family, at, shares, observed, signal)
         # What pushes against its limit is held there, or the others could not move.
         held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
         free = np.flatnonzero(~held)
@@ -255,6 +253,42 @@ def fit_spectrum(
     return at
 
 
+def _score(
+    family: SpectrumFamily,
+    at: Array,
+    shares: Array,
+    observed: Sequence[Observed],
+    signal: Sequence[Array],
+) -> tuple[Array, Array]:
+    """Derivatives of the log likelihood, (parameters,), and Fisher's information of it."""
+    score, information = np.zeros(at.size), np.zeros((at.size, at.size))
+    slopes = _slopes(family, at, shares, observed, signal)
+    for one, (expected, slope) in zip(observed, slopes, strict=True):
+        weight = len(one.periodograms) * one.weights.ravel()
+        d = slope / (expected + one.floor).ravel()
+        score += d @ (weight * ((one.average - expected) / (expected + one.floor)).ravel())
+        information += (d * weight) @ d.T
+    return score, information
+
+
+def noise_variance(
+    family: SpectrumFamily, at: Array, shares: Array, observed: Sequence[Observed]
+) -> tuple[float, float]:
+    """Variance of the noise, which may be negative, and its standard error by the information.
+
+    The information takes ordinates for independent, so that the error is somewhat too small; what
+    a bootstrap needs is that it grows and shrinks as the true one.
+    """
+    model = family.model(at, shares)
+    signal = [model.signal(one) for one in observed]
+    _, information = _score(family, at, shares, observed, signal)
+    slope = np.zeros(at.size)
+    slope[family.free.index("variance")] = model.noise_share * model.variance
+    slope[family.free.index("noise_share")] = model.variance
+    error = math.sqrt(float(slope @ np.linalg.pinv(information, hermitian=True) @ slope))
+    return model.noise_share * model.variance, error
+
+
 def _slopes(
     family: SpectrumFamily,
     at: Array,
@@ -276,7 +310,7 @@ def _slopes(
             elif name == "variance":  # the noise stays what it is
                 slope = variance * s
             elif name == "noise_share":
-                slope = variance * share * (1.0 - share) * (one.white - s)
+                slope = variance * (one.white - s)
             else:
                 change = (moved.signal(one) - s) / (aside[i] - at[i])
                 slope = variance * (1.0 - share) * change

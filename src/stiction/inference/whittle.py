@@ -122,11 +122,15 @@ class Model:
     spectrum : PowerLawSpectrum, SquaredExponentialSpectrum or ExponentialSpectrum
     anisotropy : float
     noise_share : float
-        Of the variance of the values.
+        Of the variance of the values; negative only on the way to an estimate.
     variance : float
         Of the values, noise included.
     shares : (orders,) array
         See `hermite_shares`.
+    end_seen : bool
+        Whether the truncation of the spectrum is a property of the field, which records may show.
+        Otherwise it only makes simulation finite: at a multiple of 1/xi_0 it would, among the
+        wavenumbers of a record, tell the correlation length, and rule out a longer one.
     """
 
     spectrum: Any
@@ -134,16 +138,20 @@ class Model:
     noise_share: float
     variance: float
     shares: Array
+    end_seen: bool = True
 
     @property
     def noise(self) -> float:
         """Standard deviation of the measurement noise."""
         return math.sqrt(self.noise_share * self.variance)
 
+    def power(self, grid: Grid) -> Array:
+        """Variance of z in each mode of a grid."""
+        return grid.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
+
     def signal(self, observed: Observed) -> Array:
         """Expectation of periodograms of values of unit variance without noise, (*half)."""
-        grid = observed.grid
-        rho = grid.correlation(grid.power(self.spectrum, self.anisotropy))
+        rho = observed.grid.correlation(self.power(observed.grid))
         return observed.window.expectation(np.polynomial.polynomial.polyval(rho, self.shares))
 
     def expectation(self, observed: Observed) -> Array:
@@ -158,10 +166,12 @@ class Model:
 
 
 def loss(expected: Sequence[Array], observed: Sequence[Observed]) -> float:
-    """Minus the log likelihood."""
+    """Minus the log likelihood; infinite where less than nothing is expected."""
     value = 0.0
     for one, e in zip(observed, expected, strict=True):
         lifted = e + one.floor
+        if lifted.min() <= 0.0:
+            return math.inf
         terms = np.log(lifted) + (one.average + one.floor) / lifted
         value += len(one.periodograms) * float(np.sum(one.weights * terms))
     return value

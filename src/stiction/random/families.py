@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 import scipy.stats
@@ -21,16 +21,19 @@ from stiction._model import Positive, Real, model
 from stiction.errors import InputError
 
 
+@model(kw_only=True)
 class _MeanAndCov:
     """Families above a lower bound, known by mean and coefficient of variation."""
 
-    mean: float
-    cov: float
-    low: float
+    mean: Positive
+    cov: Positive
+    low: Real = 0.0
 
-    def _check_mean(self) -> None:
+    @model_validator(mode="after")
+    def _above_low(self) -> Self:
         if not self.mean > self.low:
             raise InputError(f"mean must be above low, got mean={self.mean:g}, low={self.low:g}")
+        return self
 
     @property
     def _excess(self) -> float:
@@ -68,15 +71,7 @@ class Lognormal(_MeanAndCov):
     200000
     """
 
-    mean: Positive
-    cov: Positive
-    low: Real = 0.0
     type: Literal["lognormal"] = "lognormal"
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Lognormal:
-        self._check_mean()
-        return self
 
     @cached_property
     def distribution(self) -> Any:
@@ -105,14 +100,10 @@ class Weibull(_MeanAndCov):
         If the mean is not above the bound.
     """
 
-    mean: Positive
-    cov: Positive
-    low: Real = 0.0
     type: Literal["weibull"] = "weibull"
 
     @model_validator(mode="after")
-    def _ordered(self) -> Weibull:
-        self._check_mean()
+    def _as_wide_as_can_be_solved(self) -> Weibull:
         if not 1e-3 < self._ratio < 10.0:
             raise InputError(
                 "cov: the standard deviation over the mean above low must lie between 0.001 and"
@@ -154,15 +145,7 @@ class Gamma(_MeanAndCov):
         If the mean is not above the bound.
     """
 
-    mean: Positive
-    cov: Positive
-    low: Real = 0.0
     type: Literal["gamma"] = "gamma"
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Gamma:
-        self._check_mean()
-        return self
 
     @cached_property
     def distribution(self) -> Any:

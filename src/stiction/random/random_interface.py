@@ -19,7 +19,8 @@ from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.random.draws import block_of, standard_normal
 from stiction.random.modes import Modes
-from stiction.random.random_field import RandomField, check_counts, warn_if_inaccurate
+from stiction.random.random_field import RandomField, check_counts
+from stiction.random.resolution import warn_if_inaccurate
 from stiction.sample import PROFILES
 
 NAMES = tuple(PROFILES)

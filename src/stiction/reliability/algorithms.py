@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from stiction._progress import TimeUp, duration
+from stiction._progress import TimeUp
 from stiction._typing import Array
 from stiction.reliability.importance import Mixture, design_point
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.plain_monte_carlo import Count, count_failures, tally
 from stiction.reliability.pooling import Tail, run_until_precise, weights
+from stiction.reliability.request import Request, advice, cut_short, first_size, missed, short_of
 from stiction.reliability.result import FailureProbability, distinct, profiles_of, say
 from stiction.reliability.subset import MOST_LEVELS, Descent, descend
 from stiction.reliability.two_level import Bridge, bridge
@@ -34,69 +35,6 @@ FEWEST_FAMILIES = 5.0
 FEWEST_WEIGHTS, LARGEST_SHARE = 10.0, 0.2
 LEAST_SHARE = 0.02
 """Of the samples below the first stage's ceiling, those that fail: fewer, and it is no guide."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """What was asked, checked.
-
-    Attributes
-    ----------
-    state : LimitState
-    stress, target_cov : float
-    seed, budget : int
-    confidence : float
-    pilot : int
-        Least samples of plain Monte Carlo.
-    spent : int
-        Evaluations already made to choose the algorithm.
-    """
-
-    state: LimitState
-    stress: float
-    target_cov: float
-    seed: int
-    budget: int
-    confidence: float
-    pilot: int
-    spent: int = 0
-
-    def after(self, spent: int) -> Request:
-        """The same with less left of the budget."""
-        return replace(self, budget=max(0, self.budget - spent), spent=self.spent + spent)
-
-
-def first_size(usual: int, budget: int) -> int:
-    """Samples of a first run: fewer than usual where the budget would not even hold four levels."""
-    return min(usual, max(budget // 4, 20))
-
-
-def short_of(state: LimitState, evaluations: int) -> str:
-    """That there were too few evaluations, and what to do."""
-    return f"{ran_out(state, evaluations)} do not suffice; {advice(state)}"
-
-
-def ran_out(state: LimitState, evaluations: int) -> str:
-    """What was not enough, in words."""
-    limit = duration(state.meter.time_limit or 0.0)
-    return f"{evaluations} evaluations" + (f" in {limit}" if state.meter.over else "")
-
-
-def advice(state: LimitState) -> str:
-    """How to get more evaluations."""
-    return "raise time_limit" if state.meter.over else "raise max_evaluations"
-
-
-def _missed(request: Request, cov: float, evaluations: int) -> list[str]:
-    if cov <= request.target_cov:
-        return []
-    why = short_of(request.state, evaluations)
-    return [f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}: {why}"]
-
-
-def _cut(request: Request, cov: float) -> bool:
-    """Whether it was the time that ended it."""
-    return request.state.meter.over and cov > request.target_cov
 
 
 def unknown(request: Request, reason: str, evaluations: int) -> FailureProbability:
@@ -148,8 +86,8 @@ def counted(request: Request, count: Count, evaluations: int, reason: str) -> Fa
         confidence=request.confidence,
         failing_profiles=profiles_of(state, draws),
         diagnostics={"failures": count.failures, "samples": count.samples},
-        cut_short=_cut(request, cov),
-        warnings=say(_missed(request, cov, evaluations)),
+        cut_short=cut_short(request, cov),
+        warnings=say(missed(request, cov, evaluations)),
     )
 
 
@@ -232,7 +170,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         # So likely that there was nothing to go down to: the samples are independent.
         count = tally(np.concatenate([run.populations[0].values for run in runs]), stress)
         cov, interval = count.coefficient_of_variation, count.interval(request.confidence)
-    doubts = _missed(request, cov, evaluations)
+    doubts = missed(request, cov, evaluations)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
         deep = len(runs[0].levels) >= MOST_LEVELS
@@ -263,7 +201,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         levels=runs[0].levels,
         failing_profiles=profiles_of(state, last.draws[chosen]),
         diagnostics=diagnostics,
-        cut_short=_cut(request, cov),
+        cut_short=cut_short(request, cov),
         warnings=say(doubts),
     )
 
@@ -299,7 +237,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
     tail = Tail(runs)
     probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
     evaluations = request.spent + sum(run.evaluations for run in runs)
-    doubts = _missed(request, cov, evaluations)
+    doubts = missed(request, cov, evaluations)
     interval = lognormal_interval(probability, cov, request.confidence)
     if probability == 0.0:
         descent = runs[0].descent
@@ -347,7 +285,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         levels=largest.descent.levels,
         failing_profiles=profiles_of(state, largest.failing[chosen]),
         diagnostics=diagnostics,
-        cut_short=_cut(request, cov),
+        cut_short=cut_short(request, cov),
         warnings=say(doubts),
     )
 
@@ -398,7 +336,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
     total = float(sample.sum())
     share = float(sample.max()) / total if total > 0.0 else 1.0
     size_of = effective_size(sample)
-    doubts = _missed(request, cov, count)
+    doubts = missed(request, cov, count)
     if cov > 0.0 and (size_of < FEWEST_WEIGHTS or share > LARGEST_SHARE):
         doubts.append(
             f"the weights are worth {size_of:.0f} equal ones only, and the largest is"
@@ -427,6 +365,6 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             "effective_sample_size": size_of,
             "largest_weight_share": share,
         },
-        cut_short=_cut(request, cov),
+        cut_short=cut_short(request, cov),
         warnings=say(doubts),
     )

@@ -16,13 +16,7 @@ from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.algorithms import advice, ran_out, short_of
-from stiction.reliability.design import (
-    TailRequest,
-    check_probability,
-    stress_interval,
-    subset_tail,
-)
+from stiction.reliability.design import check_probability
 from stiction.reliability.effort import budget_of, refused_chains
 from stiction.reliability.estimate import check_target
 from stiction.reliability.limit_state import (
@@ -31,7 +25,9 @@ from stiction.reliability.limit_state import (
     make_limit_state,
 )
 from stiction.reliability.plain_monte_carlo import BATCH
+from stiction.reliability.request import advice, ran_out, short_of
 from stiction.reliability.result import say
+from stiction.reliability.tail_runs import TailRequest, stress_interval, subset_tail
 from stiction.reliability.uncertainty import binomial_interval, lognormal_interval
 from stiction.results import Variable, to_dataset
 from stiction.statistics.rice import rice_distribution
@@ -44,6 +40,7 @@ FEWEST_CROSSINGS = 5
 VARIABLES: dict[str, Variable] = {
     "stress": Variable("Pa", "stress", ("point",)),
     "stress_above_bound": Variable("Pa", "stress above the least possible one", ("point",)),
+    "friction_coefficient": Variable("1", "stress over the mean normal pressure", ("point",)),
     "probability": Variable("1", "probability of an onset below the stress", ("point",)),
     "probability_low": Variable("1", "lower end of its interval", ("point",)),
     "probability_high": Variable("1", "upper end of its interval", ("point",)),
@@ -136,7 +133,8 @@ def failure_curve(
         Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
         `probability_high` and `coefficient_of_variation`, `stress_low`, `stress_high` (Pa),
         `plain_probability` with interval (NaN where fewer than three samples fail) and, where the
-        interface is alike everywhere, `rice_probability`. `stress_above_bound` means little where
+        interface is alike everywhere, `rice_probability`; with a normal pressure
+        `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
         the attribute `lower_bound` is zero or less.
 
     Raises
@@ -225,6 +223,8 @@ def failure_curve(
         "stress_low": sides[:, 0],
         "stress_high": sides[:, 1],
     }
+    if np.isfinite(state.pressure):
+        values["friction_coefficient"] = stress / state.pressure
     if state.not_alike_everywhere() is None:
         values["rice_probability"] = _rice(problem, state.random.strength, stress, int(seed))
     if onsets.size:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -17,16 +17,6 @@ from stiction.evaluation import Method
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.algorithms import (
-    BRIDGE,
-    BRIDGE_MOST,
-    SUBSET,
-    SUBSET_MOST,
-    advice,
-    first_size,
-    ran_out,
-    short_of,
-)
 from stiction.reliability.effort import budget_of, first_stage, no_first_stage, refused_chains
 from stiction.reliability.estimate import (
     ALIKE,
@@ -35,18 +25,21 @@ from stiction.reliability.estimate import (
     check_target,
 )
 from stiction.reliability.limit_state import Event, LimitState, make_limit_state
-from stiction.reliability.pooling import AnyTailRun, Tail, run_until_precise
+from stiction.reliability.pooling import AnyTailRun, Tail
+from stiction.reliability.request import advice, ran_out, short_of
 from stiction.reliability.result import above_bound, as_coefficient, say
-from stiction.reliability.subset import Descent, descend
-from stiction.reliability.two_level import Bridge, agreement, bridge
-from stiction.reliability.uncertainty import generator, log_width
+from stiction.reliability.tail_runs import (
+    TailRequest,
+    stress_interval,
+    subset_tail,
+    two_level_tail,
+)
+from stiction.reliability.two_level import agreement
 
 TYPICAL = 200
 """Plain samples whose median is the typical stress: to 2 % where it scatters by 20 %."""
 PILOT = 500
 """Plain samples by which 'auto' judges the first stage."""
-DEEPER = 0.3
-"""Runs go on to this share of the probability, to know the lower end of the interval."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,98 +125,6 @@ def check_probability(name: str, value: Any) -> list[str]:
     if value < 1e-30:
         return [f"{name}: must be at least 1e-30, got {value!r}"]
     return []
-
-
-def stress_interval(
-    tail: Tail[AnyTailRun], probability: float, cov: float, confidence: float, lowest: float
-) -> tuple[float, float]:
-    """Stresses whose estimated probabilities bracket the one asked for."""
-    if not math.isfinite(cov):
-        return lowest, tail.runs[0].extent[1]
-    width = min(log_width(cov, confidence), 700.0)
-    below = probability * math.exp(-width)
-    seen = tail.probability(np.nextafter(min(run.extent[0] for run in tail.runs), math.inf))
-    low = tail.quantile(below) if below >= seen else lowest
-    return low, tail.quantile(min(probability * math.exp(width), 1.0))
-
-
-@dataclass(frozen=True)
-class TailRequest:
-    """How far down, and how precisely.
-
-    Attributes
-    ----------
-    state : LimitState
-    probability, target_cov : float
-    seed, budget : int
-    spent : int
-        Evaluations already made to choose the algorithm.
-    """
-
-    state: LimitState
-    probability: float
-    target_cov: float
-    seed: int
-    budget: int
-    spent: int = 0
-
-    def pooled(
-        self, make: Callable[[int, int, int], AnyTailRun], first: int, largest: int
-    ) -> Tail[AnyTailRun]:
-        """Runs until the probability is known as precisely as asked at its own quantile."""
-
-        def judge(runs: Sequence[AnyTailRun]) -> float:
-            tail = Tail(runs)
-            return tail.coefficient_of_variation(tail.quantile(self.probability))
-
-        return Tail(
-            run_until_precise(
-                make,
-                judge,
-                target_cov=self.target_cov,
-                first=first_size(first, self.budget),
-                largest=largest,
-                max_evaluations=self.budget,
-                meter=self.state.meter,
-            )
-        )
-
-
-def subset_tail(request: TailRequest) -> Tail[Descent]:
-    """The tail down to a probability, by subset simulation."""
-    state = request.state
-
-    def make(samples: int, number: int, left: int) -> Descent:
-        return descend(
-            state,
-            state.dimension,
-            rng=generator(request.seed, 5, number),
-            samples=samples,
-            probability=DEEPER * request.probability,
-            floor=state.bounds[0],
-            max_evaluations=left,
-        )
-
-    return request.pooled(make, SUBSET, SUBSET_MOST)
-
-
-def _two_level_tail(request: TailRequest) -> Tail[Bridge]:
-    state = request.state
-    cheap = state.by(first_stage(state))
-
-    def make(samples: int, number: int, left: int) -> Bridge:
-        return bridge(
-            cheap,
-            state,
-            state.dimension,
-            samples=samples,
-            rng=generator(request.seed, 6, number),
-            max_evaluations=left,
-            probability=request.probability,
-            floor=state.bounds[0],
-        )
-
-    return request.pooled(make, BRIDGE, BRIDGE_MOST)
 
 
 def _chosen(state: LimitState, probability: float, seed: int, budget: int) -> tuple[str, str, int]:
@@ -405,7 +306,7 @@ def _sampled(request: TailRequest, algorithm: str, confidence: float) -> DesignS
             )
             request = replace(request, budget=request.budget - spent, spent=spent)
         if chosen == "two_level":
-            bridges = _two_level_tail(request)
+            bridges = two_level_tail(request)
             cheap = sum(run.first_stage_evaluations for run in bridges.runs)
             return _finish(request, bridges, confidence, chosen, reason, cheap)
         return _finish(request, subset_tail(request), confidence, chosen, reason, 0)

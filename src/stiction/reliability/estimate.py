@@ -17,7 +17,6 @@ from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.algorithms import (
-    Request,
     by_counting,
     by_importance,
     by_subset,
@@ -32,6 +31,7 @@ from stiction.reliability.limit_state import (
     make_limit_state,
 )
 from stiction.reliability.plain_monte_carlo import tally
+from stiction.reliability.request import Request
 from stiction.reliability.result import FailureProbability
 from stiction.reliability.two_level import agreement
 
@@ -71,6 +71,13 @@ def check_stress(name: str, value: Any) -> list[str]:
     if is_finite(value):
         return []
     return [f"{name}: must be a finite number in Pa, got {describe(value)}"]
+
+
+def check_coefficient(name: str, value: Any) -> list[str]:
+    """Why a number is no friction coefficient."""
+    if is_finite(value) and value > 0.0:
+        return []
+    return [f"{name}: must be a positive number, got {describe(value)}"]
 
 
 def check_algorithm(
@@ -225,9 +232,8 @@ def failure_probability(
         problems.append("stress: give either stress (Pa) or friction_coefficient")
     elif stress is not None:
         problems += check_stress("stress", stress)
-    elif not (is_finite(friction_coefficient) and float(friction_coefficient or 0.0) > 0.0):
-        given = describe(friction_coefficient)
-        problems.append(f"friction_coefficient: must be a positive number, got {given}")
+    else:
+        problems += check_coefficient("friction_coefficient", friction_coefficient)
     meter = Meter("failure_probability", show=progress, time_limit=time_limit)
     state = make_limit_state(
         problem,

@@ -19,10 +19,10 @@ from stiction.evaluation import Method
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.random.coefficients import in_stress
+from stiction.random.custom_spectrum import CustomSpectrum
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.random.spectra import CustomSpectrum
 from stiction.reliability.curve import failure_curve
 from stiction.reliability.limit_state import Event
 

@@ -31,6 +31,8 @@ class ShownFigure:
     png : bytes
     tables : tuple of Table
         The numbers behind it.
+    files : tuple of str
+        Where it is beside the page.
     """
 
     name: str
@@ -39,6 +41,12 @@ class ShownFigure:
     caption: str
     png: bytes
     tables: tuple[Table, ...]
+    files: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.files:
+            place = f"figures/figure-{self.number}-{self.name}"
+            object.__setattr__(self, "files", (f"{place}.pdf", f"{place}.png"))
 
     @property
     def of_the_paper(self) -> bool:
@@ -111,6 +119,7 @@ def render(
     parameters: Sequence[tuple[str, str]],
     notes: Sequence[str],
     provenance: Sequence[tuple[str, str]],
+    listing: tuple[str, str] | None = None,
 ) -> str:
     """The page as one string of HTML; texts may hold symbols such as tau_cr.
 
@@ -131,6 +140,8 @@ def render(
     parameters, provenance : sequences of (name, value)
     notes : sequence of str
         On accuracy.
+    listing : (heading, text), optional
+        A file that belongs to the page, as it is.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("stiction.report", "templates"),
@@ -155,5 +166,6 @@ def render(
         "parameters": parameters,
         "notes": notes,
         "provenance": provenance,
+        "listing": listing,
     }
     return environment.get_template("page.html.j2").render(**content)

@@ -50,8 +50,9 @@ def write_posterior(posterior: Posterior, folder: Path, *, title: str, peaks: Pa
     for table in (summary, draws):
         table.write_csv(folder)
     figure = posterior.plot()
-    for ending in ("png", "pdf"):
-        save_figure(figure, folder / f"posterior.{ending}")
+    files = ("posterior.png", "posterior.pdf")
+    for name in files:
+        save_figure(figure, folder / name)
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=160)
     least = min(posterior.information, key=lambda name: posterior.information[name])
@@ -69,7 +70,9 @@ def write_posterior(posterior: Posterior, folder: Path, *, title: str, peaks: Pa
         ],
         exceptions=(),
         key_tables=[summary],
-        figures=[ShownFigure("posterior", "1", "Before and after", CAPTION, image.getvalue(), ())],
+        figures=[
+            ShownFigure("posterior", "1", "Before and after", CAPTION, image.getvalue(), (), files)
+        ],
         claims=(),
         parameters=[
             ("load-cell error", f"{model.error:g} {'' if posterior.peaks.coefficients else 'Pa'}"),

@@ -131,6 +131,7 @@ def curve_table(curve: xr.Dataset) -> Table:
     names = [
         ("stress", "stress (Pa)"),
         ("stress_above_bound", "above the bound (Pa)"),
+        ("friction_coefficient", "coefficient"),
         ("probability", "P"),
         ("probability_low", "low"),
         ("probability_high", "high"),

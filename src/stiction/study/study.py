@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import operator
-import tomllib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
@@ -25,15 +24,9 @@ from stiction._checks import (
     too_many_samples,
 )
 from stiction._model import (
-    Count,
-    Positive,
-    _count,
-    describe,
     explain,
     model,
-    names_to_keep,
     to_plain,
-    whole,
 )
 from stiction._progress import Meter, Show
 from stiction.dotted_keys import part_with_values
@@ -43,47 +36,20 @@ from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run
 from stiction.ensemble.part import as_part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import Plans, differing_in, variables_in
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError
 from stiction.evaluation import methods
 from stiction.inference.settings import Inference
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.sweep import (
-    Point,
-    Sweep,
-    grid_axes,
-    name_point,
-    points_of,
-    unknown_keys,
-)
+from stiction.study.ensemble import Ensemble as Ensemble
+from stiction.study.study_file import completed, read_sweep, read_toml, refuse_first_version
+from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
 
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
 ]
 """Any registered method; in a study file ``type`` says which."""
-
-FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_rate")
-"""Tables of the study files of the first version, now below [random]."""
-Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
-
-
-MOST_KEPT = 10**6
-
-
-def _chosen(value: Any) -> Any:
-    """A number of samples stands for the first ones."""
-    count = whole(value)
-    if count is not None and count > MOST_KEPT:
-        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
-    if count is not None and count > 0:
-        return tuple(range(count))
-    if not isinstance(value, list | tuple):
-        raise InputError(
-            "must be a list of sample numbers, or how many of the first samples to keep;"
-            f" got {describe(value)}"
-        )
-    return tuple(value)
 
 
 def _interface(value: Any) -> Any:
@@ -94,41 +60,6 @@ if TYPE_CHECKING:  # a field alone is accepted and becomes an interface
     AnyRandom: TypeAlias = RandomInterface | RandomField
 else:
     AnyRandom = Annotated[RandomInterface, BeforeValidator(_interface)]
-
-
-@model(kw_only=True)
-class Ensemble:
-    """How many samples, and which.
-
-    Parameters
-    ----------
-    samples : int
-        Number of samples.
-    seed : int
-        Not negative.
-    first : int
-        Number of the first sample.
-    keep : str or tuple of str
-        What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
-    keep_samples : tuple of int or int, optional
-        Numbers of the samples for which it is kept, or how many of the first; all if left out.
-    keep_limit : float, optional
-        Bytes that this may take in all; 1 GiB if left out.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> st.Ensemble(samples=1e4, seed=1).samples
-    10000
-    """
-
-    samples: Count
-    seed: Number = 0
-    first: Number = 0
-    keep: Annotated[tuple[str, ...], BeforeValidator(names_to_keep)] = ()
-    keep_samples: Annotated[tuple[Number, ...], BeforeValidator(_chosen)] | None = None
-    keep_limit: Positive | None = None
 
 
 @model(kw_only=True)
@@ -328,7 +259,7 @@ class Study:
         if part is not None and out is None:
             raise InputError("part: a part is stored; say where with out=")
         if out is not None:
-            from stiction.stored_run import run_into
+            from stiction.study_run import run_into
 
             stored = run_into(
                 self,
@@ -393,10 +324,10 @@ class Study:
         """
         check_instance("study", given, dict)
         folder = None if folder is None else as_path("folder", folder)
-        _refuse_first_version(given)
-        sweep, mistakes = _read_sweep(given, folder)
+        refuse_first_version(given)
+        sweep, mistakes = read_sweep(given, folder, cls)
         if sweep:
-            given = _completed(given, sweep)
+            given = completed(given, sweep)
         try:
             study: Study = pydantic.TypeAdapter(cls).validate_python(
                 given, context={"folder": folder, "trusted": trusted}
@@ -411,7 +342,7 @@ class Study:
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
         path = as_path("path", path)
-        return cls.from_dict(_read_toml(path), folder=path.parent)
+        return cls.from_dict(read_toml(path), folder=path.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -424,63 +355,6 @@ class Study:
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"result: its attribute 'study' is no JSON: {error}") from None
         return cls.from_dict(given)
-
-
-def _refuse_first_version(given: Any) -> None:
-    """Say what to write instead of the tables of the first version's study files."""
-    if not isinstance(given, dict) or "random" in given:
-        return
-    old = [name for name in FIRST_VERSION if name in given]
-    if old:
-        raise InputError(
-            [
-                f"{name}: what is random stands in one table now: write [random.{name}]"
-                for name in old
-            ]
-            + ["sweep: keys below these tables begin with 'random.' as well"] * ("sweep" in given)
-        )
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    except RecursionError:
-        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-
-
-def read_setup(path: Path) -> tuple[Problem, Any]:
-    """The problem of a study file and its method or None; whatever else it holds is not needed.
-
-    Of a sweep, the first values.
-    """
-    given, folder = _read_toml(path), path.parent
-    problems = [
-        unknown_name("study", name, Study.__dataclass_fields__)
-        for name in given
-        if name not in Study.__dataclass_fields__
-    ]
-    sweep, _ = _read_sweep(given, folder)
-    given = _completed(given, sweep)
-    if "problem" not in given:
-        problems.append("problem: missing")
-    found: dict[str, Any] = {}
-    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod}
-    for name, kind in kinds.items():
-        if name not in given:
-            continue
-        try:
-            found[name] = pydantic.TypeAdapter(kind).validate_python(
-                given[name], context={"folder": folder}
-            )
-        except pydantic.ValidationError as error:
-            problems += explain(error, Study, prefix=(name,))
-    if problems:
-        raise InputError(problems)
-    return found["problem"], found.get("method")
 
 
 @model(kw_only=True)
@@ -507,39 +381,6 @@ def _plan(parts: Mapping[str, Any]) -> Plan:
 def _at_points(text: str, points: list[Point]) -> str:
     more = f" and {len(points) - 1} more" if len(points) > 1 else ""
     return f"{text}, at {name_point(points[0])}{more} of the sweep"
-
-
-def _read_sweep(given: Any, folder: str | Path | None) -> tuple[Any, list[str]]:
-    """The axes of a study in plain form and its unknown keys; nothing if it cannot be read."""
-    if not isinstance(given, dict) or "sweep" not in given:
-        return (), []
-    try:
-        adapter: pydantic.TypeAdapter[Any] = pydantic.TypeAdapter(Sweep)
-        axes = adapter.validate_python(given["sweep"], context={"folder": folder})
-    except pydantic.ValidationError:
-        return (), []
-    return axes, unknown_keys(Study, axes)
-
-
-def _completed(given: dict[str, Any], axes: Any) -> dict[str, Any]:
-    """The same with the first value of every swept key that has none of its own."""
-    result = given
-    for axis in axes:
-        if not axis.steps:
-            raise InputError(f"sweep: {', '.join(axis.keys) or 'an axis'}: has no values")
-        for key, value in zip(axis.keys, axis.steps[0], strict=True):
-            result = _with_default(result, key.split("."), value)
-    return result
-
-
-def _with_default(table: dict[str, Any], steps: list[str], value: Any) -> dict[str, Any]:
-    name, *rest = steps
-    if not rest:
-        return table if name in table else table | {name: value}
-    inner = table.get(name, {})
-    if not isinstance(inner, dict):
-        return table
-    return table | {name: _with_default(inner, rest, value)}
 
 
 def study_schema() -> dict[str, Any]:

@@ -1,0 +1,75 @@
+"""Study files as plain dictionaries, before they are made a study."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pydantic
+
+from stiction.errors import InputError
+from stiction.study.sweep import Sweep, unknown_keys
+
+FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_rate")
+"""Tables of the study files of the first version, now below [random]."""
+
+
+def refuse_first_version(given: Any) -> None:
+    """Say what to write instead of the tables of the first version's study files."""
+    if not isinstance(given, dict) or "random" in given:
+        return
+    old = [name for name in FIRST_VERSION if name in given]
+    if old:
+        raise InputError(
+            [
+                f"{name}: what is random stands in one table now: write [random.{name}]"
+                for name in old
+            ]
+            + ["sweep: keys below these tables begin with 'random.' as well"] * ("sweep" in given)
+        )
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file holds; `InputError` if it is none."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def read_sweep(given: Any, folder: str | Path | None, study: type) -> tuple[Any, list[str]]:
+    """The axes of a study in plain form and its unknown keys; nothing if it cannot be read."""
+    if not isinstance(given, dict) or "sweep" not in given:
+        return (), []
+    try:
+        adapter: pydantic.TypeAdapter[Any] = pydantic.TypeAdapter(Sweep)
+        axes = adapter.validate_python(given["sweep"], context={"folder": folder})
+    except pydantic.ValidationError:
+        return (), []
+    return axes, unknown_keys(study, axes)
+
+
+def completed(given: dict[str, Any], axes: Any) -> dict[str, Any]:
+    """The same with the first value of every swept key that has none of its own."""
+    result = given
+    for axis in axes:
+        if not axis.steps:
+            raise InputError(f"sweep: {', '.join(axis.keys) or 'an axis'}: has no values")
+        for key, value in zip(axis.keys, axis.steps[0], strict=True):
+            result = _with_default(result, key.split("."), value)
+    return result
+
+
+def _with_default(table: dict[str, Any], steps: list[str], value: Any) -> dict[str, Any]:
+    name, *rest = steps
+    if not rest:
+        return table if name in table else table | {name: value}
+    inner = table.get(name, {})
+    if not isinstance(inner, dict):
+        return table
+    return table | {name: _with_default(inner, rest, value)}

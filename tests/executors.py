@@ -1,0 +1,43 @@
+"""Executors that tests hand to runs to see, delay or forbid the work."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import pytest
+
+
+class Counting:
+    """Computes at once and keeps which samples, (first, how many), in `pieces`."""
+
+    def __init__(self):
+        self.pieces = []
+
+    def submit(self, function, plan, point, first, count, *marks):
+        self.pieces.append((first, count))
+        future = Future()
+        future.set_result(function(plan, point, first, count, *marks))
+        return future
+
+
+class Forbidding:
+    """Fails the test if anything is to be computed."""
+
+    def submit(self, *arguments):
+        pytest.fail("work was begun")
+
+
+class SlowFrom(ThreadPoolExecutor):
+    """Two threads that take longer for samples from a number on."""
+
+    def __init__(self, sample, seconds):
+        super().__init__(2)
+        self.sample, self.seconds = sample, seconds
+
+    def submit(self, function, plan, point, first, count, *marks):
+        def later():
+            time.sleep(self.seconds if first >= self.sample else 0.0)
+            return function(plan, point, first, count, *marks)
+
+        return super().submit(later)

@@ -1,0 +1,109 @@
+"""Stations: what fields show at their nodes, after every step, and nothing else changes."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+
+SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
+FRICTION = st.SlipWeakening(weakening_rate=3e11, residual_strength=2e5)
+LINE = st.Problem(SOLID, st.Interface(length=0.04, nodes=64), FRICTION)
+PLANE = st.Problem(SOLID, st.Interface(length=(0.04, 0.03), nodes=(40, 36)), FRICTION)
+METHOD = st.Rupture(loading_rate=1e8)
+RECORDED = {"station_slip": "slip", "station_slip_rate": "slip_rate"} | {
+    "station_shear_stress": "shear_stress"
+}
+
+
+def strength(problem):
+    places = np.meshgrid(*problem.interface.coordinates.values(), indexing="ij")
+    return 1e6 - 3e5 * np.exp(-sum(((place - 0.012) / 0.007) ** 2 for place in places))
+
+
+CASES = {
+    "line": (LINE, {"weak": 0.012, "far": 0.0304}, (19, 49)),
+    "plane": (PLANE, {"weak": (0.012, 0.012), "far": (0.0302, 0.0201)}, ((12, 14), (30, 24))),
+}
+
+
+@pytest.fixture(scope="module", params=list(CASES))
+def case(request):
+    problem, stations, nodes = CASES[request.param]
+    run = st.simulate_rupture(
+        problem, strength(problem), method=METHOD, every=1, stations=stations, progress=False
+    )
+    return problem, stations, nodes, run
+
+
+def test_stations_show_the_fields_at_their_nodes(case):
+    """Frames after every step are the same numbers, but for the first, which no step led to."""
+    problem, stations, nodes, run = case
+    assert run.station.values.tolist() == list(stations)
+    assert np.array_equal(run.step_time, run.time[1:])
+    for own, field in RECORDED.items():
+        for name, node in zip(stations, nodes, strict=True):
+            at_node = run[field].values[(slice(1, None), *np.atleast_1d(node))]
+            assert np.array_equal(run[own].sel(station=name), at_node), own
+        assert run[own].attrs["units"] == run[field].attrs["units"]
+    far = [float(run[f"station_{dim}"][1]) for dim in problem.interface.dims]
+    expected = [
+        at[i]
+        for at, i in zip(
+            problem.interface.coordinates.values(), np.atleast_1d(nodes[1]), strict=True
+        )
+    ]
+    assert far == pytest.approx(expected)
+
+
+def test_stations_change_nothing_and_need_no_frames(case):
+    problem, stations, _, run = case
+    options = {"method": METHOD, "every": 50, "variables": (), "steps": False, "progress": False}
+    plain = st.simulate_rupture(problem, strength(problem), **options)
+    recorded = st.simulate_rupture(problem, strength(problem), stations=stations, **options)
+    assert set(recorded.variables) - set(plain.variables) == {
+        *RECORDED, "station", "step_time", *(f"station_{d}" for d in problem.interface.dims)
+    }  # fmt: skip
+    assert plain.identical(recorded[list(plain.variables)])
+    for name in RECORDED:
+        assert np.array_equal(recorded[name], run[name])
+
+
+def test_a_restart_records_the_rest_to_the_bit(case, tmp_path):
+    problem, stations, _, run = case
+    options = {"stations": stations, "every": 10, "progress": False}
+    short = st.Rupture(loading_rate=1e8, max_steps=60)
+    saved, stored = tmp_path / "state.npz", {"store": tmp_path / "run", "chunk": 2}
+    st.simulate_rupture(
+        problem, strength(problem), method=short, **options, **stored, checkpoint=saved
+    )
+    again = {"method": METHOD, "restart": saved} | options
+    st.simulate_rupture(problem, strength(problem), **again, **stored)
+    alone = st.simulate_rupture(problem, strength(problem), **again)
+    streamed = st.open_rupture(tmp_path / "run", variables=())
+    for name in (*RECORDED, "step_time"):
+        assert np.array_equal(streamed[name], run[name])
+        assert alone[name].shape[0] < run[name].shape[0]
+        assert np.array_equal(alone[name], run[name][-alone[name].shape[0] :])
+    streamed.to_netcdf(tmp_path / "whole.nc")
+    with xr.open_dataset(tmp_path / "whole.nc") as read:
+        assert read.station.values.tolist() == list(stations)
+
+
+@pytest.mark.parametrize(
+    ("problem", "stations", "text"),
+    [
+        (LINE, {"a": 7.5}, r"stations\['a'\]: 7.5 is not on the interface of 0.04 m"),
+        (LINE, {"a": (0.01, 0.01)}, "must be a number x"),
+        (PLANE, {"a": 0.01}, r"must be a pair \(x, y\)"),
+        (PLANE, {"a": (0.01, np.nan)}, r"must be a pair \(x, y\)"),
+        (PLANE, {"a": (-0.01, 0.0)}, "from the first node"),
+        (LINE, {3: 0.01}, "a name must be a text"),
+        (LINE, [0.01], "must be names and places"),
+    ],
+)
+def test_stations_that_are_no_places_are_refused(problem, stations, text):
+    with pytest.raises(st.InputError, match=text):
+        st.simulate_rupture(problem, strength(problem), method=METHOD, stations=stations)
