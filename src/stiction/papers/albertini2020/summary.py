@@ -173,7 +173,7 @@ def _points(data: Data, findings: Judged) -> list[str]:
         points.append(_about_dynamics(data))
     twice = [(claim, finding) for claim, finding in findings if finding.by_elastodynamics]
     if twice:
-        points.append(_about_both_verdicts(twice))
+        points.append(_about_both_verdicts(data, twice))
     if "arrest" in data.studies and data["arrest"].sizes["event"]:
         stay = data["arrest"]["dynamic_arrests"].values > 0
         points.append(
@@ -215,16 +215,17 @@ def _about_dynamics(data: Data) -> str:
     )
 
 
-def _about_both_verdicts(twice: Judged) -> str:
+def _about_both_verdicts(data: Data, twice: Judged) -> str:
     others = [
         f"\N{LEFT DOUBLE QUOTATION MARK}{claim.says.rstrip('.')}\N{RIGHT DOUBLE QUOTATION MARK}"
-        f" ({claim.where}) {found.verdict} by the paper's method, {other.verdict} by elastodynamics"
+        f" ({claim.where}): {found.verdict}, by the ruptures {other.verdict}"
         for claim, found in twice
         if (other := found.by_elastodynamics) and other.verdict is not found.verdict
     ]
-    same = f"{len(twice) - len(others)} of {len(twice)} statements"
-    return f"{same} about the onset of many samples get the same verdict from as many ruptures" + (
-        f"; not so: {'; '.join(others)}." if others else "."
+    runs = data["dynamic"]["critical_stress"].size
+    return (
+        f"{len(twice) - len(others)} of {len(twice)} statements about onsets get the same verdict"
+        f" from {runs:,} ruptures" + (f"; not so: {'; '.join(others)}." if others else ".")
     )
 
 

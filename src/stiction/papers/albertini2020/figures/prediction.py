@@ -20,7 +20,6 @@ title = "Theory against simulation"
 needs: tuple[str, ...] = ("representative", "ruptures")
 
 PREDICTIONS = ("local", "printed", "exact")
-LABELS = {"local": "local criterion", "printed": "same, printed $G^*$", "exact": "equilibrium"}
 
 
 def caption(data: Data) -> str:
