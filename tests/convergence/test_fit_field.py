@@ -43,13 +43,14 @@ def test_recovery_as_data_grow():
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_truth():
+@pytest.mark.parametrize("name", ["squared exponential, Weibull", "exponential, lognormal"])
+def test_intervals_hold_the_truth(name):
     """A smaller form of validation/fit_coverage.py: 40 records, all parameters together.
 
     Intervals of 90 % held 36 of 40; of so few, with parameters that depend on each other, less than
     30 (75 %) would happen once in a thousand times.
     """
-    case = fit_coverage.CASES["squared exponential, Weibull"]
+    case = fit_coverage.CASES[name]
     found = fit_coverage.coverage(case, 20, 0.2, records=40, bootstrap=60)
     assert np.mean([share for share, _ in found.values()]) > 0.8
     assert min(share for share, _ in found.values()) > 0.7

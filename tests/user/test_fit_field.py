@@ -163,7 +163,7 @@ def test_noise_that_hides_the_spectrum_is_warned_of():
         st.fit_field(labelled(noisy), **QUICK | {"noise": 3e6})
 
 
-@pytest.mark.parametrize("seed", [2, 6, 10])
+@pytest.mark.parametrize("seed", [6, 10])
 def test_no_noise_found_is_not_no_noise(seed):
     """Of these rough records none is the best estimate; the noise was a tenth of the deviation.
 

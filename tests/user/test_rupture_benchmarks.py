@@ -70,3 +70,13 @@ def test_community_fault(script, tmp_path):
         assert np.nanmax(np.abs(other - arrival)) < 1e-6
     outside = (np.abs(found.x) > 15.1e3)[:, None] | (np.abs(found.y) > 7.6e3)[None, :]
     assert np.all(np.isnan(arrival[outside]))
+    record = found.run.sel(station="along the slip")
+    slipped = record.station_slip.values > script.CRITICAL_SLIP
+    # Nodes are 200 m apart, and the nearest to 7.5 km is 100 m further out or in.
+    assert abs(float(record.station_x) - script.PERIOD[0] / 2 - 7.5e3) <= 100.0
+    assert float(record.station_shear_stress.max()) == pytest.approx(script.STRENGTH, rel=0.01)
+    # Sliding at the residual strength, to round-off of the sum of stresses.
+    assert record.station_shear_stress.values[slipped] == pytest.approx(script.RESIDUAL, rel=1e-9)
+    slip = np.trapezoid(record.station_slip_rate, record.step_time)
+    # A step slips by the predicted rate, the record holds the corrected one: second order, .1 %.
+    assert slip == pytest.approx(float(record.station_slip[-1]), rel=3e-3)

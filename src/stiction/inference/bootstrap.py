@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,10 +66,24 @@ class Repetition:
     parameters: dict[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Repetitions:
+    """Fits to records simulated from one field, and that field.
+
+    Attributes
+    ----------
+    world : Estimate
+    fits : list of Repetition
+    """
+
+    world: Estimate
+    fits: list[Repetition]
+
+
 def repeat(
     found: Estimate, setting: Setting, count: int, seed: int, workers: int, meter: Meter
-) -> list[Repetition]:
-    """Fits to simulated records; fewer than asked for if the time is over.
+) -> Repetitions:
+    """Fits to records simulated from a field; fewer than asked for if the time is over.
 
     Repetition b depends on (seed, b) only.
     """
@@ -89,45 +103,108 @@ def repeat(
 
     with ThreadPoolExecutor(workers) as pool:
         results = list(pool.map(one, range(count)))
-    return [result for result in results if result is not None]
+    return Repetitions(found, [result for result in results if result is not None])
+
+
+def at_ends(
+    around: Repetitions, setting: Setting, confidence: float
+) -> tuple[Estimate, Estimate] | None:
+    """The field with its correlation length at either end of a first interval; None if it is known.
+
+    Records of short correlation lengths hold more of them, and errors are smaller and more alike.
+    An estimate that is too short by chance therefore promises too much.
+    """
+    name, family = "correlation_length", setting.spectrum
+    if name not in family.free:
+        return None
+    found = around.world
+    estimated = parameters_of(found, setting)
+    full = f"spectrum.{name}"
+    errors = _errors(full, around, setting)
+    at, width = _scaled(full, estimated[full]), _width(full, estimated)
+    first = _ends(at, width, errors, errors, confidence)
+    place = family.free.index(name)
+
+    def moved(end: float) -> Estimate:
+        vector = family.vector(found.model)
+        vector[place] = np.clip(end, *family.limits[place])
+        return replace(found, model=family.model(vector, found.model.shares))
+
+    return moved(first[0]), moved(first[1])
 
 
 def intervals(
-    found: Estimate, setting: Setting, repeated: Sequence[Repetition], confidence: float
+    around: Repetitions,
+    ends: tuple[Repetitions, Repetitions] | None,
+    setting: Setting,
+    confidence: float,
 ) -> dict[str, tuple[float, float]]:
     """Studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
     The error of any parameter is as wide as the root of the correlation length, of which a record
     holds few, and that of a place, such as the mean, also as the field's standard deviation; a
-    repetition finds both anew.
+    repetition finds both anew. What still changes with the correlation length is met by taking the
+    error at an end of an interval from a field that belongs there, with a longer or a shorter
+    correlation (one step of a test inversion; Carpenter, 1999): the longer one at the upper end of
+    parameters whose estimates rise with that of the correlation length, and else at the lower.
 
-    Of the noise it is the variance that has an interval, with its own standard error, and as if it
-    could be negative: estimates that end at zero would all have the same error, and an interval
-    from them would hold nothing but zero. What is below zero is cut off last.
+    Of the noise it is the variance that has an interval, with its own standard error, which follows
+    the correlation length as it is, and as if it could be negative: estimates that end at zero
+    would all have the same error, and an interval from them would hold nothing but zero. What is
+    below zero is cut off last.
+
+    Parameters
+    ----------
+    around : Repetitions
+        From the estimate.
+    ends : (Repetitions, Repetitions), optional
+        From a field of shorter and one of longer correlation, see `at_ends`.
+    setting : Setting
+    confidence : float
     """
+    found = around.world
     estimated = parameters_of(found, setting)
+    lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
-    for name, value in estimated.items():
-        if name == "noise" and found.noise is not None:
+    for name in estimated:
+        if name == "noise":
             at, width = found.noise
-            pairs = [one.estimate.noise or (0.0, 1.0) for one in repeated]
-            errors = [(again - found.model.noise**2) / error for again, error in pairs]
-            ends = _ends(at, width, errors, confidence)
-            low, high = (math.sqrt(max(end, 0.0)) for end in ends)
-        else:
-            at = _scaled(name, value)
-            errors = [
-                (_scaled(name, one.parameters[name]) - at) / _width(name, one.parameters)
-                for one in repeated
-            ]
-            ends = _ends(at, _width(name, estimated), errors, confidence)
-            low, high = (_unscaled(name, end) for end in ends)
-        result[name] = (low, high)
+            errors = _noise_errors(around)
+            low, high = _ends(at, width, errors, errors, confidence)
+            result[name] = (math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0)))
+            continue
+        shorter, longer = ends or (around, around)
+        own = [_scaled(name, one.parameters[name]) for one in around.fits]
+        if np.dot(np.array(own) - np.mean(own), np.array(lengths) - np.mean(lengths)) < 0.0:
+            shorter, longer = longer, shorter
+        at, width = _scaled(name, estimated[name]), _width(name, estimated)
+        both = _errors(name, shorter, setting), _errors(name, longer, setting)
+        low, high = _ends(at, width, *both, confidence)
+        result[name] = (_unscaled(name, low), _unscaled(name, high))
     return result
 
 
+def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
+    """Of a parameter on its own scale, in units of their widths."""
+    truth = _scaled(name, parameters_of(repeated.world, setting)[name])
+    return [
+        (_scaled(name, one.parameters[name]) - truth) / _width(name, one.parameters)
+        for one in repeated.fits
+    ]
+
+
+def _noise_errors(repeated: Repetitions) -> list[float]:
+    """Errors of the variance of the noise in units of their standard errors."""
+    truth = repeated.world.model.noise**2
+    return [(at - truth) / error for at, error in (one.estimate.noise for one in repeated.fits)]
+
+
 def _ends(
-    at: float, width: float, errors: Sequence[float], confidence: float
+    at: float,
+    width: float,
+    shorter: Sequence[float],
+    longer: Sequence[float],
+    confidence: float,
 ) -> tuple[float, float]:
     """An estimate less the quantiles of its error, which is in units of its width.
 
@@ -135,8 +212,9 @@ def _ends(
     lies further inside.
     """
     tail = 0.5 * (1.0 - confidence)
-    low, high = np.quantile(errors, [tail, 1.0 - tail], method="weibull")
-    return float(at - width * high), float(at - width * low)
+    highest = float(np.quantile(shorter, 1.0 - tail, method="weibull"))
+    lowest = float(np.quantile(longer, tail, method="weibull"))
+    return at - width * highest, at - width * lowest
 
 
 def _width(name: str, values: Mapping[str, float]) -> float:

@@ -71,16 +71,16 @@ class Estimate:
     roughness : float
         How far the periodogram, averaged over bands, lies from its expectation: mean square of
         the logarithm of the ratio.
-    noise : (float, float), optional
+    noise : (float, float)
         Variance of the noise, negative where even less than none would suit better, and its
-        standard error; None if it is known.
+        standard error; 0 where it is known.
     """
 
     marginal: Any
     model: Model
     distance: float
     roughness: float
-    noise: tuple[float, float] | None = None
+    noise: tuple[float, float] = (0.0, 0.0)
 
     @property
     def field(self) -> RandomField:
@@ -122,7 +122,7 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None
     observed = observe(rows, setting.windows)
     vector = start
     noise = 0.0 if start is None else family.model(start, np.ones(2)).noise
-    signed = None
+    signed = (0.0, 0.0)
     for turn in range(2):
         marginal = setting.marginal.fit(values, noise)
         shares = hermite_shares(marginal)

@@ -17,7 +17,7 @@ from stiction._progress import Meter, Show, check_time_limit
 from stiction._typing import Array
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError, warn_accuracy
-from stiction.inference.bootstrap import Repetition, intervals, parameters_of, repeat
+from stiction.inference.bootstrap import Repetitions, at_ends, intervals, parameters_of, repeat
 from stiction.inference.estimate import (
     Estimate,
     Setting,
@@ -45,6 +45,8 @@ ENOUGH_LENGTHS = 10.0
 FAR = 0.01
 """Share of repetitions that are further from their model than the data are from theirs."""
 AT_LIMIT = 1e-3
+FEWEST = 20
+"""Repetitions that tell a tail of errors."""
 HIGHEST_DEGREE = 3
 
 
@@ -227,7 +229,8 @@ def fit_field(
     quantity : str
         What it is, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
     bootstrap : int
-        Repetitions, at least 20.
+        Repetitions, at least 20: as many from the fitted field, and from fields with correlation
+        lengths at either end of a first interval of it.
     confidence : float
         Of the intervals.
     seed : int
@@ -267,7 +270,9 @@ def fit_field(
     intervals come from fits to records simulated from the fitted field, reflected about the
     estimate on the scale on which a parameter's error is about normal and measured in units of the
     error that a record of its correlation length has (the studentised bootstrap; Davison and
-    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. That of the noise is
+    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. Upper and lower ends
+    come from fields that belong there, of longer and shorter correlation (one step of a test
+    inversion; Carpenter, 1999), which matters for short records. That of the noise is
     of its variance, by estimates that may be negative, and is cut off at zero last.
 
     Examples
@@ -295,18 +300,25 @@ def fit_field(
     windows = make_windows(records, int(detrend))
     rows = [record.values[record.measured] for record in records]
     count = usable_cores() if workers is None else int(workers)
-    with Meter("fit_field", int(bootstrap), progress, time_limit=time_limit) as meter:
+    times = 3 if "correlation_length" in spectral.free else 1
+    with Meter("fit_field", times * int(bootstrap), progress, time_limit=time_limit) as meter:
         found, setting, compared = _best(families, spectral, rows, windows, int(detrend))
-        repeated = repeat(found, setting, int(bootstrap), int(seed), count, meter)
+        options = (setting, int(bootstrap), int(seed), count, meter)
+        around = repeat(found, *options)
+        ends = None
+        if len(around.fits) >= FEWEST:
+            fields = at_ends(around, setting, float(confidence))
+            ends = fields and (repeat(fields[0], *options), repeat(fields[1], *options))
         cut_short = meter.over
-    if len(repeated) < 2:
+    if len(around.fits) < 2:
         raise InputError(
-            f"time_limit: {len(repeated)} of {bootstrap} repetitions were done, too few for an"
+            f"time_limit: {len(around.fits)} of {bootstrap} repetitions were done, too few for an"
             " interval; allow more time or a simpler marginal"
         )
     return _result(
-        found, setting, compared, repeated, records, rows, interface,
-        confidence=float(confidence), quantity=quantity, asked=int(bootstrap), cut_short=cut_short,
+        setting, compared, around, ends, records, rows, interface,
+        confidence=float(confidence), quantity=quantity, asked=times * int(bootstrap),
+        cut_short=cut_short,
     )  # fmt: skip
 
 
@@ -339,8 +351,8 @@ def _checked(
         problems.append(
             f"anisotropy: must be True, False or a positive ratio, got {describe(anisotropy)}"
         )
-    if not is_whole(bootstrap, 20):
-        problems.append(f"bootstrap: must be a whole number >= 20, got {describe(bootstrap)}")
+    if not is_whole(bootstrap, FEWEST):
+        problems.append(f"bootstrap: must be a whole number >= {FEWEST}, got {describe(bootstrap)}")
     if not (is_real(confidence) and 0.0 < confidence < 1.0):
         problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
     if not is_whole(seed, 0):
@@ -409,10 +421,10 @@ def lengths_held(found: Estimate, windows: Sequence[Any]) -> float:
 
 
 def _result(
-    found: Estimate,
     setting: Setting,
     compared: dict[str, Goodness],
-    repeated: Sequence[Repetition],
+    around: Repetitions,
+    ends: tuple[Repetitions, Repetitions] | None,
     records: Sequence[Record],
     rows: Sequence[Array],
     interface: Interface | None,
@@ -422,8 +434,12 @@ def _result(
     asked: int,
     cut_short: bool,
 ) -> FieldFit:
+    found, repeated = around.world, around.fits
     parameters = parameters_of(found, setting)
-    interval = intervals(found, setting, repeated, confidence)
+    done = len(repeated) + sum(len(one.fits) for one in ends or ())
+    if ends is not None and min(len(one.fits) for one in ends) < FEWEST:
+        ends = None
+    interval = intervals(around, ends, setting, confidence)
     misfit = {
         "marginal": float(np.mean([one.estimate.distance >= found.distance for one in repeated])),
         "spectrum": float(np.mean([one.estimate.roughness >= found.roughness for one in repeated])),
@@ -432,9 +448,9 @@ def _result(
     observed = tuple(observe(rows, setting.windows))
     held = lengths_held(found, setting.windows)
     texts = _doubts(found, setting, observed, misfit, held)
-    if len(repeated) < asked:
+    if done < asked:
         why = "the time was over" if cut_short else "the family could not be fitted to the others"
-        texts.append(f"intervals are from {len(repeated)} of {asked} repetitions: {why}")
+        texts.append(f"intervals are from {done} of {asked} repetitions: {why}")
     for text in texts:
         warn_accuracy(text)
     if interface is not None:
