@@ -49,7 +49,7 @@ _HOMES = {
     "combined_mean": "statistics.control_variates",
     "density": "statistics.densities",
     "quantiles": "statistics.quantiles",
-    "FieldFit": "inference.fit",
+    "FieldFit": "inference.field_fit",
     "fit_field": "inference.fit",
     "quantile_distance": "statistics.quantiles",
     "rice_distribution": "statistics.rice",

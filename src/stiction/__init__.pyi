@@ -36,12 +36,8 @@ from stiction.friction.exponential import ExponentialWeakening as ExponentialWea
 from stiction.friction.linear import SlipWeakening as SlipWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.inference.design import design_of_tests as design_of_tests
-from stiction.inference.fit import (
-    FieldFit as FieldFit,
-)
-from stiction.inference.fit import (
-    fit_field as fit_field,
-)
+from stiction.inference.field_fit import FieldFit as FieldFit
+from stiction.inference.fit import fit_field as fit_field
 from stiction.inference.infer import infer as infer
 from stiction.inference.peaks import read_peaks as read_peaks
 from stiction.inference.posterior import Posterior as Posterior

@@ -1,16 +1,14 @@
-"""A random field from measured profiles: the public function, its checks and its result."""
+"""A random field from measured profiles: the public function and its checks."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from stiction._brief import brief_html
 from stiction._checks import check_choice, check_instance, is_finite, is_real, is_whole
 from stiction._model import describe
 from stiction._progress import Meter, Show, check_time_limit
@@ -26,18 +24,17 @@ from stiction.inference.estimate import (
     make_windows,
     observe,
 )
-from stiction.inference.fit_figure import draw_fit
+from stiction.inference.field_fit import Details, FieldFit, Goodness
 from stiction.inference.marginal_fit import Family, family_of
 from stiction.inference.noisy_marginal import mean_log_likelihood
 from stiction.inference.records import Record, check_quantity, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.quantities import UNITS
-from stiction.random.random_field import RandomField, warn_if_inaccurate
+from stiction.random.resolution import warn_if_inaccurate
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
@@ -48,133 +45,6 @@ AT_LIMIT = 1e-3
 FEWEST = 20
 """Repetitions that tell a tail of errors."""
 HIGHEST_DEGREE = 3
-
-
-@dataclass(frozen=True)
-class Goodness:
-    """How well a family describes the values at a point.
-
-    Attributes
-    ----------
-    marginal
-        The member that fits best.
-    distance : float
-        Largest difference of the distribution functions (Kolmogorov).
-    score : float
-        Log likelihood of as many independent values as the record holds correlation lengths, less
-        the number of parameters; differences below about 2 mean nothing.
-    """
-
-    marginal: Any
-    distance: float
-    score: float
-
-
-@dataclass(frozen=True, eq=False)
-class FieldFit:
-    """A random field fitted to measured profiles, and how far it may be trusted.
-
-    Attributes
-    ----------
-    field : RandomField
-        To simulate with, without the measurement noise; it has the mean mode.
-    parameters : dict of str to float
-        What was estimated, in SI: ``marginal.*`` and ``spectrum.*`` by the names that study files
-        use, ``mean`` and ``standard_deviation`` of the field, ``efolding_length`` (m) at which the
-        correlation of z falls to 1/e, ``anisotropy``, and ``noise``, the standard deviation of the
-        measurement noise.
-    interval : dict of str to (float, float)
-        Of each of them, from the bootstrap.
-    confidence : float
-        Of the intervals.
-    repetitions : tuple of RandomField
-        The fits to records simulated from `field`: what another measurement might have given.
-    families : dict of str to Goodness
-        Of every family of marginals that was asked for.
-    misfit : dict of str to float
-        Shares of the repetitions that are as far from their own marginal, and spectrum, as the
-        data are from the fitted ones; small where a family does not suit.
-    lengths_held : float
-        Correlation lengths (on a plane, areas) that the records hold together.
-    warnings : tuple of str
-        What stands in the way of trusting it; empty if nothing does.
-    cut_short : bool
-        Whether `time_limit` ended the repetitions early.
-    """
-
-    field: RandomField
-    parameters: Mapping[str, float]
-    interval: Mapping[str, tuple[float, float]]
-    confidence: float
-    repetitions: tuple[RandomField, ...] = dataclasses.field(repr=False)
-    families: Mapping[str, Goodness] = dataclasses.field(repr=False)
-    misfit: Mapping[str, float] = dataclasses.field(repr=False)
-    lengths_held: float = dataclasses.field(repr=False)
-    quantity: str = dataclasses.field(repr=False)
-    _details: Details = dataclasses.field(repr=False)
-    warnings: tuple[str, ...] = ()
-    cut_short: bool = False
-
-    _repr_html_ = brief_html
-
-    def __str__(self) -> str:
-        unit = UNITS[self.quantity]
-        width = max(len(name) for name in self.parameters)
-        lines = [
-            f"{_title(self.field)} from {self.lengths_held:.3g} correlation lengths,"
-            f" {100 * self.confidence:g} % intervals"
-        ]
-        for name, value in self.parameters.items():
-            low, high = self.interval[name]
-            suffix = unit_of(name, unit)
-            lines.append(
-                f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g} {suffix}".rstrip()
-            )
-        lines.append(
-            f"  as far from its marginal as {100 * self.misfit['marginal']:.3g} % of simulated"
-            f" records, from its spectrum as {100 * self.misfit['spectrum']:.3g} %"
-        )
-        lines += [f"  ! {text}" for text in self.warnings]
-        return "\n".join(lines)
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def plot(self) -> Figure:
-        """Histogram and quantiles, spectrum with its band, correlation, and residuals.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Of five panels, as a notebook shows it; ``savefig`` writes it.
-        """
-        return draw_fit(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Details:
-    """What the figure needs of a fit."""
-
-    values: Array
-    records: tuple[Record, ...]
-    estimate: Estimate
-    setting: Setting
-    observed: tuple[Observed, ...]
-    repeated: tuple[Estimate, ...]
-
-
-def _title(found: RandomField) -> str:
-    marginal = getattr(found.marginal, "type", "marginal").replace("_", " ")
-    return f"{marginal} marginal, {found.spectrum.type.replace('_', ' ')} spectrum"
-
-
-def unit_of(name: str, unit: str) -> str:
-    """SI unit of a parameter of a field in `unit`; empty for pure numbers."""
-    last = name.rpartition(".")[2]
-    if last in ("correlation_length", "efolding_length"):
-        return "m"
-    stresses = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
-    return "" if last not in stresses or unit == "1" else unit
 
 
 def fit_field(

@@ -16,7 +16,7 @@ from stiction.quantities import UNITS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from stiction.inference.fit import Details, FieldFit
+    from stiction.inference.field_fit import Details, FieldFit
 
 INK, DATA, MODEL, ALARM = "#1a1a1a", "#7a7a7a", "#2a6f97", "#c8553d"
 SHOWN = 100

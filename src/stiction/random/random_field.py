@@ -22,7 +22,7 @@ from stiction.random.hermite import correlation_of_mapped, hermite_coefficients,
 from stiction.random.marginals import Marginal
 from stiction.random.modes import Modes, line_modes, plane_modes
 from stiction.random.quantile_table import from_normal
-from stiction.random.resolution import warn_if_inaccurate as warn_if_inaccurate
+from stiction.random.resolution import warn_if_inaccurate
 from stiction.random.spectra import Spectrum
 from stiction.random.spectral_density import lag_of_correlation
 from stiction.random.synthesis import gaussian_planes, gaussian_rows

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stiction import __version__
 from stiction.ensemble.files import write_whole
-from stiction.inference.fit import FieldFit, unit_of
+from stiction.inference.field_fit import FieldFit, unit_of
 from stiction.quantities import UNITS
 from stiction.report.page import ShownFigure, render
 from stiction.report.tables import Table

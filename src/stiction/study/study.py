@@ -42,7 +42,7 @@ from stiction.inference.settings import Inference
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.ensemble import Ensemble as Ensemble
+from stiction.study.ensemble import Ensemble
 from stiction.study.study_file import completed, read_sweep, read_toml, refuse_first_version
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
 

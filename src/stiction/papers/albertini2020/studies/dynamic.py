@@ -10,7 +10,8 @@ import xarray as xr
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.studies.ruptures import METHOD as WHOLE
 from stiction.papers.albertini2020.studies.study_cache import place_of
-from stiction.study.study import Ensemble, Study
+from stiction.study.ensemble import Ensemble
+from stiction.study.study import Study
 
 METHOD = dataclasses.replace(WHOLE, stop="runaway")
 """Loads and arrested events are what is asked for; the rest of each rupture would take as long."""
