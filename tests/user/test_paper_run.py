@@ -3,6 +3,7 @@
 import csv
 import re
 import shutil
+import time
 
 import matplotlib.image
 import numpy as np
@@ -130,9 +131,12 @@ def test_the_same_command_goes_on_where_it_was_interrupted(tmp_path, monkeypatch
         pass
 
     def interrupt(context):
+        while len(list((tmp_path / "studies").glob("*.nc"))) < 2:
+            time.sleep(0.05)
         raise Interrupted
 
     options = {**_options(), "full": False, "ruptures": 2, "only": ["problem", "growth"]}
+    options["workers"] = 3
     with monkeypatch.context() as patch:
         patch.setattr(studies.STUDIES["growth"], "compute", interrupt)
         with pytest.raises(Interrupted):

@@ -87,23 +87,43 @@ def test_warnings_and_progress_belong_to_their_study():
     assert told == [7, 7]
 
 
-def test_a_failure_ends_the_others_and_is_raised():
-    stopped = threading.Event()
+def test_what_is_under_way_is_finished_before_a_failure_is_raised():
+    failed = threading.Event()
 
     def fails(context):
+        failed.set()
         raise ValueError("this one")
+
+    def finishes(context):
+        assert failed.wait(20)
+        time.sleep(0.3)  # until the failure is known
+        return xr.Dataset()
+
+    def never(context):
+        raise AssertionError("began after a failure")
+
+    studies = [_study("a", fails, cost=3), _study("b", finishes, cost=2), _study("c", never)]
+    found = []
+    with pytest.raises(ValueError, match="this one"):
+        found.extend(study.name for study, _ in side_by_side(studies, _context(workers=2)))
+    assert found == ["b"]
+
+
+def test_who_leaves_early_abandons_the_rest():
+    stopped = threading.Event()
 
     def endless(context):
         try:
-            for _ in range(2000):
+            while True:
                 context.report(0)
                 time.sleep(0.01)
         finally:
             stopped.set()
-        raise AssertionError("was not abandoned")
 
-    with pytest.raises(ValueError, match="this one"):
-        list(side_by_side([_study("a", fails), _study("b", endless)], _context(workers=2)))
+    studies = [_study("a", lambda context: xr.Dataset()), _study("b", endless)]
+    results = side_by_side(studies, _context(workers=2))
+    assert next(results)[0].name == "a"
+    results.close()
     assert stopped.is_set()
 
 

@@ -57,6 +57,7 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
     Every study has a thread that leads it, and all share the threads that compute samples, so
     that no core is idle while one study only assembles its result. Results do not depend on what
     runs beside them. What the studies report is passed on from the thread that asks for results.
+    After a failure nothing more begins, and what is under way is finished before it is raised.
     Leaving the iteration early abandons the rest.
     """
     waiting = {study.name: study for study in studies}
@@ -65,6 +66,7 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
     running: dict[Future[xr.Dataset], tuple[Study, Context]] = {}
     reported: queue.SimpleQueue[int] = queue.SimpleQueue()
     abandoned = threading.Event()
+    failures: list[BaseException] = []
 
     def report(work: int) -> None:
         if abandoned.is_set():
@@ -100,12 +102,18 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
                     context.report(reported.get())
                 for future in ended:
                     study, own = running.pop(future)
+                    if failure := future.exception():
+                        failures.append(failure)
+                        waiting.clear()
+                        continue
                     done[study.name] = context.results[study.name] = future.result()
                     context.warnings.update(own.warnings)
                     begin()
                     yield study, done[study.name]
             while not reported.empty():
                 context.report(reported.get())
+            if failures:
+                raise failures[0]
         finally:
             abandoned.set()
 
