@@ -54,6 +54,13 @@ def test_lengths_of_start_and_arrest():
     assert st.griffith_length(uniform, 0.9e6, 0.3, arrest=True, **options) == np.inf
 
 
+def test_cracks_shorter_than_any_that_is_looked_at():
+    """A short crack under a uniform drop: 2a = 4 G* Gamma/(pi drop^2)."""
+    energy, stress = 1e-9, 0.7e6
+    exact = 4.0 * PROBLEM.effective_modulus * energy / (np.pi * stress**2)
+    assert st.griffith_length(PROBLEM, stress, energy) == pytest.approx(exact, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     ("call", "key"),
     [

@@ -4,6 +4,7 @@ import csv
 import re
 import shutil
 import time
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -190,7 +191,25 @@ def test_all_mistakes_at_once(tmp_path):
     for key in ("samples", "seed", "workers", "out"):
         assert f"{key}:" in text
     assert len(caught.value.problems) == 5
+    for key, wrong in {
+        "out": (None, 3, ""),
+        "setting": (5, {"nodes": 3}),
+        "only": (5, []),
+        "seed": (2**80, True),
+        "workers": (True,),
+        "quick": ("no",),
+        "full": (1,),
+        "progress": ("yes",),
+    }.items():
+        for value in wrong:
+            options = {"out": tmp_path / "new", key: value}
+            with pytest.raises(st.InputError, match=f"^{key}: "):
+                st.paper.run(**options)
+    assert not (tmp_path / "new").exists()
     with pytest.raises(st.InputError, match="needs full"):
         st.paper.run(tmp_path, only="fidelity")
     with pytest.raises(st.InputError, match="ruptures"):
         st.paper.run(tmp_path, full=True, ruptures=2)
+    if Path("/proc").exists():
+        with pytest.raises(st.InputError, match="out: /proc/stiction cannot be made"):
+            st.paper.run("/proc/stiction")

@@ -2,18 +2,22 @@
 
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
+from threadpoolctl import threadpool_info
 
 import stiction as st
-from stiction.errors import warn_accuracy
+from stiction._blas import one_blas_thread
+from stiction.errors import warn_accuracy, warn_user
 from stiction.papers.albertini2020.setting import Setting
-from stiction.papers.albertini2020.studies import compute
+from stiction.papers.albertini2020.studies import STUDIES, compute
 from stiction.papers.albertini2020.studies.context import Context
 from stiction.papers.albertini2020.studies.side_by_side import side_by_side
+from stiction.papers.albertini2020.studies.study_cache import place_of
 
 
 def _study(name, compute, needs=(), cost=1):
@@ -125,6 +129,50 @@ def test_who_leaves_early_abandons_the_rest():
     assert next(results)[0].name == "a"
     results.close()
     assert stopped.is_set()
+
+
+def test_threads_of_blas_are_what_they_were_however_it_ends():
+    """One thread while anybody needs that; the limits end in another order than they began."""
+
+    def threads():
+        return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+
+    before = threads()
+    first, second = one_blas_thread(), one_blas_thread()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert set(threads()) == {1}
+    second.__exit__(None, None, None)
+    assert threads() == before
+
+    def tell(work):
+        raise KeyboardInterrupt
+
+    context = _context(workers=2, report=tell)
+    with pytest.raises(KeyboardInterrupt):
+        compute(["monte_carlo", "disorder"], context)
+    assert threads() == before
+
+
+def test_warnings_outside_ensembles_are_kept_and_others_are_the_callers():
+    def warns(context):
+        warn_accuracy("coarse")
+        warn_user("strange unit", st.UnitWarning)
+        return xr.Dataset()
+
+    context = _context(workers=1)
+    with pytest.warns(st.UnitWarning, match="strange") as caught:
+        list(side_by_side([_study("a", warns)], context))
+    assert context.warnings == {"Study a: coarse": 1}
+    assert [warning.filename for warning in caught] == [__file__]
+
+
+def test_what_is_kept_does_not_depend_on_how_the_folder_is_called(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    absolute, relative = _context(folder=tmp_path / "run"), _context(folder=Path("run"))
+    for study in STUDIES.values():
+        assert place_of(study, absolute).name == place_of(study, relative).name
 
 
 def test_seconds_are_processor_time_wherever_it_was_spent():

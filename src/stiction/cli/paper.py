@@ -14,7 +14,13 @@ def paper(
     out: Annotated[Path, typer.Option(help="Folder for results, figures and the report.")] = Path(
         "stiction-paper"
     ),
-    samples: Annotated[int, typer.Option(help="Samples for each correlation length.")] = 10_000,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            help="Samples for each correlation length: 10,000, or 500 with --quick.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the ensemble.")] = 0,
     quick: Annotated[
         bool, typer.Option("--quick", help="500 samples, few ruptures: a first look.")

@@ -182,9 +182,10 @@ def griffith_length(
     whole = problem.interface.extent * np.linspace(0.0, 1.0, FINEST + 2)[1:-1]
     resting = _intensity_factors(problem, _resting_stress(problem), whole, centre)
     unit = _intensity_factors(problem, problem.load_profile, whole, centre)
+    from_zero = np.append(0.0, whole)  # where nothing is released
     lengths = np.array(
         [
-            _crossing(whole, rate.min(axis=1) - fracture_energy, arrest)
+            _crossing(from_zero, np.append(0.0, rate.min(axis=1)) - fracture_energy, arrest)
             for rate in (_release_rate(problem, resting + tau * unit) for tau in loads.ravel())
         ]
     )
@@ -202,7 +203,5 @@ def _crossing(lengths: Array, excess: Array, arrest: bool) -> float:
         if after.size == 0:
             return np.inf
         first += int(after[0])
-    if first == 0:
-        return float(lengths[0])
     low, high = excess[first - 1], excess[first]
     return float(lengths[first - 1] + (lengths[first] - lengths[first - 1]) * low / (low - high))

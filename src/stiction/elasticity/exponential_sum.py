@@ -15,8 +15,8 @@ import itertools
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
+from stiction._blas import one_blas_thread
 from stiction.elasticity.memory_kernels import arc_quadrature, exponential_sum
 from stiction.errors import InputError
 
@@ -213,7 +213,7 @@ def fit_exponentials(
     if problems:
         raise InputError(problems)
     # The matrices are small: more BLAS threads only wait for each other.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_blas_thread():
         return _search(mode, eta, tolerance, t_max)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -243,17 +244,16 @@ def run_plans(
     done = np.zeros((len(plans), samples), dtype=np.bool_)
     with Meter(method_name(plans), total, progress, time_limit=time_limit) as meter:
         spans = [Span(point, first, samples) for point in range(len(plans))]
-        work = share_out(plans, spans, executor=executor, workers=workers)
-        for outcome in work:
-            if outcome is not None:
-                if outcome.failures:
-                    raise_failure(outcome.failures[0])
-                gathered.add(outcome)
-                done[outcome.point, outcome.samples - first] = True
-                meter.advance(outcome.count)
-            if meter.over:
-                work.close()
-                break
+        with closing(share_out(plans, spans, executor=executor, workers=workers)) as work:
+            for outcome in work:
+                if outcome is not None:
+                    if outcome.failures:
+                        raise_failure(outcome.failures[0])
+                    gathered.add(outcome)
+                    done[outcome.point, outcome.samples - first] = True
+                    meter.advance(outcome.count)
+                if meter.over:
+                    break
     result = gathered.dataset(attributes, axes)
     return result if done.all() else _cut_short(result, done)
 

@@ -10,8 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from contextlib import ExitStack, suppress
 from typing import Any, NamedTuple
 
-from threadpoolctl import threadpool_limits
-
+from stiction._blas import one_blas_thread
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome, do_work, process_mark
@@ -124,7 +123,7 @@ def share_out(
 
     with ExitStack() as stack:
         # The kernels are the parallel part; threads of BLAS below them only get in the way.
-        stack.enter_context(threadpool_limits(limits=1, user_api="blas"))
+        stack.enter_context(one_blas_thread())
         if executor is None and workers == 1:
             while waiting:
                 span = cut(1)

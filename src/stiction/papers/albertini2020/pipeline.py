@@ -12,6 +12,7 @@ from typing import Any
 
 import xarray as xr
 
+from stiction._checks import check_flag, check_instance, check_progress
 from stiction._files import write_atomically
 from stiction._model import describe
 from stiction._progress import Meter
@@ -28,18 +29,20 @@ from stiction.papers.albertini2020.summary import assemble, claims_table
 from stiction.plot.style import paper_style
 from stiction.report.page import ShownFigure
 
+SAMPLES = 10_000
 QUICK = 500
 FEWEST = 64
 RUNS = 20
 """Ruptures at each correlation length, as in the paper."""
 _FEW = 2
 _FEWEST_DYNAMIC = 16
+_LARGEST = 2**63  # that a file can hold
 _DRAWING = 10_000  # work of a figure, for progress
 
 
 def run(
     out: str | Path,
-    samples: int = 10_000,
+    samples: int | None = None,
     seed: int = 0,
     quick: bool = False,
     full: bool = False,
@@ -57,12 +60,13 @@ def run(
         Folder, made if it is not there: `report.html`, `results.nc` (one group a study),
         `figures/*.png` and `*.pdf`, `tables/*.csv`.
     samples : int
-        For each correlation length of the Monte Carlo study, at least 64; side studies take a
-        quarter.
+        For each correlation length of the Monte Carlo study, at least 64 (10,000 by default, 500
+        if `quick`); side studies take a quarter.
     seed : int
         Not negative. The same seed gives the same numbers, whatever the workers.
     quick : bool
-        500 samples and two ruptures at each correlation length, for a first look.
+        500 samples and two ruptures at each correlation length, unless they are given, for a first
+        look.
     full : bool
         Also the Monte Carlo study by elastodynamics: an ensemble of ruptures at every correlation
         length, 0.03 s each on one core: for all 40,000 ten minutes on two.
@@ -95,14 +99,22 @@ def run(
         Naming all that is wrong, unknown figures with the nearest valid name.
     """
     started = time.perf_counter()
-    folder, figures = _checked(out, samples, seed, workers, only, full, ruptures)
-    count = QUICK if quick else samples
+    count = (QUICK if quick else SAMPLES) if samples is None else samples
+    folder, figures = _checked(
+        out, count, seed, quick, full, ruptures, workers, only, progress, setting
+    )
+    try:
+        for name in ("figures", "tables"):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"out: {folder} cannot be made: {error.strerror}") from None
+    few = _FEW if quick else RUNS
     context = Context(
         setting or Setting(),
         count,
         seed,
         workers,
-        ruptures=_FEW if quick else RUNS if full or ruptures is None else ruptures,
+        ruptures=few if full or ruptures is None else ruptures,
         dynamic=(ruptures or count) if full else 0,
         folder=folder,
     )
@@ -131,33 +143,60 @@ def run(
 
 
 def _checked(
-    out: Any, samples: Any, seed: Any, workers: Any, only: Any, full: bool, ruptures: Any
+    out: Any,
+    samples: Any,
+    seed: Any,
+    quick: Any,
+    full: Any,
+    ruptures: Any,
+    workers: Any,
+    only: Any,
+    progress: Any,
+    setting: Any,
 ) -> tuple[Path, list[Figure]]:
-    problems = []
+    problems: list[str] = []
+
+    def check(test: Callable[..., Any], *given: Any) -> Any:
+        try:
+            return test(*given)
+        except InputError as error:
+            problems.extend(error.problems)
+
+    for name, value in (("quick", quick), ("full", full)):
+        check(check_flag, name, value)
+    check(check_progress, progress)
+    if setting is not None:
+        check(check_instance, "setting", setting, Setting)
     counts = [("samples", samples, FEWEST), ("seed", seed, 0)]
     if ruptures is not None:
         counts.append(("ruptures", ruptures, _FEWEST_DYNAMIC if full else _FEW))
+    if workers is not None:
+        counts.append(("workers", workers, 1))
     for name, value, smallest in counts:
         if isinstance(value, bool) or not isinstance(value, int) or value < smallest:
             problems.append(f"{name}: must be a whole number >= {smallest}, got {describe(value)}")
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
-    figures: list[Figure] = []
-    try:
-        figures = select(only)
-    except InputError as error:
-        problems += error.problems
+        elif value >= _LARGEST:
+            problems.append(f"{name}: must be below 2^63, got {describe(value)}")
+    figures: list[Figure] = check(select, only) or []
     if only is not None and not full and any("dynamic" in figure.needs for figure in figures):
         problems.append("only: the Monte Carlo study by elastodynamics needs full")
-    folder = Path(out)
-    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not existing.is_dir():
-        problems.append(f"out: {existing} is a file; give a folder")
-    elif not os.access(existing, os.W_OK):
-        problems.append(f"out: {existing} cannot be written")
+    folder = check(_folder, out)
     if problems:
         raise InputError(problems)
     return folder, figures
+
+
+def _folder(out: Any) -> Path:
+    """The folder, made."""
+    if not isinstance(out, str | os.PathLike) or not str(out):
+        raise InputError(f"out: must be the path of a folder, got {describe(out)}")
+    folder = Path(out)
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise InputError(f"out: {existing} is a file; give a folder")
+    if not os.access(existing, os.W_OK):
+        raise InputError(f"out: {existing} cannot be written")
+    return folder
 
 
 def _claims_of(figures: list[Figure]) -> list[Claim]:
@@ -170,8 +209,6 @@ def _compute_and_draw(
     needed: set[str], figures: list[Figure], context: Context, folder: Path
 ) -> tuple[Data, dict[str, ShownFigure]]:
     """The studies, and each figure as soon as those are done that it shows."""
-    for name in ("figures", "tables"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
     found: dict[str, xr.Dataset] = {}
     data = Data(context.setting, context.samples, context.seed, found)
     drawn: dict[str, ShownFigure] = {}

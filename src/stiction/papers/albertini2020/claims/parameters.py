@@ -248,11 +248,13 @@ def griffith_length(data: Data) -> Measured:
     rule=All(Below(limits.AS_ONE), Below(limits.RESOLVED)),
 )
 def enough_samples(data: Data) -> Measured:
-    """Relative standard errors of mean and standard deviation at the number of samples taken."""
-    stress = [data.at(ratio)["critical_stress"].values for ratio in data.ratios]
+    """Relative standard errors of mean and standard deviation of 10,000 samples."""
+    count = data.samples
+    fewer = math.sqrt(count / 10_000.0)
 
     def relative(each: Estimate, factor: float) -> Estimate:
-        return Estimate(factor * each.error / each.value)
+        found = factor * fewer * each.error / each.value
+        return Estimate(found, found / math.sqrt(2.0 * count))  # as a deviation is known
 
     return Measured(
         (
@@ -262,5 +264,6 @@ def enough_samples(data: Data) -> Measured:
                 standard_deviation(data.at(r)["critical_stress"].values), 1.0),
                 label="error of the spread"),
         ),
-        one("samples", float(stress[0].size)),
+        one("samples", float(count)),
+        comment="standard errors, told from the samples taken",
     )  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from stiction._model import describe
 from stiction.errors import InputError, unknown_name
 from stiction.papers.albertini2020.figures import (
     driving,
@@ -57,7 +58,11 @@ def select(only: Iterable[str] | None) -> list[Figure]:
     """
     if only is None:
         return list(FIGURES.values())
+    if not isinstance(only, Iterable):
+        raise InputError(f"only: must be names of figures, got {describe(only)}")
     names = [only] if isinstance(only, str) else list(only)
+    if not names:
+        raise InputError(f"only: name at least one figure (valid: {', '.join(FIGURES)})")
     problems = [unknown_name("only", str(name), FIGURES) for name in names if name not in FIGURES]
     if problems:
         raise InputError(problems)

@@ -13,7 +13,7 @@ import xarray as xr
 
 from stiction.ensemble.monte_carlo import monte_carlo
 from stiction.ensemble.scheduler import usable_cores
-from stiction.errors import AccuracyWarning, collect_warnings, warn_user
+from stiction.errors import AccuracyWarning, Warned, collect_warnings, warn_user
 from stiction.papers.albertini2020.setting import Setting
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -134,10 +134,17 @@ class Context:
 
         with collect_warnings() as caught:
             result = compute(tell)
-        for message, category in caught:
-            if issubclass(category, AccuracyWarning):
-                text = f"{self.title}: {message}"
+        for warned in self.note(caught):
+            warn_user(*warned)
+        return result
+
+    def note(self, caught: Iterable[Warned]) -> list[Warned]:
+        """Keep the accuracy warnings among some, with the study's title; return the others."""
+        others = []
+        for warned in caught:
+            if issubclass(warned.category, AccuracyWarning):
+                text = f"{self.title}: {warned.message}"
                 self.warnings[text] = self.warnings.get(text, 0) + 1
             else:
-                warn_user(message, category)
-        return result
+                others.append(warned)
+        return others

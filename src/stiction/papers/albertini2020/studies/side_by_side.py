@@ -12,9 +12,10 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from typing import Any, TypeVar
 
 import xarray as xr
-from threadpoolctl import threadpool_limits
 
+from stiction._blas import one_blas_thread
 from stiction.ensemble.scheduler import usable_cores
+from stiction.errors import Warned, collect_warnings, warn_user
 from stiction.papers.albertini2020.registry import Study
 from stiction.papers.albertini2020.studies.context import Context
 
@@ -63,7 +64,7 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
     waiting = {study.name: study for study in studies}
     done = dict(context.results)
     cores = context.workers or usable_cores()
-    running: dict[Future[xr.Dataset], tuple[Study, Context]] = {}
+    running: dict[Future[tuple[xr.Dataset, list[Warned]]], tuple[Study, Context]] = {}
     reported: queue.SimpleQueue[int] = queue.SimpleQueue()
     abandoned = threading.Event()
     failures: list[BaseException] = []
@@ -90,7 +91,7 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
 
     # BLAS has no threads of its own meanwhile: their number would change last bits.
     with (
-        threadpool_limits(limits=1, user_api="blas"),
+        one_blas_thread(),
         ThreadPoolExecutor(cores) as threads,
         ThreadPoolExecutor(cores) as leaders,
     ):
@@ -106,8 +107,11 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
                         failures.append(failure)
                         waiting.clear()
                         continue
-                    done[study.name] = context.results[study.name] = future.result()
+                    dataset, others = future.result()
+                    done[study.name] = context.results[study.name] = dataset
                     context.warnings.update(own.warnings)
+                    for warned in others:  # from here: its thread knows no line of the caller
+                        warn_user(*warned)
                     begin()
                     yield study, done[study.name]
             while not reported.empty():
@@ -118,10 +122,13 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
             abandoned.set()
 
 
-def _compute(study: Study, context: Context) -> xr.Dataset:
+def _compute(study: Study, context: Context) -> tuple[xr.Dataset, list[Warned]]:
+    """The result, and warnings that are not about its accuracy, which the context keeps."""
     begin = time.thread_time()
-    dataset = study.compute(context)
+    with collect_warnings() as caught:
+        dataset = study.compute(context)
+    others = context.note(caught)
     seconds = time.thread_time() - begin
     if isinstance(context.executor, _Share):
         seconds += context.executor.seconds
-    return dataset.assign_attrs(title=study.title, seconds=seconds)
+    return dataset.assign_attrs(title=study.title, seconds=seconds), others

@@ -40,7 +40,11 @@ def place_of(study: Study, context: Context, depends: tuple[str, ...] | None = N
         depends = getattr(study, "depends", ("samples", "seed"))
     defined = {
         "study": study.name,
-        "needs": [str(place_of(_named(name), context)) for name in getattr(study, "needs", ())],
+        "needs": [
+            place.name
+            for name in getattr(study, "needs", ())
+            if (place := place_of(_named(name), context)) is not None
+        ],
         "setting": to_plain(context.setting),
         "sources": _sources(),
         **{name: getattr(context, name) for name in depends},
