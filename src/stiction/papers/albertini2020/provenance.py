@@ -99,7 +99,10 @@ def provenance(data: Data, seconds: float) -> list[tuple[str, str]]:
         ("Python", f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
         ("Packages", ", ".join(versions)),
         ("Time taken", f"{seconds:.1f} s before this page was written"),
-        ("Studies", times or "none"),
+        (
+            "Processor time",
+            f"{times} (of all cores, with the compilation met on the way)" if times else "none",
+        ),
         ("Results", "results.nc (one group a study), tables/*.csv, figures/*.png and *.pdf"),
         (
             "Local criterion",

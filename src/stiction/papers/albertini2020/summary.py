@@ -162,8 +162,8 @@ def _points(data: Data, findings: Judged) -> list[str]:
             100.0 * float(misplaced(data, r).mean()) for r in (data.ratios[0], data.ratios[-1])
         ]
         points.append(
-            "Exact equilibrium with every interaction between patches lowers this by"
-            f" {bias[0]:.2g} % of the mean strength at the shortest and {bias[1]:.1g} % at the"
+            "With every interaction between patches, by exact equilibrium, this changes by"
+            f" {-bias[0]:.2g} % of the mean strength at the shortest and {-bias[1]:.1g} % at the"
             " longest correlation length; the local criterion puts the onset in the wrong place in"
             f" {wrong[0]:.2g} and {wrong[1]:.2g} % of samples."
         )
