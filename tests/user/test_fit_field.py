@@ -10,6 +10,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import stiction as st
+from stiction._progress import Meter
 from stiction.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -131,12 +132,12 @@ def test_every_wrong_option_is_named_at_once():
     with pytest.raises(st.InputError) as raised:
         st.fit_field(
             VALUES, PIECE, marginal="lognormul", spectrum={"type": "power_law", "exponnt": 2.0},
-            detrend=7, noise=-1.0, gaps="fill", bootstrap=3, confidence=90, seed=-1,
+            detrend=7, noise=-1.0, gaps="fill", bootstrap=3, confidence=90, seed=-1, progress="x",
         )  # fmt: skip
     text = str(raised.value)
     for part in (
         "did you mean 'lognormal'", "did you mean 'exponent'", "detrend", "noise", "gaps",
-        "bootstrap", "confidence", "seed",
+        "bootstrap", "confidence", "seed", "progress",
     ):  # fmt: skip
         assert part in text
     with pytest.raises(st.InputError, match="anisotropy: is of maps"):
@@ -153,7 +154,40 @@ def test_a_record_of_few_lengths_is_warned_of():
 def test_a_family_that_does_not_suit_is_warned_of():
     two_sided = np.where(np.median(VALUES) < VALUES, VALUES + 2e6, VALUES)
     with pytest.warns(st.AccuracyWarning, match="far from any lognormal marginal"):
-        st.fit_field(labelled(two_sided), **QUICK)
+        st.fit_field(labelled(two_sided), **QUICK | {"bootstrap": 99})
+
+
+def test_twenty_repetitions_cannot_tell_one_per_cent():
+    """None further of 20 is of a probability of 1 in 21; a warning of 99 % would be false."""
+    two_sided = np.where(np.median(VALUES) < VALUES, VALUES + 2e6, VALUES)
+    with pytest.warns(st.AccuracyWarning, match="none of 20 .* 99 repetitions can"):
+        fit = st.fit_field(labelled(two_sided), **QUICK)
+    assert fit.misfit["marginal"] == 0.0
+    assert not any("far from any" in text for text in fit.warnings)
+    assert "of 20 simulated records" in str(fit)
+
+
+def stop_after(monkeypatch, count):
+    """The time is over after so many repetitions."""
+    monkeypatch.setattr(Meter, "over", property(lambda meter: meter.done >= count))
+
+
+def test_time_for_too_few_repetitions_is_an_error(monkeypatch):
+    shown = []
+    stop_after(monkeypatch, 7)
+    with pytest.raises(st.InputError, match="over after 7 of 60 .* at least 20; allow more time"):
+        st.fit_field(
+            VALUES, PIECE, **QUICK | {"progress": lambda *at: shown.append(at), "workers": 1}
+        )
+    assert shown[-1] == (7, 60)  # the numbers that progress shows
+
+
+def test_intervals_cut_short_say_what_they_rest_on(monkeypatch):
+    stop_after(monkeypatch, 45)  # 5 of the third field are too few to be used
+    with pytest.warns(st.AccuracyWarning, match="from 20 of 60 repetitions: the time was over"):
+        fit = st.fit_field(VALUES, PIECE, **QUICK, workers=1)
+    assert fit.cut_short
+    assert "from 20 of 60 repetitions" in str(fit)
 
 
 def test_noise_that_hides_the_spectrum_is_warned_of():
