@@ -101,9 +101,10 @@ class FieldFit:
             lines.append(
                 f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g} {suffix}".rstrip()
             )
+        marginal, spectrum = (100.0 * self.misfit[name] for name in ("marginal", "spectrum"))
         lines.append(
-            f"  as far from its marginal as {100 * self.misfit['marginal']:.3g} % of"
-            f" {len(self.repetitions)} simulated records, from its spectrum as {100 * self.misfit['spectrum']:.3g} %"
+            f"  as far from its marginal as {marginal:.3g} % of {len(self.repetitions)} simulated"
+            f" records, from its spectrum as {spectrum:.3g} %"
         )
         lines += [f"  ! {text}" for text in self.warnings]
         return "\n".join(lines)
