@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import stiction as st
 from stiction._progress import Meter
 from stiction.cli.app import app
+from stiction.inference import bootstrap
 
 ROOT = Path(__file__).parents[2]
 FIELD = st.RandomField(
@@ -284,3 +285,64 @@ def test_heights_of_a_topography_need_a_map_and_keep_their_unit():
     np.testing.assert_allclose(found, expected)
     fit = st.fit_field(found, gaps="skip", **QUICK)
     assert fit.field.mean == pytest.approx(np.nanmean(expected), rel=0.02)
+
+
+def bounded(noise):
+    """A rough field between bounds, fitted by its bounds and its exponent too."""
+    truth = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        st.PowerLawSpectrum(2e-3, exponent=1.0, power_kept=0.99),
+    )
+    interface = st.Interface(length=0.05, nodes=256)
+    values = truth.sample(interface, samples=1, seed=3)[0, :128]
+    options = QUICK | {"marginal": "beta", "spectrum": "power_law", "noise": noise}
+    return values, st.fit_field(labelled(values, interface.x[:128]), **options)
+
+
+@pytest.mark.slow
+def test_intervals_hold_nothing_that_cannot_be():
+    values, fit = bounded(noise=True)
+    interval = fit.interval
+    # Noise may have carried values beyond the bounds, by no more than the most there may be of it.
+    share = 1.0 - (interval["noise"][1] / values.std()) ** 2
+    quiet = values.mean() + np.sqrt(share) * (values - values.mean())
+    assert interval["marginal.low"][1] <= quiet.min() * (1.0 + 1e-9)
+    assert interval["marginal.high"][0] >= quiet.max() * (1.0 - 1e-9)
+    # The estimate is the end of the range; repetitions end there too, which tells nothing.
+    assert interval["spectrum.exponent"] == (0.65, 16.0)
+    assert re.search(r"exponent +16 +0.65 to 16 \(searched from 0.65 to 16\)", str(fit))
+
+
+def test_bounds_lie_outside_of_values_without_noise():
+    values, fit = bounded(noise=False)
+    assert fit.interval["marginal.low"][1] <= values.min()
+    assert fit.interval["marginal.high"][0] >= values.max()
+    assert fit.interval["spectrum.exponent"][0] >= 0.65
+    assert fit.interval["spectrum.exponent"][1] <= 16.0
+    for name in ("marginal.low", "marginal.high", "spectrum.exponent"):
+        assert fit.interval[name][0] < fit.interval[name][1]
+
+
+def test_the_scale_of_a_uniform_marginal_spans_the_values():
+    fit = st.fit_field(labelled(), **QUICK | {"marginal": "uniform"})
+    least, most = VALUES.min(), VALUES.max()
+    limits = bootstrap._limits(fit.parameters, fit._details.estimate, VALUES)
+    assert limits["marginal.loc"] == (-np.inf, least)
+    assert limits["marginal.scale"] == (pytest.approx(most - least), np.inf)
+    normal = st.fit_field(labelled(), **QUICK | {"marginal": "normal"})  # has no bounds
+    assert bootstrap._limits(normal.parameters, normal._details.estimate, VALUES) == {}
+
+
+@pytest.mark.parametrize(
+    ("interval", "limits", "cut"),
+    [
+        ((1.0, 2.0), (0.65, 16.0), (1.0, 2.0)),
+        ((1.0, 350.0), (0.65, 16.0), (1.0, 16.0)),
+        ((15.999, 350.0), (0.65, 16.0), (0.65, 16.0)),
+        ((-4.0, 3.0), (2.0, np.inf), (2.0, 3.0)),
+        ((-4.0, 1.0), (2.0, np.inf), (2.0, 2.5)),  # the estimate
+        ((2.0, 2.0001), (2.0, np.inf), (2.0, 2.0001)),
+    ],
+)
+def test_intervals_are_cut(interval, limits, cut):
+    assert bootstrap._cut(interval, limits, 2.5) == cut

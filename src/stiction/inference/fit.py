@@ -152,7 +152,11 @@ def fit_field(
     Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. Upper and lower ends
     come from fields that belong there, of longer and shorter correlation (one step of a test
     inversion; Carpenter, 1999), which matters for short records. That of the noise is
-    of its variance, by estimates that may be negative, and is cut off at zero last.
+    of its variance, by estimates that may be negative, and is cut off at zero last. Likewise cut
+    off are those of a marginal's bounds where values lie beyond (drawn together by the greatest
+    noise of its interval), and those of an exponent and of an anisotropy at the ends of the ranges
+    that are searched, 0.65 to 16 and 0.05 to 20, which is said where they reach one; of a parameter
+    that the data do not tell the interval is all of its range.
 
     Examples
     --------
@@ -326,12 +330,13 @@ def _result(
     if ends is not None and min(len(one.fits) for one in ends) < FEWEST:
         ends = None
     used = len(repeated) + sum(len(one.fits) for one in ends or ())
-    interval = intervals(around, ends, setting, confidence)
+    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
+    values = np.concatenate(rows)
+    interval = intervals(around, ends, setting, confidence, values)
     further = {
         "marginal": sum(one.estimate.distance >= found.distance for one in repeated),
         "spectrum": sum(one.estimate.roughness >= found.roughness for one in repeated),
     }
-    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
     observed = tuple(observe(rows, setting.windows))
     held = lengths_held(found, setting.windows)
     texts = _doubts(found, setting, observed, held) + _misfits(
@@ -346,7 +351,7 @@ def _result(
         found.field.modes(interface)
         warn_if_inaccurate(found.field, interface)
     details = Details(
-        np.concatenate(rows), tuple(records), found, setting, observed,
+        values, tuple(records), found, setting, observed,
         tuple(one.estimate for one in repeated),
     )  # fmt: skip
     return FieldFit(
