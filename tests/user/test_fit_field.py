@@ -346,3 +346,12 @@ def test_the_scale_of_a_uniform_marginal_spans_the_values():
 )
 def test_intervals_are_cut(interval, limits, cut):
     assert bootstrap._cut(interval, limits, 2.5) == cut
+
+
+@pytest.mark.parametrize(("name", "side"), [("marginal.low", -1.0), ("marginal.high", 1.0)])
+def test_bounds_stay_on_their_side_of_the_mean(name, side):
+    values = {"mean": 1.0, "marginal.low": 0.6, "marginal.high": 1.6}
+    at = bootstrap._scaled(name, values)
+    assert bootstrap._unscaled(name, at, values) == pytest.approx(values[name])
+    for step in (-3.0, 3.0):
+        assert side * (bootstrap._unscaled(name, at + step, values) - values["mean"]) > 0.0

@@ -15,8 +15,10 @@ from stiction.errors import InputError
 from stiction.inference.estimate import Estimate, Setting, estimate, simulate
 from stiction.inference.spectrum_fit import ANISOTROPIES, EXPONENTS
 
-PLACES = ("mean", "marginal.mean", "marginal.low", "marginal.high", "marginal.loc")
-"""Parameters that say where something is; all others are positive and live on a logarithm."""
+PLACES = ("mean", "marginal.mean", "marginal.loc")
+"""Parameters that say where something is; all others live on a logarithm."""
+SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
+"""On which side of the mean a bound lies; what lives on a logarithm is its distance from there."""
 
 RANGES = {"spectrum.exponent": EXPONENTS, "anisotropy": ANISOTROPIES}
 """Between which ends parameters are looked for, and intervals cut off."""
@@ -128,7 +130,7 @@ def at_ends(
     estimated = parameters_of(found, setting)
     full = f"spectrum.{name}"
     errors = _errors(full, around, setting)
-    at, width = _scaled(full, estimated[full]), _width(full, estimated)
+    at, width = _scaled(full, estimated), _width(full, estimated)
     first = _ends(at, width, errors, errors, confidence)
     place = family.free.index(name)
 
@@ -184,13 +186,14 @@ def intervals(
             result[name] = (math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0)))
             continue
         shorter, longer = ends or (around, around)
-        own = [_scaled(name, one.parameters[name]) for one in around.fits]
+        own = [_scaled(name, one.parameters) for one in around.fits]
         if np.dot(np.array(own) - np.mean(own), np.array(lengths) - np.mean(lengths)) < 0.0:
             shorter, longer = longer, shorter
-        at, width = _scaled(name, estimated[name]), _width(name, estimated)
+        at, width = _scaled(name, estimated), _width(name, estimated)
         both = _errors(name, shorter, setting), _errors(name, longer, setting)
         low, high = _ends(at, width, *both, confidence)
-        result[name] = (_unscaled(name, low), _unscaled(name, high))
+        low, high = sorted(_unscaled(name, end, estimated) for end in (low, high))
+        result[name] = (low, high)
     noise = result["noise"][1] if "noise" in result else found.model.noise
     for name, limits in _limits(estimated, found, setting.marginal.quiet(values, noise)).items():
         result[name] = _cut(result[name], limits, estimated[name])
@@ -235,9 +238,9 @@ def _cut(
 
 def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
     """Of a parameter on its own scale, in units of their widths."""
-    truth = _scaled(name, parameters_of(repeated.world, setting)[name])
+    truth = _scaled(name, parameters_of(repeated.world, setting))
     return [
-        (_scaled(name, one.parameters[name]) - truth) / _width(name, one.parameters)
+        (_scaled(name, one.parameters) - truth) / _width(name, one.parameters)
         for one in repeated.fits
     ]
 
@@ -272,15 +275,21 @@ def _width(name: str, values: Mapping[str, float]) -> float:
     return root * values["standard_deviation"] if name in PLACES else root
 
 
-def _scaled(name: str, value: float) -> float:
+def _scaled(name: str, values: Mapping[str, float]) -> float:
+    """A parameter on the scale on which its error is about normal."""
     if name in PLACES:
-        return value
-    shift = 0.5 if name.endswith("exponent") else 0.0
-    return math.log(max(value - shift, 1e-300))
+        return values[name]
+    return math.log(max(SIDES.get(name, 1.0) * (values[name] - _origin(name, values)), 1e-300))
 
 
-def _unscaled(name: str, value: float) -> float:
+def _unscaled(name: str, scaled: float, values: Mapping[str, float]) -> float:
     if name in PLACES:
-        return value
-    shift = 0.5 if name.endswith("exponent") else 0.0
-    return shift + math.exp(value)
+        return scaled
+    return _origin(name, values) + SIDES.get(name, 1.0) * math.exp(scaled)
+
+
+def _origin(name: str, values: Mapping[str, float]) -> float:
+    """From where a logarithm counts."""
+    if name in SIDES:
+        return values["mean"]
+    return 0.5 if name.endswith("exponent") else 0.0

@@ -152,7 +152,8 @@ def fit_field(
     Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. Upper and lower ends
     come from fields that belong there, of longer and shorter correlation (one step of a test
     inversion; Carpenter, 1999), which matters for short records. That of the noise is
-    of its variance, by estimates that may be negative, and is cut off at zero last. Likewise cut
+    of its variance, by estimates that may be negative, and is cut off at zero last; those of a
+    marginal's bounds are of the logarithm of their distance from the mean. Likewise cut
     off are those of a marginal's bounds where values lie beyond (drawn together by the greatest
     noise of its interval), and those of an exponent and of an anisotropy at the ends of the ranges
     that are searched, 0.65 to 16 and 0.05 to 20, which is said where they reach one; of a parameter
