@@ -10,7 +10,9 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import stiction as st
+from stiction._progress import Meter
 from stiction.cli.app import app
+from stiction.inference import bootstrap
 
 ROOT = Path(__file__).parents[2]
 FIELD = st.RandomField(
@@ -131,12 +133,12 @@ def test_every_wrong_option_is_named_at_once():
     with pytest.raises(st.InputError) as raised:
         st.fit_field(
             VALUES, PIECE, marginal="lognormul", spectrum={"type": "power_law", "exponnt": 2.0},
-            detrend=7, noise=-1.0, gaps="fill", bootstrap=3, confidence=90, seed=-1,
+            detrend=7, noise=-1.0, gaps="fill", bootstrap=3, confidence=90, seed=-1, progress="x",
         )  # fmt: skip
     text = str(raised.value)
     for part in (
         "did you mean 'lognormal'", "did you mean 'exponent'", "detrend", "noise", "gaps",
-        "bootstrap", "confidence", "seed",
+        "bootstrap", "confidence", "seed", "progress",
     ):  # fmt: skip
         assert part in text
     with pytest.raises(st.InputError, match="anisotropy: is of maps"):
@@ -153,7 +155,40 @@ def test_a_record_of_few_lengths_is_warned_of():
 def test_a_family_that_does_not_suit_is_warned_of():
     two_sided = np.where(np.median(VALUES) < VALUES, VALUES + 2e6, VALUES)
     with pytest.warns(st.AccuracyWarning, match="far from any lognormal marginal"):
-        st.fit_field(labelled(two_sided), **QUICK)
+        st.fit_field(labelled(two_sided), **QUICK | {"bootstrap": 99})
+
+
+def test_twenty_repetitions_cannot_tell_one_per_cent():
+    """None further of 20 is of a probability of 1 in 21; a warning of 99 % would be false."""
+    two_sided = np.where(np.median(VALUES) < VALUES, VALUES + 2e6, VALUES)
+    with pytest.warns(st.AccuracyWarning, match="none of 20 .* 99 repetitions can"):
+        fit = st.fit_field(labelled(two_sided), **QUICK)
+    assert fit.misfit["marginal"] == 0.0
+    assert not any("far from any" in text for text in fit.warnings)
+    assert "of 20 simulated records" in str(fit)
+
+
+def stop_after(monkeypatch, count):
+    """The time is over after so many repetitions."""
+    monkeypatch.setattr(Meter, "over", property(lambda meter: meter.done >= count))
+
+
+def test_time_for_too_few_repetitions_is_an_error(monkeypatch):
+    shown = []
+    stop_after(monkeypatch, 7)
+    with pytest.raises(st.InputError, match="over after 7 of 60 .* at least 20; allow more time"):
+        st.fit_field(
+            VALUES, PIECE, **QUICK | {"progress": lambda *at: shown.append(at), "workers": 1}
+        )
+    assert shown[-1] == (7, 60)  # the numbers that progress shows
+
+
+def test_intervals_cut_short_say_what_they_rest_on(monkeypatch):
+    stop_after(monkeypatch, 45)  # 5 of the third field are too few to be used
+    with pytest.warns(st.AccuracyWarning, match="from 20 of 60 repetitions: the time was over"):
+        fit = st.fit_field(VALUES, PIECE, **QUICK, workers=1)
+    assert fit.cut_short
+    assert "from 20 of 60 repetitions" in str(fit)
 
 
 def test_noise_that_hides_the_spectrum_is_warned_of():
@@ -250,3 +285,73 @@ def test_heights_of_a_topography_need_a_map_and_keep_their_unit():
     np.testing.assert_allclose(found, expected)
     fit = st.fit_field(found, gaps="skip", **QUICK)
     assert fit.field.mean == pytest.approx(np.nanmean(expected), rel=0.02)
+
+
+def bounded(noise):
+    """A rough field between bounds, fitted by its bounds and its exponent too."""
+    truth = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        st.PowerLawSpectrum(2e-3, exponent=1.0, power_kept=0.99),
+    )
+    interface = st.Interface(length=0.05, nodes=256)
+    values = truth.sample(interface, samples=1, seed=3)[0, :128]
+    options = QUICK | {"marginal": "beta", "spectrum": "power_law", "noise": noise}
+    return values, st.fit_field(labelled(values, interface.x[:128]), **options)
+
+
+@pytest.mark.slow
+def test_intervals_hold_nothing_that_cannot_be():
+    values, fit = bounded(noise=True)
+    interval = fit.interval
+    # Noise may have carried values beyond the bounds, by no more than the most there may be of it.
+    share = 1.0 - (interval["noise"][1] / values.std()) ** 2
+    quiet = values.mean() + np.sqrt(share) * (values - values.mean())
+    assert interval["marginal.low"][1] <= quiet.min() * (1.0 + 1e-9)
+    assert interval["marginal.high"][0] >= quiet.max() * (1.0 - 1e-9)
+    # The estimate is the end of the range; repetitions end there too, which tells nothing.
+    assert interval["spectrum.exponent"] == (0.65, 16.0)
+    assert re.search(r"exponent +16 +0.65 to 16 \(searched from 0.65 to 16\)", str(fit))
+
+
+def test_bounds_lie_outside_of_values_without_noise():
+    values, fit = bounded(noise=False)
+    assert fit.interval["marginal.low"][1] <= values.min()
+    assert fit.interval["marginal.high"][0] >= values.max()
+    assert fit.interval["spectrum.exponent"][0] >= 0.65
+    assert fit.interval["spectrum.exponent"][1] <= 16.0
+    for name in ("marginal.low", "marginal.high", "spectrum.exponent"):
+        assert fit.interval[name][0] < fit.interval[name][1]
+
+
+def test_the_scale_of_a_uniform_marginal_spans_the_values():
+    fit = st.fit_field(labelled(), **QUICK | {"marginal": "uniform"})
+    least, most = VALUES.min(), VALUES.max()
+    limits = bootstrap._limits(fit.parameters, fit._details.estimate, VALUES)
+    assert limits["marginal.loc"] == (-np.inf, least)
+    assert limits["marginal.scale"] == (pytest.approx(most - least), np.inf)
+    normal = st.fit_field(labelled(), **QUICK | {"marginal": "normal"})  # has no bounds
+    assert bootstrap._limits(normal.parameters, normal._details.estimate, VALUES) == {}
+
+
+@pytest.mark.parametrize(
+    ("interval", "limits", "cut"),
+    [
+        ((1.0, 2.0), (0.65, 16.0), (1.0, 2.0)),
+        ((1.0, 350.0), (0.65, 16.0), (1.0, 16.0)),
+        ((15.999, 350.0), (0.65, 16.0), (0.65, 16.0)),
+        ((-4.0, 3.0), (2.0, np.inf), (2.0, 3.0)),
+        ((-4.0, 1.0), (2.0, np.inf), (2.0, 2.5)),  # the estimate
+        ((2.0, 2.0001), (2.0, np.inf), (2.0, 2.0001)),
+    ],
+)
+def test_intervals_are_cut(interval, limits, cut):
+    assert bootstrap._cut(interval, limits, 2.5) == cut
+
+
+@pytest.mark.parametrize(("name", "side"), [("marginal.low", -1.0), ("marginal.high", 1.0)])
+def test_bounds_stay_on_their_side_of_the_mean(name, side):
+    values = {"mean": 1.0, "marginal.low": 0.6, "marginal.high": 1.6}
+    at = bootstrap._scaled(name, values)
+    assert bootstrap._unscaled(name, at, values) == pytest.approx(values[name])
+    for step in (-3.0, 3.0):
+        assert side * (bootstrap._unscaled(name, at + step, values) - values["mean"]) > 0.0

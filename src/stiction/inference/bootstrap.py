@@ -10,11 +10,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiction._progress import Meter
+from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.inference.estimate import Estimate, Setting, estimate, simulate
+from stiction.inference.spectrum_fit import ANISOTROPIES, EXPONENTS
 
-PLACES = ("mean", "marginal.mean", "marginal.low", "marginal.high", "marginal.loc")
-"""Parameters that say where something is; all others are positive and live on a logarithm."""
+PLACES = ("mean", "marginal.mean", "marginal.loc")
+"""Parameters that say where something is; all others live on a logarithm."""
+SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
+"""On which side of the mean a bound lies; what lives on a logarithm is its distance from there."""
+
+RANGES = {"spectrum.exponent": EXPONENTS, "anisotropy": ANISOTROPIES}
+"""Between which ends parameters are looked for, and intervals cut off."""
+SAME = 1e-3
+"""As a share of an end of a range: how near to it an interval that tells nothing lies."""
 
 
 def parameters_of(found: Estimate, setting: Setting) -> dict[str, float]:
@@ -121,7 +130,7 @@ def at_ends(
     estimated = parameters_of(found, setting)
     full = f"spectrum.{name}"
     errors = _errors(full, around, setting)
-    at, width = _scaled(full, estimated[full]), _width(full, estimated)
+    at, width = _scaled(full, estimated), _width(full, estimated)
     first = _ends(at, width, errors, errors, confidence)
     place = family.free.index(name)
 
@@ -138,6 +147,7 @@ def intervals(
     ends: tuple[Repetitions, Repetitions] | None,
     setting: Setting,
     confidence: float,
+    values: Array,
 ) -> dict[str, tuple[float, float]]:
     """Studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
@@ -151,7 +161,7 @@ def intervals(
     Of the noise it is the variance that has an interval, with its own standard error, which follows
     the correlation length as it is, and as if it could be negative: estimates that end at zero
     would all have the same error, and an interval from them would hold nothing but zero. What is
-    below zero is cut off last.
+    below zero is cut off last. So is of other parameters what they cannot be, see `_limits`.
 
     Parameters
     ----------
@@ -161,6 +171,8 @@ def intervals(
         From a field of shorter and one of longer correlation, see `at_ends`.
     setting : Setting
     confidence : float
+    values : (points,)
+        What was fitted, of all records.
     """
     found = around.world
     estimated = parameters_of(found, setting)
@@ -174,21 +186,61 @@ def intervals(
             result[name] = (math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0)))
             continue
         shorter, longer = ends or (around, around)
-        own = [_scaled(name, one.parameters[name]) for one in around.fits]
+        own = [_scaled(name, one.parameters) for one in around.fits]
         if np.dot(np.array(own) - np.mean(own), np.array(lengths) - np.mean(lengths)) < 0.0:
             shorter, longer = longer, shorter
-        at, width = _scaled(name, estimated[name]), _width(name, estimated)
+        at, width = _scaled(name, estimated), _width(name, estimated)
         both = _errors(name, shorter, setting), _errors(name, longer, setting)
         low, high = _ends(at, width, *both, confidence)
-        result[name] = (_unscaled(name, low), _unscaled(name, high))
+        low, high = sorted(_unscaled(name, end, estimated) for end in (low, high))
+        result[name] = (low, high)
+    noise = result["noise"][1] if "noise" in result else found.model.noise
+    for name, limits in _limits(estimated, found, setting.marginal.quiet(values, noise)).items():
+        result[name] = _cut(result[name], limits, estimated[name])
     return result
+
+
+def _limits(
+    estimated: Mapping[str, float], found: Estimate, quiet: Array
+) -> dict[str, tuple[float, float]]:
+    """Between which ends parameters can lie, of those for which there is such a thing.
+
+    Values lie inside the bounds of their marginal; `quiet` are the values as they would be without
+    the greatest noise that they may carry. Errors of bounds, which have a long tail where the
+    values hardly show them, do not know of that, nor those of an exponent of its range.
+    """
+    bottom, top = (float(end) for end in found.marginal.distribution.support())
+    least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
+    below, above = (-math.inf, least), (most, math.inf)
+    limits = RANGES | {"marginal.low": below, "marginal.high": above}
+    loc, scale = estimated.get("marginal.loc"), estimated.get("marginal.scale")
+    if loc in (bottom, top):  # else it is inside, such as a mean
+        limits["marginal.loc"] = below if loc == bottom else above
+    if scale is not None and math.isclose(scale, top - bottom):
+        limits["marginal.scale"] = (most - least, math.inf)
+    return {name: limits[name] for name in limits if name in estimated}
+
+
+def _cut(
+    interval: tuple[float, float], limits: tuple[float, float], at: float
+) -> tuple[float, float]:
+    """An interval within limits; one that lies at a limit or beyond tells nothing, and is all.
+
+    Where there is no end, it reaches to the estimate.
+    """
+    low, high = (min(max(end, limits[0]), limits[1]) for end in interval)
+    near = SAME if np.isfinite(limits).all() else 0.0
+    if any(math.isclose(low, end, rel_tol=near) and math.isclose(high, end, rel_tol=near)
+           for end in limits):  # fmt: skip
+        low, high = (end if math.isfinite(end) else at for end in limits)
+    return low, high
 
 
 def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
     """Of a parameter on its own scale, in units of their widths."""
-    truth = _scaled(name, parameters_of(repeated.world, setting)[name])
+    truth = _scaled(name, parameters_of(repeated.world, setting))
     return [
-        (_scaled(name, one.parameters[name]) - truth) / _width(name, one.parameters)
+        (_scaled(name, one.parameters) - truth) / _width(name, one.parameters)
         for one in repeated.fits
     ]
 
@@ -223,15 +275,21 @@ def _width(name: str, values: Mapping[str, float]) -> float:
     return root * values["standard_deviation"] if name in PLACES else root
 
 
-def _scaled(name: str, value: float) -> float:
+def _scaled(name: str, values: Mapping[str, float]) -> float:
+    """A parameter on the scale on which its error is about normal."""
     if name in PLACES:
-        return value
-    shift = 0.5 if name.endswith("exponent") else 0.0
-    return math.log(max(value - shift, 1e-300))
+        return values[name]
+    return math.log(max(SIDES.get(name, 1.0) * (values[name] - _origin(name, values)), 1e-300))
 
 
-def _unscaled(name: str, value: float) -> float:
+def _unscaled(name: str, scaled: float, values: Mapping[str, float]) -> float:
     if name in PLACES:
-        return value
-    shift = 0.5 if name.endswith("exponent") else 0.0
-    return shift + math.exp(value)
+        return scaled
+    return _origin(name, values) + SIDES.get(name, 1.0) * math.exp(scaled)
+
+
+def _origin(name: str, values: Mapping[str, float]) -> float:
+    """From where a logarithm counts."""
+    if name in SIDES:
+        return values["mean"]
+    return 0.5 if name.endswith("exponent") else 0.0

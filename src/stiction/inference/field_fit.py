@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from stiction._brief import brief_html
 from stiction._typing import Array
+from stiction.inference.bootstrap import RANGES
 from stiction.inference.estimate import Estimate, Setting
 from stiction.inference.fit_figure import draw_fit
 from stiction.inference.records import Record
@@ -54,7 +56,8 @@ class FieldFit:
         correlation of z falls to 1/e, ``anisotropy``, and ``noise``, the standard deviation of the
         measurement noise.
     interval : dict of str to (float, float)
-        Of each of them, from the bootstrap.
+        Of each of them, from the bootstrap; within what is searched, and of bounds of the marginal
+        outside the values.
     confidence : float
         Of the intervals.
     repetitions : tuple of RandomField
@@ -63,7 +66,8 @@ class FieldFit:
         Of every family of marginals that was asked for.
     misfit : dict of str to float
         Shares of the repetitions that are as far from their own marginal, and spectrum, as the
-        data are from the fitted ones; small where a family does not suit.
+        data are from the fitted ones; small where a family does not suit. A share below 1 % takes
+        at least 99 repetitions to tell.
     lengths_held : float
         Correlation lengths (on a plane, areas) that the records hold together.
     warnings : tuple of str
@@ -97,12 +101,15 @@ class FieldFit:
         for name, value in self.parameters.items():
             low, high = self.interval[name]
             suffix = unit_of(name, unit)
-            lines.append(
-                f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g} {suffix}".rstrip()
-            )
+            least, most = RANGES.get(name, (-math.inf, math.inf))
+            if low <= least or high >= most:
+                suffix += f" (searched from {least:g} to {most:g})"
+            line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
+            lines.append(f"{line} {suffix.strip()}".rstrip())
+        marginal, spectrum = (100.0 * self.misfit[name] for name in ("marginal", "spectrum"))
         lines.append(
-            f"  as far from its marginal as {100 * self.misfit['marginal']:.3g} % of simulated"
-            f" records, from its spectrum as {100 * self.misfit['spectrum']:.3g} %"
+            f"  as far from its marginal as {marginal:.3g} % of {len(self.repetitions)} simulated"
+            f" records, from its spectrum as {spectrum:.3g} %"
         )
         lines += [f"  ! {text}" for text in self.warnings]
         return "\n".join(lines)

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from stiction._checks import check_choice, check_instance, is_finite, is_real, is_whole
+from stiction._checks import (
+    check_choice,
+    check_instance,
+    check_progress,
+    is_finite,
+    is_real,
+    is_whole,
+)
 from stiction._model import describe
 from stiction._progress import Meter, Show, check_time_limit
 from stiction._typing import Array
@@ -40,7 +47,8 @@ MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record says little of any parameter."""
 FAR = 0.01
-"""Share of repetitions that are further from their model than the data are from theirs."""
+"""Share of simulated records that are as far from their model as the data are from theirs, below
+which a family does not suit."""
 AT_LIMIT = 1e-3
 FEWEST = 20
 """Repetitions that tell a tail of errors."""
@@ -108,7 +116,8 @@ def fit_field(
     workers : int, optional
         Threads; all cores by default. The numbers do not depend on it.
     time_limit : float, optional
-        Seconds; the intervals then come from the repetitions that are done.
+        Seconds; the intervals then come from the repetitions that are done, and it is an error if
+        these are fewer than 20.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -143,7 +152,12 @@ def fit_field(
     Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. Upper and lower ends
     come from fields that belong there, of longer and shorter correlation (one step of a test
     inversion; Carpenter, 1999), which matters for short records. That of the noise is
-    of its variance, by estimates that may be negative, and is cut off at zero last.
+    of its variance, by estimates that may be negative, and is cut off at zero last; those of a
+    marginal's bounds are of the logarithm of their distance from the mean. Likewise cut
+    off are those of a marginal's bounds where values lie beyond (drawn together by the greatest
+    noise of its interval), and those of an exponent and of an anisotropy at the ends of the ranges
+    that are searched, 0.65 to 16 and 0.05 to 20, which is said where they reach one; of a parameter
+    that the data do not tell the interval is all of its range.
 
     Examples
     --------
@@ -158,7 +172,7 @@ def fit_field(
     """
     families, spectral = _checked(
         interface, marginal, spectrum, detrend, noise, anisotropy, gaps, quantity, bootstrap,
-        confidence, seed, workers, time_limit,
+        confidence, seed, workers, time_limit, progress,
     )  # fmt: skip
     records = records_of(profiles, interface, quantity, gaps == "skip")
     if spectral.anisotropy != 1.0 and records[0].values.ndim == 1:
@@ -180,14 +194,21 @@ def fit_field(
             fields = at_ends(around, setting, float(confidence))
             ends = fields and (repeat(fields[0], *options), repeat(fields[1], *options))
         cut_short = meter.over
-    if len(around.fits) < 2:
+    asked = times * int(bootstrap)
+    if len(around.fits) < FEWEST:
+        why = (
+            "time_limit: the time was over after"
+            if cut_short
+            else f"marginal: {setting.marginal.name!r} could be fitted to only"
+        )
+        advice = "allow more time" if cut_short else "take another marginal"
         raise InputError(
-            f"time_limit: {len(around.fits)} of {bootstrap} repetitions were done, too few for an"
-            " interval; allow more time or a simpler marginal"
+            f"{why} {len(around.fits)} of {asked} repetitions, and intervals take at least"
+            f" {FEWEST}; {advice}"
         )
     return _result(
         setting, compared, around, ends, records, rows, interface,
-        confidence=float(confidence), quantity=quantity, asked=times * int(bootstrap),
+        confidence=float(confidence), quantity=quantity, asked=asked,
         cut_short=cut_short,
     )  # fmt: skip
 
@@ -195,7 +216,7 @@ def fit_field(
 def _checked(
     interface: Any, marginal: Any, spectrum: Any, detrend: Any, noise: Any, anisotropy: Any,
     gaps: Any, quantity: Any, bootstrap: Any, confidence: Any, seed: Any, workers: Any,
-    time_limit: Any,
+    time_limit: Any, progress: Any,
 ) -> tuple[list[Family], SpectrumFamily]:  # fmt: skip
     """The families to fit, or everything that is wrong with the arguments."""
     problems = check_time_limit(time_limit)
@@ -211,6 +232,7 @@ def _checked(
         collect(check_instance, "interface", interface, Interface)
     collect(check_choice, "gaps", gaps, ("refuse", "skip"))
     collect(check_quantity, quantity)
+    collect(check_progress, progress)
     if not (is_whole(detrend, 0) and detrend <= HIGHEST_DEGREE):
         problems.append(f"detrend: must be a degree from 0 to 3, got {describe(detrend)}")
     if not (isinstance(noise, bool) or (is_finite(noise) and noise >= 0.0)):
@@ -306,28 +328,31 @@ def _result(
 ) -> FieldFit:
     found, repeated = around.world, around.fits
     parameters = parameters_of(found, setting)
-    done = len(repeated) + sum(len(one.fits) for one in ends or ())
     if ends is not None and min(len(one.fits) for one in ends) < FEWEST:
         ends = None
-    interval = intervals(around, ends, setting, confidence)
-    misfit = {
-        "marginal": float(np.mean([one.estimate.distance >= found.distance for one in repeated])),
-        "spectrum": float(np.mean([one.estimate.roughness >= found.roughness for one in repeated])),
-    }
+    used = len(repeated) + sum(len(one.fits) for one in ends or ())
     rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
+    values = np.concatenate(rows)
+    interval = intervals(around, ends, setting, confidence, values)
+    further = {
+        "marginal": sum(one.estimate.distance >= found.distance for one in repeated),
+        "spectrum": sum(one.estimate.roughness >= found.roughness for one in repeated),
+    }
     observed = tuple(observe(rows, setting.windows))
     held = lengths_held(found, setting.windows)
-    texts = _doubts(found, setting, observed, misfit, held)
-    if done < asked:
+    texts = _doubts(found, setting, observed, held) + _misfits(
+        found, setting, further, len(repeated)
+    )
+    if used < asked:
         why = "the time was over" if cut_short else "the family could not be fitted to the others"
-        texts.append(f"intervals are from {done} of {asked} repetitions: {why}")
+        texts.append(f"intervals are from {used} of {asked} repetitions: {why}")
     for text in texts:
         warn_accuracy(text)
     if interface is not None:
         found.field.modes(interface)
         warn_if_inaccurate(found.field, interface)
     details = Details(
-        np.concatenate(rows), tuple(records), found, setting, observed,
+        values, tuple(records), found, setting, observed,
         tuple(one.estimate for one in repeated),
     )  # fmt: skip
     return FieldFit(
@@ -337,7 +362,7 @@ def _result(
         confidence=confidence,
         repetitions=tuple(one.estimate.field for one in repeated),
         families=compared,
-        misfit=misfit,
+        misfit={name: count / len(repeated) for name, count in further.items()},
         lengths_held=held,
         quantity=quantity,
         warnings=tuple(texts),
@@ -350,7 +375,6 @@ def _doubts(
     found: Estimate,
     setting: Setting,
     observed: Sequence[Observed],
-    misfit: Mapping[str, float],
     held: float,
 ) -> list[str]:
     """What stands in the way of trusting a fit."""
@@ -360,17 +384,6 @@ def _doubts(
         texts.append(
             f"the records hold only {held:.2g} correlation lengths ({length:.3g} m), too few for"
             " intervals to be trusted; about ten are needed: measure a longer piece, or several"
-        )
-    if misfit["marginal"] < FAR:
-        texts.append(
-            f"the values are far from any {setting.marginal.name} marginal: the distribution"
-            f" functions differ by {found.distance:.2g}, more than in 99 % of simulated records;"
-            " compare families (marginal=['beta', 'lognormal', 'weibull', ...]) or look at plot()"
-        )
-    if misfit["spectrum"] < FAR:
-        texts.append(
-            f"the periodogram is far from any {setting.spectrum.name} spectrum, more than in 99 %"
-            " of simulated records; take another spectrum or a higher detrend, or look at plot()"
         )
     if noise_hides_cutoff(found, observed):
         texts.append(
@@ -387,6 +400,40 @@ def _doubts(
                 f"{name} lies at the end of the range that was searched: the data do not tell it;"
                 f" give it (spectrum={{'type': {family.name!r}, {name!r}: ...}}) or another"
                 " spectrum"
+            )
+    return texts
+
+
+def _misfits(
+    found: Estimate, setting: Setting, further: Mapping[str, int], count: int
+) -> list[str]:
+    """Whether marginal and spectrum are far from the data, as far as the repetitions can tell.
+
+    Of data that are a record of their model, at most k of n repetitions are further from theirs
+    with a probability of (k + 1) / (n + 1) (Barnard's test; Davison and Hinkley, 1997, section
+    4.2): fewer than 99 cannot show that a share is below 1 %.
+    """
+    differences = {
+        "marginal": (
+            f"the values are far from any {setting.marginal.name} marginal: the distribution"
+            f" functions differ by {found.distance:.2g}, ",
+            "; compare families (marginal=['beta', 'lognormal', 'weibull', ...]) or look at plot()",
+        ),
+        "spectrum": (
+            f"the periodogram is far from any {setting.spectrum.name} spectrum, ",
+            "; take another spectrum or a higher detrend, or look at plot()",
+        ),
+    }
+    enough = math.ceil(1.0 / FAR) - 1
+    texts = []
+    for name, (difference, advice) in differences.items():
+        if further[name] + 1 <= FAR * (count + 1):
+            texts.append(f"{difference}more than in 99 % of simulated records{advice}")
+        elif further[name] == 0:
+            family = getattr(setting, name).name
+            texts.append(
+                f"none of {count} simulated records is as far from its {name} as the data from"
+                f" {family!r}: too few to tell whether it suits; {enough} repetitions can"
             )
     return texts
 
