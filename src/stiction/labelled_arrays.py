@@ -9,7 +9,7 @@ import numpy as np
 from stiction._model import real_array
 from stiction.errors import InputError, unknown_name
 from stiction.profile_nodes import Points
-from stiction.quantities import PLACES, UNITS, Map, choose, converted, factor_of
+from stiction.quantities import PLACES, UNITS, Map, check_only, choose, converted, factor_of
 
 _SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
@@ -64,6 +64,8 @@ def labelled(
         number = choose(known, quantity, strength) if chosen is None else chosen
         extra = {x: source[x]} if x is not None and x in source.data_vars else {}
         source = source[names[number]].assign_coords(extra)
+    else:
+        check_only(source.name, value)
     si = UNITS[quantity] if strength is None else "m"
     nodes = _dimension_along(source, x)
     samples = [name for name in source.dims if name != nodes]

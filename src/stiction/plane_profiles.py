@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from stiction._model import real_array
+from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.profile_files import NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_text import Table, read_table
-from stiction.quantities import Map, choose, converted, factor_of
+from stiction.quantities import Map, check_only, choose, converted, factor_of
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
@@ -55,6 +55,8 @@ def on_plane(
         known = [(one, _stated(source[one])) for one in names]
         name = names[choose(known, quantity, strength)] if value is None else value
         source = source[name]
+    else:
+        check_only(source.name, value)
     stated, name = _stated(source), source.name
     dims = [str(dim) for dim in source.dims]
     samples = [dim for dim in dims if dim not in interface.dims]
@@ -104,6 +106,10 @@ def read_plane(
         raise InputError(
             "a profile of a plane is an array (nx, ny) in a .npy or .nc file, or text with the"
             f" columns x, y and value, got {path.name!r}"
+        )
+    if value is not None:
+        raise InputError(
+            f"value: a .npy file of a plane holds one array, without names; got {describe(value)}"
         )
     array = read_npy(path)
     if array.shape == interface.shape[::-1] != interface.shape:

@@ -102,7 +102,8 @@ def read_profile(
     Warns
     -----
     UnitWarning
-        If `strength` is applied to a stress that is called neither hardness nor a pressure.
+        If `strength` is applied to a stress that is called neither hardness nor a pressure, or
+        makes of heights without a unit what is no strength of a solid.
     AccuracyWarning
         If something is interpolated or filled in, or x lies between the nodes.
 
@@ -128,6 +129,14 @@ def read_profile(
         raise InputError(unknown_name("quantity", str(quantity), UNITS))
     if interface is not None and not isinstance(interface, Interface):
         raise InputError(f"interface: must be an Interface, got {describe(interface)}")
+    for what, text in {"unit": unit, "x_unit": x_unit}.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{what}: must be a text such as 'um', got {describe(text)}")
+    if strength is not None and not callable(strength):
+        raise InputError(
+            "strength: must be a function that makes strength (Pa) of an array of heights (m), such"
+            f" as lambda h: 1e12 * h; got {describe(strength)}"
+        )
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
     if is_topography(source):
@@ -140,6 +149,11 @@ def read_profile(
     if interface is not None and interface.is_plane:
         if x is not None or x_unit is not None:
             raise InputError("x and x_unit: are options of profiles of a line")
+        if interpolate:
+            raise InputError(
+                "interpolate: is an option of profiles of a line; on a plane values are taken at"
+                " the nodes"
+            )
         return _of_plane(name, source, quantity, interface, value, unit, strength, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, UnitWarning, warn_user
+from stiction.plausible import is_strength, warn_of_mapped
 from stiction.units import factor_to, parse
 
 Map = Callable[[Array], Array]
@@ -27,6 +30,8 @@ UNITS = {
     "friction_coefficient": "1",
 }
 """What can be a profile, and its SI unit."""
+_SIGNED = ("initial_stress", "load_profile", "slip")
+"""What may be negative."""
 
 _NAMES = {
     "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
@@ -81,7 +86,11 @@ def converted(
     """Values in SI; with a map `strength` what it makes of them, called `name` in the source."""
     if strength is None:
         return values * factor_of(given, stated, quantity)
-    return mapped_by(strength, values * _factor_to_map(name, given, stated, quantity))
+    values = values * _factor_to_map(name, given, stated, quantity)
+    found = mapped_by(strength, values, quantity)
+    if given is None and stated is None and quantity == "strength":
+        _warn_of_length(strength, values, found, quantity)
+    return found
 
 
 def _factor_to_map(name: object, given: str | None, stated: str | None, quantity: str) -> float:
@@ -127,6 +136,12 @@ def _of_dimension(unit: str | None, si: str) -> bool:
     given, wanted = None if unit is None else parse(unit), parse(si)
     assert wanted is not None
     return given is not None and given.dimension == wanted.dimension
+
+
+def check_only(name: object, value: object) -> None:
+    """Refuse the name of another variable than the only one there is."""
+    if value is not None and value != name:
+        raise InputError(f"value: {describe(value)} is not the one variable here, {name!r}")
 
 
 def choose(
@@ -186,12 +201,43 @@ def _described(known: Sequence[tuple[str | None, str | None]]) -> str:
     return ", ".join(f"{n!r} in {u}" if u else f"{n!r}" for n, u in known) or "none"
 
 
-def mapped_by(strength: Map, values: Array) -> Array:
-    """What a user makes of measured values, such as heights: one value for each."""
-    found = np.asarray(strength(values), dtype=np.float64)
+def mapped_by(strength: Map, values: Array, quantity: str) -> Array:
+    """What a user makes of measured values, such as heights: one value for each; gaps stay gaps."""
+    try:
+        found = real_array(np.ma.filled(strength(values.copy()), np.nan))
+    except Exception as error:  # whatever a user's function raises
+        raise InputError(
+            f"strength: failed with {type(error).__name__}: {error}; it is called with one array of"
+            f" shape {values.shape} and returns one of real numbers"
+        ) from error
     if found.shape != values.shape:
         raise InputError(
             f"strength: must return one value a point, shape {values.shape}, got shape"
             f" {found.shape}"
         )
+    found = np.where(np.isnan(values), np.nan, found)
+    wrong = ~np.isnan(values) & ~np.isfinite(found)
+    valid = "finite"
+    if quantity not in _SIGNED:
+        wrong |= found < 0.0
+        valid = "finite and not negative"
+    if wrong.any():
+        first = np.flatnonzero(wrong)[0]
+        raise InputError(
+            f"strength: must return {quantity} that is {valid}, got {found.flat[first]:g} for"
+            f" {values.flat[first]:g} (SI units), and such at {int(wrong.sum())} of"
+            f" {values.size} points"
+        )
     return found
+
+
+def _warn_of_length(strength: Map, values: Array, found: Array, quantity: str) -> None:
+    """Warn where values without a unit give a strength that no solid has."""
+    if np.isnan(found).all() or is_strength(float(np.nanmean(found))):
+        return
+    fitting = {}
+    for unit in ("mm", "um", "nm"):
+        with contextlib.suppress(InputError), np.errstate(all="ignore"):
+            other = mapped_by(strength, values * factor_to("m", unit), quantity)
+            fitting[unit] = float(np.nanmean(other))
+    warn_of_mapped(float(np.nanmean(found)), fitting)

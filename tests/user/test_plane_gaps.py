@@ -142,3 +142,14 @@ def test_a_variable_that_says_nothing_is_no_strength(tmp_path):
 def test_a_map_is_not_read_as_a_line(tmp_path):
     with pytest.raises(st.InputError, match="x repeats.*interface="):
         st.read_profile(text(tmp_path / "map.csv"))
+
+
+def test_options_without_a_meaning_on_a_plane_are_refused(tmp_path):
+    np.save(tmp_path / "map.npy", VALUES)
+    with pytest.raises(st.InputError, match="interpolate: is an option of profiles of a line"):
+        st.read_profile(tmp_path / "map.npy", interface=PLANE, interpolate=True)
+    with pytest.raises(st.InputError, match="value: a .npy file of a plane holds one array"):
+        st.read_profile(tmp_path / "map.npy", interface=PLANE, value="q")
+    given = xr.DataArray(VALUES, dims=("x", "y"), name="tau")
+    with pytest.raises(st.InputError, match="value: 'q' is not the one variable here, 'tau'"):
+        st.read_profile(given, interface=PLANE, value="q")

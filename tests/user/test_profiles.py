@@ -262,6 +262,56 @@ def test_the_unit_of_heights_is_not_called_one_of_strength(strength):
         st.read_profile(given.assign_attrs(units="um"), unit="mm", strength=lambda h: h)
 
 
+MAPS = {
+    "strength: must be a function.*got 5": 5,
+    "strength: failed with TypeError: .*missing 1.*called with one array": lambda h, b: h,
+    "strength: failed with ZeroDivisionError": lambda h: h * (1 / 0),
+    "strength: .*finite and not negative, got -1e\\+06 for 0 ": lambda h: h - 1e6,
+    "strength: .*got inf": lambda h: h + np.inf,
+    "strength: .*got nan .*at 128 of 128 points": lambda h: h * np.nan,
+    "strength: failed with TypeError: .*complex128": lambda h: h + 1j,
+}
+
+
+@pytest.mark.parametrize("words", MAPS)
+def test_maps_that_make_no_strength_are_refused(interface, tmp_path, words):
+    np.save(tmp_path / "p.npy", interface.x)
+    with pytest.raises(st.InputError, match=words):
+        st.read_profile(tmp_path / "p.npy", strength=MAPS[words], unit="mm")
+
+
+def test_a_map_may_be_negative_of_what_may_and_leaves_gaps(interface, tmp_path):
+    heights = np.where(interface.x > 0.05, np.nan, interface.x)
+    np.save(tmp_path / "p.npy", heights)
+    options = {"quantity": "initial_stress", "unit": "m"}
+    found = st.read_profile(tmp_path / "p.npy", strength=lambda h: -1e6 - h, **options)
+    assert (found.values[~np.isnan(heights)] < 0.0).all()
+    filled = st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e6 + np.nan_to_num(h))
+    np.testing.assert_array_equal(np.isnan(filled), np.isnan(heights))
+
+
+def test_heights_without_a_unit_that_make_no_strength_are_doubted(interface, tmp_path):
+    np.save(tmp_path / "p.npy", 1.0 + interface.x)  # um
+    with pytest.warns(st.UnitWarning, match="1.05e\\+12 Pa.*perhaps they are in um: unit='um'"):
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e12 * h)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e6 * h)
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e12 * h, unit="um")
+
+
+def test_options_of_the_wrong_kind_are_refused(interface, strength, tmp_path):
+    np.save(tmp_path / "p.npy", strength)
+    with pytest.raises(st.InputError, match="unit: must be a text such as 'um', got 3"):
+        st.read_profile(tmp_path / "p.npy", unit=3)
+    with pytest.raises(st.InputError, match="x_unit: must be a text"):
+        st.read_profile(tmp_path / "p.npy", x_unit=3)
+    given = labelled(strength, interface.x).rename("tau")
+    with pytest.raises(st.InputError, match="value: 'q' is not the one variable here, 'tau'"):
+        st.read_profile(given, value="q")
+    np.testing.assert_array_equal(st.read_profile(given, value="tau"), strength)
+
+
 def test_netcdf_with_units(interface, strength, tmp_path):
     x = ("x", interface.x[::-1] * 1e3, {"units": "mm"})
     data = {"friction_strength": ("x", strength[::-1] * 1e-6, {"units": "MPa"})}
