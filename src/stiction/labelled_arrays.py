@@ -9,7 +9,16 @@ import numpy as np
 from stiction._model import real_array
 from stiction.errors import InputError, unknown_name
 from stiction.profile_nodes import Points
-from stiction.quantities import PLACES, UNITS, Map, check_only, choose, converted, factor_of
+from stiction.quantities import (
+    OF_A_PLANE,
+    PLACES,
+    UNITS,
+    Map,
+    check_only,
+    choose,
+    converted,
+    factor_of,
+)
 
 _SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
@@ -57,7 +66,9 @@ def labelled(
         names = [str(name) for name in source.data_vars if str(name) != str(x)]
         known = [(name, _unit_of(source[name])) for name in names]
         if not names:
-            raise InputError("holds no profile (a variable of numbers along one dimension)")
+            raise InputError(
+                f"holds no profile (a variable of numbers along one dimension){OF_A_PLANE}"
+            )
         chosen = names.index(value) if value in names else None
         if value is not None and chosen is None:
             raise InputError(unknown_name("value", str(value), names))

@@ -76,7 +76,9 @@ def on_plane(
             )
         if dim in source.coords:
             place = real_array(source[dim].values) * factor_of(None, _stated(source[dim]), dim)
-            if np.abs(place - nodes).max() > TOLERANCE * nodes[1]:
+            order = np.argsort(place, kind="stable")
+            source, place = source.isel({dim: order}), place[order]
+            if not np.abs(place - nodes).max() <= TOLERANCE * nodes[1]:  # NaN is no place
                 raise InputError(
                     f"{dim} reaches from {place[0]:g} to {place[-1]:g} m, the nodes from"
                     f" {nodes[0]:g} to {nodes[-1]:g} m; on a plane values are taken at the nodes"
@@ -132,6 +134,12 @@ def _from_table(
 ) -> Array:
     """Values at the nodes from columns x, y and value; NaN where there is none."""
     names = [str(name).casefold() for name in table.names]
+    if not any(table.names):
+        raise InputError(
+            f"holds {len(names)} columns without names, as of a matrix; a map as text has a line"
+            " for each place, with columns called 'x', 'y' and the value's; save a matrix"
+            " (nx, ny) with np.save as .npy"
+        )
     if "x" not in names or "y" not in names:
         raise InputError(
             "a map as text needs a line of names, with columns called 'x', 'y' and the value's, got"

@@ -23,6 +23,7 @@ from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, 
 from stiction.profile_nodes import AtNodes, Gaps, Points, check_gaps, in_order
 from stiction.profile_text import Table, read_table
 from stiction.quantities import (
+    OF_A_PLANE,
     PLACES,
     UNITS,
     Map,
@@ -158,7 +159,7 @@ def read_profile(
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
-            raise InputError(f"must hold one profile, got shape {points.values.shape}")
+            raise InputError(f"must hold one profile, got shape {points.values.shape}{OF_A_PLANE}")
         values, place, measured = points.values, points.x, points.measured
         if interface is not None:
             values, measured = points.on(interface, interpolate=interpolate, gaps=gaps)
@@ -169,8 +170,7 @@ def read_profile(
             again = np.flatnonzero(np.diff(place) == 0.0)
             if again.size:
                 raise InputError(
-                    f"x repeats: {place[again[0]]:.9g} m stands beside two values; a map over x and"
-                    " y is read with the plane it belongs to, interface=..."
+                    f"x repeats: {place[again[0]]:.9g} m stands beside two values{OF_A_PLANE}"
                 )
             measured = None if measured is None else measured[order]
     except InputError as error:
@@ -266,7 +266,8 @@ def _table_of(array: Array, x: Any, value: Any) -> Table:
     if array.ndim == 2 and array.size and value is not None:
         width = array.shape[1]
         return Table((None,) * width, (None,) * width, array.T)
-    hint = "; of an array of columns say which: x=0, value=1" if array.ndim == 2 else ""
+    columns = "; of an array of columns say which: x=0, value=1"
+    hint = columns + OF_A_PLANE if array.ndim == 2 else ""
     raise InputError(f"must hold one profile, shape (nodes,), got shape {array.shape}{hint}")
 
 
@@ -275,6 +276,8 @@ def _choose_columns(
 ) -> tuple[int, int | None]:
     """The columns of the values and of x."""
     names, width = table.names, len(table.names)
+    if _is_map(table) and x is None:
+        raise InputError(f"holds values over x and y, not along a line{OF_A_PLANE}")
     value = _column("value", value, names)
     place = _column("x", x, names)
     if place is None and width > 1:
@@ -290,12 +293,22 @@ def _choose_columns(
         elif value is None and width > 2:
             raise InputError(
                 f"has {width} columns ({_listed(names)}); say which are meant: x=..., value=..."
+                + ("" if any(names) else OF_A_PLANE)
             )
     others = [i for i in range(width) if i != place]
     if value is None:
         known = [(names[i], table.units[i]) for i in others]
         value = others[choose(known, quantity, strength)]
     return value, place
+
+
+def _is_map(table: Table) -> bool:
+    """Whether there are columns x and y, and a place on either axis has several lines."""
+    names = [str(name).casefold() for name in table.names]
+    if "x" not in names or "y" not in names:
+        return False
+    places = [table.columns[names.index(dim)] for dim in ("x", "y")]
+    return all(1 < np.unique(place).size < place.size for place in places)
 
 
 def _column(what: str, wanted: Any, names: Sequence[str | None]) -> int | None:
@@ -320,7 +333,8 @@ def _and_own_gaps(measured: Any, source: Any) -> Any:
     """Where a map was measured, those that were filled earlier taken into account."""
     if MEASURED not in getattr(source, "coords", {}):
         return measured
-    own = source.coords[MEASURED].transpose("x", "y").values.astype(bool)
+    own = source.coords[MEASURED].transpose("x", "y")
+    own = own.sortby([dim for dim in own.dims if dim in own.coords]).values.astype(bool)
     return own if measured is None else measured & own
 
 

@@ -50,6 +50,11 @@ HEIGHTS = ("height", "heights", "topography", "z")
 """Names of what a map from heights to strength is applied to."""
 _OTHER_STRESSES = ("hardness", "normal_pressure", *_NAMES["normal_pressure"])
 """Names of stresses of which a map may make a strength."""
+OF_A_PLANE = (
+    "; a map over x and y is read with the plane it belongs to,"
+    " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
+)
+"""What to do with two dimensions where a line was expected."""
 PLACES = ("x", "position", "pos", "distance", "coordinate")
 """Names of the coordinate along the interface."""
 
