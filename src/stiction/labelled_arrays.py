@@ -9,7 +9,16 @@ import numpy as np
 from stiction._model import real_array
 from stiction.errors import InputError, unknown_name
 from stiction.profile_nodes import Points
-from stiction.quantities import PLACES, UNITS, choose, factor_of
+from stiction.quantities import (
+    OF_A_PLANE,
+    PLACES,
+    UNITS,
+    Map,
+    check_only,
+    choose,
+    converted,
+    factor_of,
+)
 
 _SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
@@ -50,34 +59,39 @@ def labelled(
     value: Any = None,
     unit: str | None = None,
     x_unit: str | None = None,
-    any_dimension: bool = False,
+    strength: Map | None = None,
 ) -> Points:
     """Values and coordinates of a DataArray, or of one variable of a Dataset; names decide."""
     if hasattr(source, "data_vars"):
         names = [str(name) for name in source.data_vars if str(name) != str(x)]
         known = [(name, _unit_of(source[name])) for name in names]
         if not names:
-            raise InputError("holds no profile (a variable of numbers along one dimension)")
+            raise InputError(
+                f"holds no profile (a variable of numbers along one dimension){OF_A_PLANE}"
+            )
         chosen = names.index(value) if value in names else None
         if value is not None and chosen is None:
             raise InputError(unknown_name("value", str(value), names))
-        number = choose(known, quantity, any_dimension) if chosen is None else chosen
+        number = choose(known, quantity, strength) if chosen is None else chosen
         extra = {x: source[x]} if x is not None and x in source.data_vars else {}
         source = source[names[number]].assign_coords(extra)
+    else:
+        check_only(source.name, value)
+    si = UNITS[quantity] if strength is None else "m"
     nodes = _dimension_along(source, x)
     samples = [name for name in source.dims if name != nodes]
     if len(samples) > 1:
         sizes = ", ".join(f"{name}: {size}" for name, size in source.sizes.items())
         raise InputError(f"must have one dimension beside x, got ({sizes}); select one point")
     if nodes is None:  # one value a sample
-        values = real_array(_magnitude(source.data, UNITS[quantity]))[:, np.newaxis]
-        return Points(values * factor_of(unit, _unit_of(source), quantity, any_dimension))
+        values = real_array(_magnitude(source.data, si))[:, np.newaxis]
+        return Points(converted(values, unit, _unit_of(source), quantity, strength, source.name))
     source = source.transpose(*samples, nodes)
     try:
-        values = real_array(_magnitude(source.data, UNITS[quantity]))
+        values = real_array(_magnitude(source.data, si))
     except TypeError as error:
         raise InputError(f"must be numbers; {error}") from None
-    values = values * factor_of(unit, _unit_of(source), quantity, any_dimension)
+    values = converted(values, unit, _unit_of(source), quantity, strength, source.name)
     measured = None
     if MEASURED in source.coords and nodes in source.coords[MEASURED].dims:
         mask = source.coords[MEASURED].broadcast_like(source).transpose(*samples, nodes)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from stiction._model import real_array
+from stiction._model import describe, real_array
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.profile_files import NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_text import Table, read_table
-from stiction.quantities import choose, factor_of
+from stiction.quantities import Map, check_only, choose, converted, factor_of
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
@@ -25,7 +25,7 @@ def on_plane(
     interface: Interface,
     value: Any = None,
     unit: str | None = None,
-    any_dimension: bool = False,
+    strength: Map | None = None,
 ) -> Array:
     """Values of a labelled array at the nodes of a plane, in SI.
 
@@ -39,8 +39,8 @@ def on_plane(
     interface : Interface
     value, unit : str, optional
         Name of the variable; unit where the source states none.
-    any_dimension : bool
-        Whether the values are something else, such as heights, of which a user makes `quantity`.
+    strength : callable, optional
+        What makes `quantity` of the values, which are something else then, such as heights.
 
     Returns
     -------
@@ -53,14 +53,16 @@ def on_plane(
         if not names:
             raise InputError("holds no map (a variable of numbers along two dimensions)")
         known = [(one, _stated(source[one])) for one in names]
-        name = names[choose(known, quantity, any_dimension)] if value is None else value
+        name = names[choose(known, quantity, strength)] if value is None else value
         source = source[name]
-    factor = factor_of(unit, _stated(source), quantity, any_dimension)
+    else:
+        check_only(source.name, value)
+    stated, name = _stated(source), source.name
     dims = [str(dim) for dim in source.dims]
     samples = [dim for dim in dims if dim not in interface.dims]
     if len(samples) <= 1 and len(samples) == len(dims):  # one value a sample
         values = real_array(source.values)[..., np.newaxis]
-        return values * factor
+        return converted(values, unit, stated, quantity, strength, name)
     if len(samples) > 1 or len(dims) - len(samples) != 2:
         raise InputError(
             f"which dimensions run along the plane is not clear from ({', '.join(dims)}); call them"
@@ -74,13 +76,15 @@ def on_plane(
             )
         if dim in source.coords:
             place = real_array(source[dim].values) * factor_of(None, _stated(source[dim]), dim)
-            if np.abs(place - nodes).max() > TOLERANCE * nodes[1]:
+            order = np.argsort(place, kind="stable")
+            source, place = source.isel({dim: order}), place[order]
+            if not np.abs(place - nodes).max() <= TOLERANCE * nodes[1]:  # NaN is no place
                 raise InputError(
                     f"{dim} reaches from {place[0]:g} to {place[-1]:g} m, the nodes from"
                     f" {nodes[0]:g} to {nodes[-1]:g} m; on a plane values are taken at the nodes"
                     " only"
                 )
-    return real_array(source.values) * factor
+    return converted(real_array(source.values), unit, stated, quantity, strength, name)
 
 
 def _stated(source: Any) -> str | None:
@@ -93,19 +97,21 @@ def read_plane(
     interface: Interface,
     value: Any,
     unit: str | None,
-    any_dimension: bool,
+    strength: Map | None,
 ) -> Array:
     """The same from a .npy file of shape (nx, ny), in SI or in `unit`, a NetCDF file or text."""
     if path.suffix.lower() in NETCDF:
-        return on_plane(read_netcdf(path, 2), quantity, interface, value, unit, any_dimension)
+        return on_plane(read_netcdf(path, 2), quantity, interface, value, unit, strength)
     if path.suffix.lower() in TEXT:
-        return _from_table(
-            read_table(decoded(path)), quantity, interface, value, unit, any_dimension
-        )
+        return _from_table(read_table(decoded(path)), quantity, interface, value, unit, strength)
     if path.suffix.lower() != ".npy":
         raise InputError(
             "a profile of a plane is an array (nx, ny) in a .npy or .nc file, or text with the"
             f" columns x, y and value, got {path.name!r}"
+        )
+    if value is not None:
+        raise InputError(
+            f"value: a .npy file of a plane holds one array, without names; got {describe(value)}"
         )
     array = read_npy(path)
     if array.shape == interface.shape[::-1] != interface.shape:
@@ -115,7 +121,7 @@ def read_plane(
         )
     if array.shape != interface.shape:
         raise InputError(f"must have shape {interface.shape}, got shape {array.shape}")
-    return array * factor_of(unit, None, quantity, any_dimension)
+    return converted(array, unit, None, quantity, strength)
 
 
 def _from_table(
@@ -124,10 +130,16 @@ def _from_table(
     interface: Interface,
     value: Any,
     unit: str | None,
-    any_dimension: bool,
+    strength: Map | None,
 ) -> Array:
     """Values at the nodes from columns x, y and value; NaN where there is none."""
     names = [str(name).casefold() for name in table.names]
+    if not any(table.names):
+        raise InputError(
+            f"holds {len(names)} columns without names, as of a matrix; a map as text has a line"
+            " for each place, with columns called 'x', 'y' and the value's; save a matrix"
+            " (nx, ny) with np.save as .npy"
+        )
     if "x" not in names or "y" not in names:
         raise InputError(
             "a map as text needs a line of names, with columns called 'x', 'y' and the value's, got"
@@ -140,8 +152,7 @@ def _from_table(
     if value is not None and not chosen:
         raise InputError(unknown_name("value", str(value), [str(table.names[i]) for i in rest]))
     known = [(table.names[i], table.units[i] or unit) for i in rest]
-    column = chosen[0] if chosen else rest[choose(known, quantity, any_dimension)]
-    factor = factor_of(unit, table.units[column], quantity, any_dimension)
+    column = chosen[0] if chosen else rest[choose(known, quantity, strength)]
     found = np.full(interface.shape, np.nan)
     index = []
     for dim, spacing, count in zip(
@@ -165,4 +176,4 @@ def _from_table(
     if np.unique(flat).size < flat.size:
         raise InputError("repeats a place: two lines have the same x and y")
     found.ravel()[flat] = table.columns[column]
-    return found * factor
+    return converted(found, unit, table.units[column], quantity, strength, table.names[column])

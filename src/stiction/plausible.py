@@ -26,6 +26,8 @@ WEAKEST = 1e-8
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
 USUAL = 1e-3
 """Strength over shear modulus of polymers in the laboratory; of rock a tenth of that."""
+TYPICAL = 1e6
+"""Pa; shear strength of polymers in the laboratory, where surfaces are measured."""
 SLIPPERIEST = 1e-4
 """Friction coefficient; structural superlubricity has 1e-4 or less."""
 ROUGHEST = 50.0
@@ -133,6 +135,23 @@ def warn_of_length(problem: Problem, patch: float, strength: float | None = None
         f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
         f" ({length:.3g} m): all of it slides as one",
         suspects(problem, length / patch, strength),
+    )
+
+
+def is_strength(value: float) -> bool:
+    """Whether some solid may have such a mean strength (Pa)."""
+    low, high = _PARTS["strength"][2]
+    return low <= value <= high
+
+
+def warn_of_mapped(strength: float, others: Mapping[str, float]) -> None:
+    """Warn of a mean strength (Pa) made of heights without a unit; `others`: if in which one."""
+    fits = {unit: abs(math.log(value / TYPICAL)) for unit, value in others.items()
+            if is_strength(value)}  # fmt: skip
+    unit = min(fits, key=lambda unit: fits[unit]) if fits else None
+    _warn(
+        f"strength: makes {strength:.4g} Pa in the mean of values that state no unit, taken as m",
+        f"they are in {unit}: unit={unit!r}" if unit else "",
     )
 
 

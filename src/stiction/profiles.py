@@ -6,7 +6,6 @@ until somebody asks for them to be filled.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,17 @@ from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_nodes import AtNodes, Gaps, Points, check_gaps, in_order
 from stiction.profile_text import Table, read_table
-from stiction.quantities import PLACES, UNITS, choose, factor_of, mapped_by
+from stiction.quantities import (
+    OF_A_PLANE,
+    PLACES,
+    UNITS,
+    Map,
+    choose,
+    converted,
+    factor_of,
+    is_called,
+    is_height,
+)
 from stiction.topographies import is_topography, mapped
 
 if TYPE_CHECKING:
@@ -64,7 +73,9 @@ def read_profile(
         'weakening_rate' (Pa/m), 'critical_slip' (m), 'load_profile' or 'friction_coefficient' (1).
     strength : callable, optional
         Map from another measured quantity, such as heights in SI units, to the strength in Pa;
-        nothing is taken for a strength without one. On a plane it gets an array (nx, ny).
+        nothing is taken for a strength without one. It is applied to what is called ``height`` or
+        ``z``, to the only variable in a unit of length, or to the only one that is no stress. On a
+        plane it gets an array (nx, ny).
     interface : Interface, optional
         Put the profile on its nodes x_i = i L/n, modulo L; as it is if left out. Points may come
         in any order and begin anywhere. On a plane values at the nodes are taken, from ``.npy`` of
@@ -91,6 +102,9 @@ def read_profile(
 
     Warns
     -----
+    UnitWarning
+        If `strength` is applied to a stress that is called neither hardness nor a pressure, or
+        makes of heights without a unit what is no strength of a solid.
     AccuracyWarning
         If something is interpolated or filled in, or x lies between the nodes.
 
@@ -116,6 +130,14 @@ def read_profile(
         raise InputError(unknown_name("quantity", str(quantity), UNITS))
     if interface is not None and not isinstance(interface, Interface):
         raise InputError(f"interface: must be an Interface, got {describe(interface)}")
+    for what, text in {"unit": unit, "x_unit": x_unit}.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{what}: must be a text such as 'um', got {describe(text)}")
+    if strength is not None and not callable(strength):
+        raise InputError(
+            "strength: must be a function that makes strength (Pa) of an array of heights (m), such"
+            f" as lambda h: 1e12 * h; got {describe(strength)}"
+        )
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
     if is_topography(source):
@@ -128,11 +150,16 @@ def read_profile(
     if interface is not None and interface.is_plane:
         if x is not None or x_unit is not None:
             raise InputError("x and x_unit: are options of profiles of a line")
+        if interpolate:
+            raise InputError(
+                "interpolate: is an option of profiles of a line; on a plane values are taken at"
+                " the nodes"
+            )
         return _of_plane(name, source, quantity, interface, value, unit, strength, gaps)
     try:
         points = points_of(source, quantity, x, value, unit, x_unit, strength)
         if points.values.ndim != 1:
-            raise InputError(f"must hold one profile, got shape {points.values.shape}")
+            raise InputError(f"must hold one profile, got shape {points.values.shape}{OF_A_PLANE}")
         values, place, measured = points.values, points.x, points.measured
         if interface is not None:
             values, measured = points.on(interface, interpolate=interpolate, gaps=gaps)
@@ -143,8 +170,7 @@ def read_profile(
             again = np.flatnonzero(np.diff(place) == 0.0)
             if again.size:
                 raise InputError(
-                    f"x repeats: {place[again[0]]:.9g} m stands beside two values; a map over x and"
-                    " y is read with the plane it belongs to, interface=..."
+                    f"x repeats: {place[again[0]]:.9g} m stands beside two values{OF_A_PLANE}"
                 )
             measured = None if measured is None else measured[order]
     except InputError as error:
@@ -165,7 +191,7 @@ def _of_plane(
     interface: Interface,
     value: Any,
     unit: str | None,
-    strength: Callable[[Array], Array] | None,
+    strength: Map | None,
     gaps: Gaps,
 ) -> xr.DataArray:
     """`read_profile` of a plane, which takes values at the nodes only."""
@@ -178,11 +204,9 @@ def _of_plane(
             f"source: must be a path, a DataArray or a Dataset, got {describe(source)}"
         )
     try:
-        values = read(given, quantity, interface, value, unit, strength is not None)
+        values = read(given, quantity, interface, value, unit, strength)
         if values.shape != interface.shape:
             raise InputError(f"must hold one profile, got shape {values.shape}")
-        if strength is not None:
-            values = mapped_by(strength, values)
         values, measured = close_gaps(values, interface, gaps)
     except InputError as error:
         raise InputError([_prefixed(name, text) for text in error.problems]) from None
@@ -207,7 +231,7 @@ def points_of(
     value: str | int | None = None,
     unit: str | None = None,
     x_unit: str | None = None,
-    strength: Callable[[Array], Array] | None = None,
+    strength: Map | None = None,
 ) -> Points:
     """What `source` says of a quantity, in SI; see `read_profile`."""
     if isinstance(source, str | Path):
@@ -224,17 +248,16 @@ def points_of(
         else:
             source = _table_of(read_npy(path), x, value)
     if isinstance(source, Table):
-        column, place, stated, x_stated = _choose_columns(source, quantity, x, value, strength)
-        factor = factor_of(unit, stated, quantity, strength is not None)
-        at = None if place is None else place * factor_of(x_unit, x_stated, "x")
-        points = Points(column * factor, at)
-    elif is_labelled(source):
-        points = labelled(source, quantity, x, value, unit, x_unit, strength is not None)
-    else:
-        raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
-    if strength is None:
-        return points
-    return dataclasses.replace(points, values=mapped_by(strength, points.values))
+        column, place = _choose_columns(source, quantity, x, value, strength)
+        at = None
+        if place is not None:
+            at = source.columns[place] * factor_of(x_unit, source.units[place], "x")
+        name, stated = source.names[column], source.units[column]
+        values = converted(source.columns[column], unit, stated, quantity, strength, name)
+        return Points(values, at)
+    if is_labelled(source):
+        return labelled(source, quantity, x, value, unit, x_unit, strength)
+    raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
 
 
 def _table_of(array: Array, x: Any, value: Any) -> Table:
@@ -243,34 +266,49 @@ def _table_of(array: Array, x: Any, value: Any) -> Table:
     if array.ndim == 2 and array.size and value is not None:
         width = array.shape[1]
         return Table((None,) * width, (None,) * width, array.T)
-    hint = "; of an array of columns say which: x=0, value=1" if array.ndim == 2 else ""
+    columns = "; of an array of columns say which: x=0, value=1"
+    hint = columns + OF_A_PLANE if array.ndim == 2 else ""
     raise InputError(f"must hold one profile, shape (nodes,), got shape {array.shape}{hint}")
 
 
 def _choose_columns(
-    table: Table, quantity: str, x: Any, value: Any, strength: Any
-) -> tuple[Array, Array | None, str | None, str | None]:
-    """Values, x, and the units that are stated of both."""
+    table: Table, quantity: str, x: Any, value: Any, strength: Map | None
+) -> tuple[int, int | None]:
+    """The columns of the values and of x."""
     names, width = table.names, len(table.names)
+    if _is_map(table) and x is None:
+        raise InputError(f"holds values over x and y, not along a line{OF_A_PLANE}")
     value = _column("value", value, names)
     place = _column("x", x, names)
     if place is None and width > 1:
+        # Heights beside the strength are no coordinate.
+        beside_strength = (
+            strength is not None and is_height(names[0]) and is_called(names[1], quantity)
+        )
         called = [i for i, name in enumerate(names) if str(name).casefold() in PLACES]
         if len(called) == 1:
             place = called[0]
-        elif width == 2 and value != 0:
+        elif width == 2 and value != 0 and not beside_strength:
             place = 0
-        elif value is None:
+        elif value is None and width > 2:
             raise InputError(
                 f"has {width} columns ({_listed(names)}); say which are meant: x=..., value=..."
+                + ("" if any(names) else OF_A_PLANE)
             )
     others = [i for i in range(width) if i != place]
     if value is None:
         known = [(names[i], table.units[i]) for i in others]
-        value = others[choose(known, quantity, strength is not None)]
-    at = None if place is None else table.columns[place]
-    x_unit = None if place is None else table.units[place]
-    return table.columns[value], at, table.units[value], x_unit
+        value = others[choose(known, quantity, strength)]
+    return value, place
+
+
+def _is_map(table: Table) -> bool:
+    """Whether there are columns x and y, and a place on either axis has several lines."""
+    names = [str(name).casefold() for name in table.names]
+    if "x" not in names or "y" not in names:
+        return False
+    places = [table.columns[names.index(dim)] for dim in ("x", "y")]
+    return all(1 < np.unique(place).size < place.size for place in places)
 
 
 def _column(what: str, wanted: Any, names: Sequence[str | None]) -> int | None:
@@ -295,7 +333,8 @@ def _and_own_gaps(measured: Any, source: Any) -> Any:
     """Where a map was measured, those that were filled earlier taken into account."""
     if MEASURED not in getattr(source, "coords", {}):
         return measured
-    own = source.coords[MEASURED].transpose("x", "y").values.astype(bool)
+    own = source.coords[MEASURED].transpose("x", "y")
+    own = own.sortby([dim for dim in own.dims if dim in own.coords]).values.astype(bool)
     return own if measured is None else measured & own
 
 

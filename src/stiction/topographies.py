@@ -46,7 +46,7 @@ def mapped(
         raise InputError("states no unit of its lengths; set it (topography.scale_height, unit=)")
     scale = factor_to("m", str(unit))
     heights = np.ma.filled(np.ma.asarray(source.heights(), dtype=np.float64), np.nan) * scale
-    values = mapped_by(strength, heights)
+    values = mapped_by(strength, heights, quantity)
     dims = ("x", "y")[: heights.ndim]
     uniform = bool(getattr(source, "is_uniform", True))
     places = {

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import stiction as st
+from stiction.profiles import at_nodes
 
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(32, 16))
 VALUES = 1e6 + 1e5 * np.sin(2.0 * np.pi * PLANE.x / 0.02)[:, None] * np.ones(16)
@@ -139,6 +140,60 @@ def test_a_variable_that_says_nothing_is_no_strength(tmp_path):
     np.testing.assert_allclose(found, 1e3 * VALUES)
 
 
-def test_a_map_is_not_read_as_a_line(tmp_path):
-    with pytest.raises(st.InputError, match="x repeats.*interface="):
-        st.read_profile(text(tmp_path / "map.csv"))
+@pytest.mark.parametrize("interface", [None, st.Interface(length=0.02, nodes=32)])
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".npy", "matrix", "array"])
+@pytest.mark.filterwarnings("error")
+def test_a_map_is_not_read_as_a_line(tmp_path, ending, interface):
+    if ending == "matrix":
+        path = tmp_path / "matrix.csv"
+        np.savetxt(path, VALUES, delimiter=",")
+    elif ending == "array":
+        path = xr.DataArray(VALUES, dims=("x", "y"))
+    else:
+        path, _ = heights_in(tmp_path, ending)
+    for given in ({}, {"strength": lambda h: 1e12 * h, "unit": "um"}):
+        with pytest.raises(st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly\)"):
+            st.read_profile(path, interface=interface, **given)
+
+
+def test_filled_gaps_of_a_turned_map_stay_where_they_are(tmp_path):
+    path = text(tmp_path / "map.csv", without=3)
+    with pytest.warns(st.AccuracyWarning, match="filled"):
+        filled = st.read_profile(path, interface=PLANE, gaps="fill")
+    found = at_nodes("strength", filled[::-1, ::-1], "strength", PLANE)
+    np.testing.assert_array_equal(found.values, filled)
+    np.testing.assert_array_equal(found.measured, filled["measured"])
+
+
+@pytest.mark.parametrize("order", ["descending", "shuffled"])
+def test_coordinates_of_a_map_decide_and_not_the_order(tmp_path, order):
+    values = VALUES + 1e4 * np.arange(16)
+    array = xr.DataArray(values, dims=("x", "y"), coords=PLANE.coordinates, name="strength")
+    for dim, count in array.sizes.items():
+        index = np.arange(count)[::-1]
+        if order == "shuffled":
+            index = np.random.default_rng(0).permutation(count)
+        array = array.isel({dim: index})
+    array.to_netcdf(tmp_path / "map.nc")
+    for source in (array, tmp_path / "map.nc"):
+        np.testing.assert_array_equal(st.read_profile(source, interface=PLANE), values)
+    unknown = array.assign_coords(x=np.where(array.x == 0.0, np.nan, array.x))
+    with pytest.raises(st.InputError, match="x reaches from .* to nan"):
+        st.read_profile(unknown, interface=PLANE)
+
+
+def test_a_matrix_as_text_is_told_what_it_is(tmp_path):
+    np.savetxt(tmp_path / "map.csv", VALUES, delimiter=",")
+    with pytest.raises(st.InputError, match="16 columns without names, as of a matrix.*np.save"):
+        st.read_profile(tmp_path / "map.csv", interface=PLANE)
+
+
+def test_options_without_a_meaning_on_a_plane_are_refused(tmp_path):
+    np.save(tmp_path / "map.npy", VALUES)
+    with pytest.raises(st.InputError, match="interpolate: is an option of profiles of a line"):
+        st.read_profile(tmp_path / "map.npy", interface=PLANE, interpolate=True)
+    with pytest.raises(st.InputError, match="value: a .npy file of a plane holds one array"):
+        st.read_profile(tmp_path / "map.npy", interface=PLANE, value="q")
+    given = xr.DataArray(VALUES, dims=("x", "y"), name="tau")
+    with pytest.raises(st.InputError, match="value: 'q' is not the one variable here, 'tau'"):
+        st.read_profile(given, interface=PLANE, value="q")

@@ -200,6 +200,118 @@ def test_heights_are_no_strength(interface, strength, tmp_path, head):
         points_of(heights.drop_attrs(), "strength")
 
 
+@pytest.mark.parametrize("ending", [".csv", ".nc"])
+@pytest.mark.parametrize("with_x", [True, False])
+def test_a_map_is_applied_to_heights_and_not_to_the_strength_beside_them(
+    interface, strength, tmp_path, ending, with_x
+):
+    """The strength (1e6 Pa) times 1e11 would be 1e17 Pa."""
+    heights = 10.0 * interface.x
+    path = tmp_path / f"p{ending}"
+    if ending == ".csv":
+        head = "x (mm);height (um);strength (MPa)"
+        columns = [interface.x * 1e3, heights, strength * 1e-6]
+        path.write_text(text_of(columns, head=head) if with_x else
+                        text_of(columns[1:], head=head[7:]))  # fmt: skip
+    else:
+        data = {"strength": ("x", strength * 1e-6, {"units": "MPa"})}
+        data["height"] = ("x", heights, {"units": "um"})
+        xr.Dataset(data, {"x": interface.x} if with_x else None).to_netcdf(path)
+    found = st.read_profile(path, strength=lambda h: 1e11 * h)
+    np.testing.assert_allclose(found, 1e5 * heights, rtol=1e-10)
+    assert ("x" in found.coords) == with_x
+    with pytest.raises(st.InputError, match="'strength' is the strength already"):
+        st.read_profile(path, value="strength", strength=lambda h: 1e11 * h)
+
+
+def test_which_variable_a_map_is_applied_to_is_not_guessed(strength):
+    both = xr.Dataset({name: ("x", strength, {"units": "um"}) for name in ("front", "back")})
+    with pytest.raises(st.InputError, match="which variable strength= is applied to.*value=..."):
+        st.read_profile(both, strength=lambda h: h)
+    one = both.assign(back=both["back"].assign_attrs(units="1"))  # the only length
+    np.testing.assert_allclose(st.read_profile(one, strength=lambda h: 1e6 * h), strength)
+    beside = both[["front"]].assign(tau=both["back"].assign_attrs(units="MPa"))
+    np.testing.assert_allclose(st.read_profile(beside, strength=lambda h: 1e6 * h), strength)
+    stresses = beside.assign(front=both["front"].assign_attrs(units="kPa"))
+    with pytest.raises(st.InputError, match="'front' in kPa, 'tau' in MPa"):
+        st.read_profile(stresses, strength=lambda h: h)
+
+
+def test_a_map_from_a_stress_is_doubted_unless_the_source_says_what_it_is(strength, tmp_path):
+    np.save(tmp_path / "p.npy", strength)
+    with pytest.warns(st.UnitWarning, match="the quantity to map is in Pa, a stress"):
+        st.read_profile(tmp_path / "p.npy", unit="Pa", strength=lambda h: h)
+    given = xr.DataArray(strength, dims="x", name="height", attrs={"units": "MPa"})
+    with pytest.raises(st.InputError, match="'height' is in MPa, which is no unit of length"):
+        st.read_profile(given, strength=lambda h: h)
+    with pytest.raises(st.InputError, match="'tau' is the strength already"):
+        st.read_profile(given.rename("tau"), strength=lambda h: h)
+    with pytest.warns(st.UnitWarning, match="'front' is in MPa, a stress"):
+        st.read_profile(given.rename("front"), strength=lambda h: h)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = st.read_profile(given.rename("pressure"), strength=lambda p: 0.6e-6 * p)
+    np.testing.assert_allclose(found, 0.6 * strength)
+
+
+def test_the_unit_of_heights_is_not_called_one_of_strength(strength):
+    given = xr.DataArray(strength, dims="x", name="z", attrs={"units": "banana"})
+    with pytest.raises(st.InputError, match="'z' unknown unit 'banana'"):
+        st.read_profile(given, strength=lambda h: h)
+    with pytest.raises(st.InputError, match="'z' is said to be in mm, the source states um"):
+        st.read_profile(given.assign_attrs(units="um"), unit="mm", strength=lambda h: h)
+
+
+MAPS = {
+    "strength: must be a function.*got 5": 5,
+    "strength: failed with TypeError: .*missing 1.*called with one array": lambda h, b: h,
+    "strength: failed with ZeroDivisionError": lambda h: h * (1 / 0),
+    "strength: .*finite and not negative, got -1e\\+06 for 0 ": lambda h: h - 1e6,
+    "strength: .*got inf": lambda h: h + np.inf,
+    "strength: .*got nan .*at 128 of 128 points": lambda h: h * np.nan,
+    "strength: failed with TypeError: .*complex128": lambda h: h + 1j,
+}
+
+
+@pytest.mark.parametrize("words", MAPS)
+def test_maps_that_make_no_strength_are_refused(interface, tmp_path, words):
+    np.save(tmp_path / "p.npy", interface.x)
+    with pytest.raises(st.InputError, match=words):
+        st.read_profile(tmp_path / "p.npy", strength=MAPS[words], unit="mm")
+
+
+def test_a_map_may_be_negative_of_what_may_and_leaves_gaps(interface, tmp_path):
+    heights = np.where(interface.x > 0.05, np.nan, interface.x)
+    np.save(tmp_path / "p.npy", heights)
+    options = {"quantity": "initial_stress", "unit": "m"}
+    found = st.read_profile(tmp_path / "p.npy", strength=lambda h: -1e6 - h, **options)
+    assert (found.values[~np.isnan(heights)] < 0.0).all()
+    filled = st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e6 + np.nan_to_num(h))
+    np.testing.assert_array_equal(np.isnan(filled), np.isnan(heights))
+
+
+def test_heights_without_a_unit_that_make_no_strength_are_doubted(interface, tmp_path):
+    np.save(tmp_path / "p.npy", 1.0 + interface.x)  # um
+    with pytest.warns(st.UnitWarning, match="1.05e\\+12 Pa.*perhaps they are in um: unit='um'"):
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e12 * h)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e6 * h)
+        st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e12 * h, unit="um")
+
+
+def test_options_of_the_wrong_kind_are_refused(interface, strength, tmp_path):
+    np.save(tmp_path / "p.npy", strength)
+    with pytest.raises(st.InputError, match="unit: must be a text such as 'um', got 3"):
+        st.read_profile(tmp_path / "p.npy", unit=3)
+    with pytest.raises(st.InputError, match="x_unit: must be a text"):
+        st.read_profile(tmp_path / "p.npy", x_unit=3)
+    given = labelled(strength, interface.x).rename("tau")
+    with pytest.raises(st.InputError, match="value: 'q' is not the one variable here, 'tau'"):
+        st.read_profile(given, value="q")
+    np.testing.assert_array_equal(st.read_profile(given, value="tau"), strength)
+
+
 def test_netcdf_with_units(interface, strength, tmp_path):
     x = ("x", interface.x[::-1] * 1e3, {"units": "mm"})
     data = {"friction_strength": ("x", strength[::-1] * 1e-6, {"units": "MPa"})}
