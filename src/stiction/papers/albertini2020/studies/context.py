@@ -13,7 +13,6 @@ import xarray as xr
 
 from stiction.ensemble.monte_carlo import monte_carlo
 from stiction.ensemble.scheduler import usable_cores
-from stiction.errors import AccuracyWarning, Warned, collect_warnings, warn_user
 from stiction.papers.albertini2020.setting import Setting
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -92,7 +91,7 @@ class Context:
         first: int = 0,
         weight: int = 1,
     ) -> xr.Dataset:
-        """An ensemble of this seed, its accuracy warnings kept for the report.
+        """An ensemble of this seed.
 
         `weight` is how many times as dear as usual a sample is.
         """
@@ -114,8 +113,8 @@ class Context:
     def map(self, work: Callable[[Item], Found], items: Iterable[Item], each: int) -> list[Found]:
         """`work` of every item, in threads, in the order of the items; each counts as `each`."""
         found = []
-        threads = ThreadPoolExecutor(self.workers or usable_cores())
-        with threads if self.executor is None else nullcontext(self.executor) as pool:
+        shared = nullcontext(self.executor) if self.executor else None
+        with shared or ThreadPoolExecutor(self.workers or usable_cores()) as pool:
             for result in pool.map(work, items):
                 found.append(result)
                 self.report(each)
@@ -132,19 +131,4 @@ class Context:
             self.report((done - seen) * each)
             seen = done
 
-        with collect_warnings() as caught:
-            result = compute(tell)
-        for warned in self.note(caught):
-            warn_user(*warned)
-        return result
-
-    def note(self, caught: Iterable[Warned]) -> list[Warned]:
-        """Keep the accuracy warnings among some, with the study's title; return the others."""
-        others = []
-        for warned in caught:
-            if issubclass(warned.category, AccuracyWarning):
-                text = f"{self.title}: {warned.message}"
-                self.warnings[text] = self.warnings.get(text, 0) + 1
-            else:
-                others.append(warned)
-        return others
+        return compute(tell)

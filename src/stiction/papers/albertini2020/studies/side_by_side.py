@@ -15,7 +15,7 @@ import xarray as xr
 
 from stiction._blas import one_blas_thread
 from stiction.ensemble.scheduler import usable_cores
-from stiction.errors import Warned, collect_warnings, warn_user
+from stiction.errors import AccuracyWarning, Warned, collect_warnings, warn_user
 from stiction.papers.albertini2020.registry import Study
 from stiction.papers.albertini2020.studies.context import Context
 
@@ -62,7 +62,7 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
     Leaving the iteration early abandons the rest.
     """
     waiting = {study.name: study for study in studies}
-    done = dict(context.results)
+    done = context.results
     cores = context.workers or usable_cores()
     running: dict[Future[tuple[xr.Dataset, list[Warned]]], tuple[Study, Context]] = {}
     reported: queue.SimpleQueue[int] = queue.SimpleQueue()
@@ -108,14 +108,12 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
                         waiting.clear()
                         continue
                     dataset, others = future.result()
-                    done[study.name] = context.results[study.name] = dataset
+                    done[study.name] = dataset
                     context.warnings.update(own.warnings)
                     for warned in others:  # from here: its thread knows no line of the caller
                         warn_user(*warned)
                     begin()
-                    yield study, done[study.name]
-            while not reported.empty():
-                context.report(reported.get())
+                    yield study, dataset
             if failures:
                 raise failures[0]
         finally:
@@ -127,7 +125,13 @@ def _compute(study: Study, context: Context) -> tuple[xr.Dataset, list[Warned]]:
     begin = time.thread_time()
     with collect_warnings() as caught:
         dataset = study.compute(context)
-    others = context.note(caught)
+    others = []
+    for warned in caught:
+        if issubclass(warned.category, AccuracyWarning):
+            text = f"{study.title}: {warned.message}"
+            context.warnings[text] = context.warnings.get(text, 0) + 1
+        else:
+            others.append(warned)
     seconds = time.thread_time() - begin
     if isinstance(context.executor, _Share):
         seconds += context.executor.seconds
