@@ -72,18 +72,21 @@ def test_the_costliest_begins_first():
 
 
 def test_warnings_and_progress_belong_to_their_study():
-    def warns(context):
-        def run(tell):
-            warn_accuracy(f"so says {context.title}")
-            list(context.executor.map(lambda i: warn_accuracy(f"sample {i % 1}"), range(3)))
-            tell(1, 1)
-            return xr.Dataset()
+    def warns(name):
+        def compute(context):
+            def run(tell):
+                warn_accuracy(f"so says Study {name}")
+                list(context.executor.map(lambda i: warn_accuracy(f"sample {i % 1}"), range(3)))
+                tell(1, 1)
+                return xr.Dataset()
 
-        return context.listen(run, 7)
+            return context.listen(run, 7)
+
+        return compute
 
     told = []
     context = _context(workers=2, report=told.append)
-    list(side_by_side([_study("a", warns), _study("b", warns)], context))
+    list(side_by_side([_study(name, warns(name)) for name in "ab"], context))
     assert context.warnings == {
         "Study a: so says Study a": 1, "Study a: sample 0": 3,
         "Study b: so says Study b": 1, "Study b: sample 0": 3,

@@ -60,8 +60,6 @@ class Context:
         Accuracy warnings that came up, with how often; the page shows them.
     results : dict of str to Dataset
         Of the studies that are done; a study may use those that it names in `needs`.
-    title : str
-        Of the study that is running.
     """
 
     setting: Setting
@@ -75,7 +73,6 @@ class Context:
     report: Callable[[int], None] = _unheard
     warnings: dict[str, int] = field(default_factory=dict)
     results: dict[str, xr.Dataset] = field(default_factory=dict)
-    title: str = ""
 
     @property
     def fewer(self) -> int:

@@ -85,7 +85,6 @@ def side_by_side(studies: Iterable[Study], context: Context) -> Iterator[tuple[S
                 report=report,
                 warnings={},
                 results=dict(done),
-                title=study.title,
             )
             running[leaders.submit(_compute, waiting.pop(study.name), own)] = study, own
 
