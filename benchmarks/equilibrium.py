@@ -62,7 +62,7 @@ def by_bisection(matrix, tau_p, tolerance=1e-9):
 
 def main():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
-    problem = st.Problem(solid, st.Interface(0.1, NODES), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(0.1, NODES), st.LinearWeakening(weakening_rate=0.5e12))
     matrix = matrix_of(problem)
     solver = Equilibrium().prepare(problem)
     print(f"equilibrium, n = {NODES}, one core; us a sample; events of arrest included")

@@ -33,7 +33,7 @@ def factor_time(problem, slip):
 
 def main():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
-    problem = st.Problem(solid, st.Interface(3.456, NODES), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(3.456, NODES), st.LinearWeakening(weakening_rate=0.5e12))
     solver = Equilibrium(slip=True).prepare(problem)
     patches = problem.interface.length / problem.nucleation_length
     print(f"equilibrium, n = {NODES}, L/h_n = {patches:.0f}, one core; us a sample")

@@ -27,7 +27,7 @@ def system(nodes):
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         spectrum=st.PowerLawSpectrum(correlation_length=0.5 * length),
     )
-    return st.Problem(solid, plane, st.SlipWeakening(weakening_rate=RATE)), field
+    return st.Problem(solid, plane, st.LinearWeakening(weakening_rate=RATE)), field
 
 
 def plain_field(field, modes, shape, draws):

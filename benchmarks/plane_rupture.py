@@ -41,7 +41,7 @@ def problem_and_strength(nodes: int) -> tuple[st.Problem, np.ndarray]:
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         st.PowerLawSpectrum(correlation_length=0.5 * h_n),
     )
-    problem = st.Problem(solid, plane, st.SlipWeakening(weakening_rate=RATE))
+    problem = st.Problem(solid, plane, st.LinearWeakening(weakening_rate=RATE))
     return problem, field.sample(plane, samples=1, seed=1)
 
 

@@ -77,7 +77,7 @@ def main():
                             stress,
                             method=method,
                             algorithm=name,
-                            target_cov=TARGET,
+                            target_cv=TARGET,
                             seed=seed,
                             workers=1,
                         )
@@ -93,7 +93,7 @@ def main():
                 )
     start = time.perf_counter()
     answer = design_stress(
-        problem, field, probability=1e-6, method=Equilibrium(), target_cov=TARGET, workers=1
+        problem, field, probability=1e-6, method=Equilibrium(), target_cv=TARGET, workers=1
     )
     print(f"design stress, P = 1e-6, equilibrium: {time.perf_counter() - start:.2f} s; {answer}")
     state = make_limit_state(problem, field, LocalCriterion(), 0, {}, "critical_stress", 1)

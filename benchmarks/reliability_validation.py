@@ -34,7 +34,7 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
             stress,
             method=method,
             algorithm=algorithm,
-            target_cov=target,
+            target_cv=target,
             seed=seed,
             workers=1,
         )
@@ -76,7 +76,7 @@ def main():
             stress,
             method=method,
             algorithm="importance",
-            target_cov=0.015,
+            target_cv=0.015,
             seed=99,
             workers=1,
         )
@@ -97,7 +97,7 @@ def main():
         counted = float(np.mean(counts[1] < stress))
         rule = -math.expm1(4.0 * math.log1p(-chance))
         found = failure_probability(
-            long, field, stress, method=local, algorithm="subset", target_cov=0.05, workers=1
+            long, field, stress, method=local, algorithm="subset", target_cv=0.05, workers=1
         )
         share = math.log1p(-rule) / math.log1p(-counted)
         print(

@@ -135,7 +135,7 @@ def calls() -> list[Call]:
     """Everything public, each with arguments that work and take little time."""
     solid = {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}
     interface = st.Interface(length=0.1, nodes=NODES)
-    friction = st.SlipWeakening(weakening_rate=0.1e12)
+    friction = st.LinearWeakening(weakening_rate=0.1e12)
     problem = st.Problem(st.Solid(**solid), interface, friction)
     beta = {"alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6}
     spectrum = st.PowerLawSpectrum(correlation_length=0.02)
@@ -154,16 +154,16 @@ def calls() -> list[Call]:
                                       "critical_slip", "fracture_energy", "normal_pressure",
                                       "correlation")}  # fmt: skip
     chance = {
-        **ensemble_of, "method": local, "seed": 0, "target_cov": 0.5,
+        **ensemble_of, "method": local, "seed": 0, "target_cv": 0.5,
         "max_evaluations": 5000, "confidence": 0.9, "event": "critical_stress", "workers": 1,
     }  # fmt: skip
     values = np.linspace(0.7e6, 0.9e6, 50)
     return [
         ("Solid", st.Solid, {**solid, "plane": "strain"}),
         ("Interface", st.Interface, {"length": 0.1, "nodes": NODES}),
-        ("SlipWeakening", st.SlipWeakening,
+        ("LinearWeakening", st.LinearWeakening,
          {"weakening_rate": 1e11, "critical_slip": None, "residual_strength": 0.0}),
-        ("SlipWeakening", st.SlipWeakening, {"critical_slip": 1e-6}),
+        ("LinearWeakening", st.LinearWeakening, {"critical_slip": 1e-6}),
         ("Load", st.Load, {"profile": 1.0, "initial_stress": 0.0, "normal_pressure": 1e6}),
         ("Problem", st.Problem,
          {"solid": problem.solid, "interface": interface, "friction": friction,

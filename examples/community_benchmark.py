@@ -55,7 +55,7 @@ def benchmark(spacing: float) -> tuple[st.Problem, np.ndarray]:
     # A node stands for its cell: one on the edge of the square lies in it by half.
     inside = [np.clip((SQUARE / 2 - away) / spacing + 0.5, 0.0, 1.0) for away in (x, y)]
     initial = AROUND + (INSIDE - AROUND) * inside[0] * inside[1]
-    friction = st.SlipWeakening(critical_slip=CRITICAL_SLIP, residual_strength=RESIDUAL)
+    friction = st.LinearWeakening(critical_slip=CRITICAL_SLIP, residual_strength=RESIDUAL)
     load = st.Load(initial_stress=initial)
     return st.Problem(SOLID, plane, friction, load), np.where(fault, STRENGTH, np.inf)
 

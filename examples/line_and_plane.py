@@ -27,7 +27,7 @@ from stiction.statistics.estimates import Estimate, mean, standard_deviation
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-FRICTION = st.SlipWeakening(weakening_rate=0.5e12)
+FRICTION = st.LinearWeakening(weakening_rate=0.5e12)
 NUCLEATION_LENGTH = st.Problem(
     SOLID, st.Interface(length=0.1, nodes=512), FRICTION
 ).nucleation_length

@@ -19,7 +19,7 @@ np.savetxt("strength.csv", rows, delimiter=";", header="x (mm); strength (MPa)",
 problem = st.Problem(
     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
     interface=st.Interface(length=0.1, nodes=1024),
-    friction=st.SlipWeakening(weakening_rate=0.5e12),
+    friction=st.LinearWeakening(weakening_rate=0.5e12),
 )
 profile = st.read_profile(Path("strength.csv"), interface=problem.interface, interpolate=True)
 for method in (st.LocalCriterion(), st.Equilibrium()):

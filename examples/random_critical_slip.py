@@ -26,7 +26,7 @@ cases = {
 }
 onsets = {}
 for name, (law, more) in cases.items():
-    problem = st.Problem(paper.solid, paper.interface, st.SlipWeakening(**law))
+    problem = st.Problem(paper.solid, paper.interface, st.LinearWeakening(**law))
     random = st.RandomInterface(strength=strength, **more)
     onsets[name] = st.monte_carlo(problem, random, method=st.Equilibrium(), samples=60, seed=0)
     mean = float(onsets[name].critical_stress.mean())

@@ -9,7 +9,7 @@ import stiction as st
 
 solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
 plane = st.Interface(length=(0.0138, 0.0138), nodes=(48, 48))
-problem = st.Problem(solid, plane, st.SlipWeakening(weakening_rate=0.5e12))
+problem = st.Problem(solid, plane, st.LinearWeakening(weakening_rate=0.5e12))
 strength = st.RandomField(
     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
     spectrum=st.PowerLawSpectrum(correlation_length=2e-3),

@@ -43,7 +43,7 @@ def problem(solid):
     import stiction as st
 
     return st.Problem(
-        solid, st.Interface(length=0.1, nodes=256), st.SlipWeakening(weakening_rate=0.5e12)
+        solid, st.Interface(length=0.1, nodes=256), st.LinearWeakening(weakening_rate=0.5e12)
     )
 
 

@@ -22,7 +22,7 @@ LOAD = 7.5e5
 def rupture(steps: int, barrier: float = 1e6, end: float = 40e-6):
     """A weak spot under constant load; a high barrier arrests what it starts."""
     interface = st.Interface(length=0.1, nodes=256)
-    friction = st.SlipWeakening(weakening_rate=2e11, residual_strength=2e5)
+    friction = st.LinearWeakening(weakening_rate=2e11, residual_strength=2e5)
     problem = st.Problem(SOLID, interface, friction)
     strength = barrier - (barrier - 6.5e5) * np.exp(-(((interface.x - 0.05) / 0.012) ** 4))
     return st.simulate_rupture(

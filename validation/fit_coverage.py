@@ -45,14 +45,14 @@ CASES = {
     ),
     "exponential, lognormal": Case(
         st.RandomField(
-            st.Lognormal(mean=1e6, cov=0.3), st.ExponentialSpectrum(LENGTH), mean_mode=True
+            st.Lognormal(mean=1e6, cv=0.3), st.ExponentialSpectrum(LENGTH), mean_mode=True
         ),
         "lognormal",
         "exponential",
     ),
     "squared exponential, Weibull": Case(
         st.RandomField(
-            st.Weibull(mean=1e6, cov=0.3), st.SquaredExponentialSpectrum(LENGTH), mean_mode=True
+            st.Weibull(mean=1e6, cv=0.3), st.SquaredExponentialSpectrum(LENGTH), mean_mode=True
         ),
         "weibull",
         "squared_exponential",
@@ -72,7 +72,7 @@ def truth_of(case: Case, noise: float) -> dict[str, float]:
         "spectrum.correlation_length": spectrum.correlation_length,
         "noise": noise * deviation,
     }
-    names = ("alpha", "beta", "mean", "cov")
+    names = ("alpha", "beta", "mean", "cv")
     return values | {f"marginal.{n}": getattr(marginal, n) for n in names if hasattr(marginal, n)}
 
 

@@ -19,7 +19,7 @@ from stiction.plot.style import COLUMN, new_figure, paper_style, series
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES, STEPS, LOADING = 128, 1200, 3e9
 PROBLEM = st.Problem(
-    SOLID, st.Interface(length=0.05, nodes=NODES), st.SlipWeakening(weakening_rate=0.2e12)
+    SOLID, st.Interface(length=0.05, nodes=NODES), st.LinearWeakening(weakening_rate=0.2e12)
 )
 X = PROBLEM.interface.x
 TAU_P = 1e6 - 2e5 * np.exp(-(((X - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * X)

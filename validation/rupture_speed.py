@@ -26,7 +26,7 @@ def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
     modulus = SOLID.effective_modulus("II")
     spacing = 1.158 * modulus / RATE / 20.0
     problem = st.Problem(
-        SOLID, st.Interface(length=nodes * spacing, nodes=nodes), st.SlipWeakening(
+        SOLID, st.Interface(length=nodes * spacing, nodes=nodes), st.LinearWeakening(
             weakening_rate=RATE
         ),
     )  # fmt: skip

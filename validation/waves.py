@@ -41,7 +41,7 @@ def exact(t: float) -> float:
 
 def simulated(steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (in 1/(k c_s)) and a/a_0 of an explicit run; everything slides at its residual."""
-    friction = st.SlipWeakening(weakening_rate=1e9, residual_strength=1e6)
+    friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(SOLID, INTERFACE, friction)
     run = st.simulate_rupture(
         problem,

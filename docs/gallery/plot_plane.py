@@ -11,7 +11,7 @@ import stiction as st
 problem = st.Problem(
     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
     interface=st.Interface(length=(0.02, 0.01), nodes=(128, 64)),
-    friction=st.SlipWeakening(weakening_rate=0.5e12),
+    friction=st.LinearWeakening(weakening_rate=0.5e12),
 )
 strength = st.RandomField(
     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),

@@ -16,7 +16,7 @@ import stiction as st
 
 POINTS, SPACING = 1200, 0.1e-3  # 120 mm
 FIELD = st.RandomField(
-    st.Lognormal(mean=1.0e6, cov=0.18, low=0.3e6),  # Pa
+    st.Lognormal(mean=1.0e6, cv=0.18, low=0.3e6),  # Pa
     st.PowerLawSpectrum(correlation_length=2.4e-3, exponent=2.0, power_kept=0.999),  # m
     mean_mode=True,
 )

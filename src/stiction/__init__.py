@@ -11,7 +11,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Solid": "solid",
     "Interface": "interface",
-    "SlipWeakening": "friction.linear",
+    "LinearWeakening": "friction.linear",
     "ExponentialWeakening": "friction.exponential",
     "PiecewiseWeakening": "friction.piecewise",
     "Load": "load",
@@ -76,7 +76,7 @@ _HOMES = {
     "AccuracyWarning": "errors",
     "UnitWarning": "errors",
 }
-_MODULES = {"paper": "papers.albertini2020", "plot": "plot"}
+_MODULES = {"paper": "paper", "plot": "plot"}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 

@@ -33,7 +33,7 @@ from stiction.errors import (
 )
 from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
-from stiction.friction.linear import SlipWeakening as SlipWeakening
+from stiction.friction.linear import LinearWeakening as LinearWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
 from stiction.inference.design import design_of_tests as design_of_tests
 from stiction.inference.field_fit import FieldFit as FieldFit
@@ -49,7 +49,7 @@ from stiction.load import Load as Load
 from stiction.merge import (
     merge_parts as merge_parts,
 )
-from stiction.papers import albertini2020 as _albertini2020
+from stiction import paper as paper
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
 from stiction.random.custom_spectrum import CustomSpectrum as CustomSpectrum
@@ -110,5 +110,4 @@ from stiction.study.study import (
     Study as Study,
 )
 
-paper = _albertini2020
 __version__: str

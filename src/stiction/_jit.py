@@ -46,7 +46,10 @@ event.register("numba:compile", _FirstCompilation())
 
 
 def _digest_of_sources() -> str:
-    """Digest of every file with a kernel and of all that such files import, directly or not."""
+    """Digest of every file with a kernel and of what such files import, directly or not.
+
+    Files that refuse input hold no part of a kernel: an edited message recompiles nothing.
+    """
     package = Path(__file__).parent
     texts = {
         ".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes()
@@ -59,7 +62,8 @@ def _digest_of_sources() -> str:
     while waiting:
         for module, member in imported.findall(texts[waiting.pop()]):
             names = {module.decode(), f"{module.decode()}.{member.decode()}"}
-            waiting += (new := names & texts.keys() - reached)
+            new = {name for name in names & texts.keys() - reached if b"InputError" not in texts[name]}
+            waiting += new
             reached |= new
     digest = hashlib.sha256()
     for name in sorted(reached):

@@ -41,7 +41,7 @@ class Problem:
     ----------
     solid : Solid
     interface : Interface
-    friction : SlipWeakening, ExponentialWeakening or PiecewiseWeakening
+    friction : LinearWeakening, ExponentialWeakening or PiecewiseWeakening
     load : Load, optional
         Uniform and without initial stress if left out.
     mode : {"II", "III"}
@@ -59,7 +59,7 @@ class Problem:
     >>> problem = st.Problem(
     ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
     ...     interface=st.Interface(length=0.1, nodes=1024),
-    ...     friction=st.SlipWeakening(weakening_rate=0.5e12),
+    ...     friction=st.LinearWeakening(weakening_rate=0.5e12),
     ... )
     >>> round(problem.nucleation_length * 1e3, 3)  # mm
     3.456

@@ -16,7 +16,7 @@ def rupture(nodes, steps):
     """A weak spot that breaks a whole interface at constant load; slip and radiated energy."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
     interface = st.Interface(length=0.1, nodes=nodes)
-    friction = st.SlipWeakening(weakening_rate=2e11, residual_strength=2e5)
+    friction = st.LinearWeakening(weakening_rate=2e11, residual_strength=2e5)
     problem = st.Problem(solid, interface, friction)
     strength = 1e6 - 0.35e6 * np.exp(-(((interface.x - 0.05) / 0.012) ** 2))
     method = Rupture(loading_rate=1.0, implicit=False, time_step=END / steps)
@@ -67,7 +67,7 @@ def test_implicit_steps_approach_the_explicit_solution():
     """The same slow onset by explicit steps only, and by implicit steps of two sizes."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     interface = st.Interface(length=0.1, nodes=256)
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=2e11))
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=2e11))
     strength = 1e6 - 3e5 * np.exp(-(((interface.x - 0.05) / 0.01) ** 2))
     rows = problem.sample(strength)
 

@@ -15,7 +15,7 @@ DEPTH = 0.4e6
 def relative_error(nodes_per_patch, periods):
     """Onset of a Gaussian dip two h_n wide against the weighted mean, as a share of its depth."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    friction = st.LinearWeakening(weakening_rate=0.5e12)
     patch = 2.0 * 0.5788869418506 * solid.effective_modulus() / 0.5e12
     interface = st.Interface(length=periods * patch, nodes=periods * nodes_per_patch)
     problem = st.Problem(solid, interface, friction)

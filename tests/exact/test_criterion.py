@@ -138,7 +138,7 @@ def test_load_profile_and_initial_stress(solid):
         initial_stress=1e5 * np.cos(2.0 * np.pi * x / 0.1) + 2e5,
         normal_pressure=5e6,
     )
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12), load)
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
     result = st.onset(problem, np.full(256, 1e6), method=st.LocalCriterion())
     amplitude = multiplier_of(problem, problem.nucleation_length)[1]
     load_factor = (1e6 - 2e5 - 1e5 * amplitude) / 2.0
@@ -187,7 +187,7 @@ def test_load_that_varies_along_the_interface(solid, nodes):
     interface = st.Interface(length=0.1, nodes=nodes)
     x, k = interface.x, 2.0 * np.pi / 0.1
     load = st.Load(profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=x + 1.0)
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12), load)
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
     one, two = multiplier_of(problem, problem.nucleation_length)[[3, 2]]
 
@@ -214,7 +214,7 @@ def test_a_load_that_jumps_keeps_the_ratio_between_its_bounds(solid):
     interface = st.Interface(length=0.1, nodes=128)
     profile = np.where(np.arange(128) < 20, 1.0, 1e-3)
     problem = st.Problem(
-        solid, interface, st.SlipWeakening(weakening_rate=0.5e12), st.Load(profile=profile)
+        solid, interface, st.LinearWeakening(weakening_rate=0.5e12), st.Load(profile=profile)
     )
     result = st.onset(problem, np.full(128, 1e6), method=st.LocalCriterion())
     # Twenty nodes hold several patches of 4.4 nodes that see the unit load only.
@@ -232,7 +232,7 @@ def test_weakening_rate_of_each_sample(problem, make_strength):
         problem, {"strength": tau_p, "weakening_rate": rates}, method=st.LocalCriterion()
     )
     for i in range(5):
-        friction = st.SlipWeakening(weakening_rate=float(rates[i, 0]))
+        friction = st.LinearWeakening(weakening_rate=float(rates[i, 0]))
         alone = st.onset(
             st.Problem(problem.solid, problem.interface, friction),
             tau_p[i],
@@ -246,7 +246,7 @@ def test_weakening_rate_of_each_sample(problem, make_strength):
 def test_critical_slip_is_a_weakening_rate(solid):
     """W = (tau_p - tau_r)/d_c, so a uniform strength has a uniform W."""
     interface = st.Interface(length=0.1, nodes=256)
-    friction = st.SlipWeakening(critical_slip=2e-6, residual_strength=2e5)
+    friction = st.LinearWeakening(critical_slip=2e-6, residual_strength=2e5)
     rows = st.Problem(solid, interface, friction).sample(np.full((2, 256), 1e6))
     np.testing.assert_allclose(rows.weakening_rate, 8e5 / 2e-6, rtol=1e-15)
     tau_p = 1e6 - 1e5 * np.cos(2.0 * np.pi * interface.x / 0.1)

@@ -56,7 +56,7 @@ def released(steps, end, mode="II"):
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     interface = st.Interface(length=0.1, nodes=32)
     # Everything has slipped beyond d_c and slides on at the residual strength.
-    friction = st.SlipWeakening(weakening_rate=1e9, residual_strength=1e6)
+    friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(solid, interface, friction, mode=mode)
     k = interface.wavenumbers[2]
     unit = 1.0 / (k * solid.shear_wave_speed)

@@ -195,7 +195,7 @@ def test_patches_on_the_circle():
 @pytest.fixture
 def wide(problem, solid):
     """Ten profiles of so wide a range that nodes are at the residual before the instability."""
-    slow = st.Problem(solid, problem.interface, st.SlipWeakening(weakening_rate=0.2e12))
+    slow = st.Problem(solid, problem.interface, st.LinearWeakening(weakening_rate=0.2e12))
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.1e6, high=3.1e6),
         spectrum=st.PowerLawSpectrum(correlation_length=3e-3),

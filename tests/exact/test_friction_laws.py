@@ -13,7 +13,7 @@ from stiction.friction.kernels import line_at, slope_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
 LAWS = {
-    "linear": st.SlipWeakening(weakening_rate=RATE),
+    "linear": st.LinearWeakening(weakening_rate=RATE),
     "exponential": st.ExponentialWeakening(weakening_rate=RATE),
     "dual": st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], weakening_rate=RATE),
     "steepening": st.PiecewiseWeakening(
@@ -95,7 +95,7 @@ def test_polygon_along_a_law():
 )
 def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
     scale |= {"residual_strength": 0.3e6}
-    linear = dataclasses.replace(problem, friction=st.SlipWeakening(**scale))
+    linear = dataclasses.replace(problem, friction=st.LinearWeakening(**scale))
     piece = dataclasses.replace(problem, friction=st.PiecewiseWeakening(**ONE_PIECE, **scale))
     tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=4)
     wide = 0.4e6 + 3.0 * (tau_p - tau_p.min())  # the residual strength is reached, events arrest

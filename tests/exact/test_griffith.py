@@ -38,7 +38,7 @@ def test_a_short_crack_under_a_sloping_drop():
 def test_lengths_of_start_and_arrest():
     problem = dataclasses.replace(
         PROBLEM,
-        friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
+        friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
         load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
     )
     options = {"centre": 0.5 * LENGTH}
@@ -81,7 +81,7 @@ def test_arrested_patches_are_as_long_as_griffith_says():
     """Events by equilibrium under an edge load, against G = <Gamma>: to a third in the median."""
     problem = dataclasses.replace(
         st.paper.problem(nodes=512),
-        friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
+        friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
         load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
     )
     tau_p = st.paper.strength(problem, 0.5).sample(problem.interface, samples=6, seed=0)

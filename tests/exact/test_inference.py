@@ -34,7 +34,7 @@ def with_marginal(marginal):
 
 
 def with_friction(**options):
-    return dataclasses.replace(PROBLEM, friction=st.SlipWeakening(**options))
+    return dataclasses.replace(PROBLEM, friction=st.LinearWeakening(**options))
 
 
 def model_of(prior, method=LOCAL, error=0.0, samples=400, **options):

@@ -8,11 +8,11 @@ import stiction as st
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
 EACH = [
-    st.Lognormal(mean=1e6, cov=0.2, low=0.3e6),
-    st.Weibull(mean=1e6, cov=0.2, low=0.3e6),
-    st.Gamma(mean=1e6, cov=0.2, low=0.3e6),
-    st.TruncatedNormal(mean=1e6, cov=0.2, low=0.6e6),
-    st.TruncatedNormal(mean=1e6, cov=0.2, low=0.6e6, high=1.5e6),
+    st.Lognormal(mean=1e6, cv=0.2, low=0.3e6),
+    st.Weibull(mean=1e6, cv=0.2, low=0.3e6),
+    st.Gamma(mean=1e6, cv=0.2, low=0.3e6),
+    st.TruncatedNormal(mean=1e6, cv=0.2, low=0.6e6),
+    st.TruncatedNormal(mean=1e6, cv=0.2, low=0.6e6, high=1.5e6),
 ]
 
 
@@ -21,19 +21,19 @@ def test_moments_and_bounds_are_those_that_were_given(marginal):
     frozen = marginal.distribution
     # To what the equations for scipy's parameters are solved to.
     assert frozen.mean() == pytest.approx(marginal.mean, rel=1e-9)
-    assert frozen.std() == pytest.approx(marginal.cov * marginal.mean, rel=1e-7)
+    assert frozen.std() == pytest.approx(marginal.cv * marginal.mean, rel=1e-7)
     assert frozen.support()[0] == marginal.low
 
 
 def test_against_the_textbook():
-    """Lognormal: sigma^2 = ln(1 + cov^2); Weibull of shape 2: cov = sqrt(4/pi - 1)."""
-    lognormal = st.Lognormal(mean=2.0, cov=0.3).distribution
+    """Lognormal: sigma^2 = ln(1 + cv^2); Weibull of shape 2: cv = sqrt(4/pi - 1)."""
+    lognormal = st.Lognormal(mean=2.0, cv=0.3).distribution
     sigma = np.sqrt(np.log(1.09))
     assert lognormal.ppf(0.5) == pytest.approx(2.0 * np.exp(-0.5 * sigma**2), rel=1e-12)
-    rayleigh = st.Weibull(mean=1.0, cov=np.sqrt(4.0 / np.pi - 1.0)).distribution
+    rayleigh = st.Weibull(mean=1.0, cv=np.sqrt(4.0 / np.pi - 1.0)).distribution
     assert rayleigh.args[0] == pytest.approx(2.0, rel=1e-9)
-    assert st.Gamma(mean=3.0, cov=1.0).distribution.sf(3.0) == pytest.approx(np.exp(-1.0))
-    symmetric = st.TruncatedNormal(mean=1.0, cov=0.2, low=0.5, high=1.5).distribution
+    assert st.Gamma(mean=3.0, cv=1.0).distribution.sf(3.0) == pytest.approx(np.exp(-1.0))
+    symmetric = st.TruncatedNormal(mean=1.0, cv=0.2, low=0.5, high=1.5).distribution
     assert symmetric.ppf(0.5) == pytest.approx(1.0, rel=1e-9)
 
 
@@ -44,7 +44,7 @@ def test_fields_have_the_marginal_and_files_hold_it(marginal):
     values = field.sample(interface, samples=2000, seed=3)[:, 0]
     # 0.043 is exceeded once in a thousand times by 2,000 independent values.
     assert scipy.stats.kstest(values, marginal.distribution.cdf).statistic < 0.043
-    table = {"type": marginal.type, "mean": 1e6, "cov": 0.2, "low": marginal.low}
+    table = {"type": marginal.type, "mean": 1e6, "cv": 0.2, "low": marginal.low}
     high = getattr(marginal, "high", None)
     table |= {"high": high} if high else {}
     assert st.RandomField(table, SPECTRUM) == field
@@ -53,18 +53,18 @@ def test_fields_have_the_marginal_and_files_hold_it(marginal):
 def test_names_of_scipy_still_mean_scipy():
     scipys = st.RandomField({"type": "gamma", "a": 2.0, "scale": 1e6}, SPECTRUM)
     assert scipys.mean == pytest.approx(2e6)
-    ours = st.RandomField({"type": "gamma", "mean": 2e6, "cov": 0.5}, SPECTRUM)
+    ours = st.RandomField({"type": "gamma", "mean": 2e6, "cv": 0.5}, SPECTRUM)
     assert ours.standard_deviation == pytest.approx(1e6)
 
 
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: st.Lognormal(mean=1e5, cov=0.1, low=2e5), "mean must be above low"),
-        (lambda: st.Weibull(mean=1e5, cov=-0.1), "Weibull.cov: must be greater than 0"),
-        (lambda: st.TruncatedNormal(mean=1e6, cov=0.5, low=0.6e6), "wider than the cut leaves"),
-        (lambda: st.TruncatedNormal(mean=1e6, cov=0.1, high=0.5e6), "between low and high"),
-        (lambda: st.RandomField({"type": "lognormal", "mean": 1.0}, SPECTRUM), "cov: missing"),
+        (lambda: st.Lognormal(mean=1e5, cv=0.1, low=2e5), "mean must be above low"),
+        (lambda: st.Weibull(mean=1e5, cv=-0.1), "Weibull.cv: must be greater than 0"),
+        (lambda: st.TruncatedNormal(mean=1e6, cv=0.5, low=0.6e6), "wider than the cut leaves"),
+        (lambda: st.TruncatedNormal(mean=1e6, cv=0.1, high=0.5e6), "between low and high"),
+        (lambda: st.RandomField({"type": "lognormal", "mean": 1.0}, SPECTRUM), "cv: missing"),
         (lambda: st.RandomField({"type": "wiebull", "mean": 1.0}, SPECTRUM), "mean 'weibull'"),
     ],
 )
@@ -77,9 +77,9 @@ def test_strength_below_the_residual_strength_is_said_before_anything_is_compute
     problem = st.Problem(
         solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
         interface=st.Interface(length=0.1, nodes=512),
-        friction=st.SlipWeakening(weakening_rate=5e11, residual_strength=0.6e6),
+        friction=st.LinearWeakening(weakening_rate=5e11, residual_strength=0.6e6),
     )
-    strength = st.RandomField(st.Lognormal(mean=1e6, cov=0.17), SPECTRUM)
+    strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.17), SPECTRUM)
     share = 100.0 * strength.marginal.distribution.cdf(0.6e6)
     with pytest.warns(st.AccuracyWarning, match=f"strength: {share:.3g} % of its marginal"):
         st.monte_carlo(problem, strength, method=st.LocalCriterion(), samples=2, seed=0)

@@ -9,7 +9,7 @@ import stiction as st
 from stiction.equilibrium.plane_patches import labelled_patches, patch_of
 
 RATE = 0.5e12
-FRICTION = st.SlipWeakening(weakening_rate=RATE)
+FRICTION = st.LinearWeakening(weakening_rate=RATE)
 
 
 @pytest.mark.filterwarnings("ignore::stiction.UnitWarning")

@@ -19,7 +19,7 @@ RATE = 0.5e12
 def test_strength_along_one_axis_equals_the_line(solid, mode, across):
     nodes = 128
     problem = st.Problem(
-        solid, st.Interface(0.04, nodes), st.SlipWeakening(weakening_rate=RATE), mode=mode
+        solid, st.Interface(0.04, nodes), st.LinearWeakening(weakening_rate=RATE), mode=mode
     )
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     tau_p = strength.sample(problem.interface, samples=3, seed=1)

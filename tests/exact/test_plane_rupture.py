@@ -20,8 +20,8 @@ from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
-FRICTION = st.SlipWeakening(weakening_rate=0.5e12)
-GENTLE = st.SlipWeakening(weakening_rate=5e10)
+FRICTION = st.LinearWeakening(weakening_rate=0.5e12)
+GENTLE = st.LinearWeakening(weakening_rate=5e10)
 LENGTH, NODES = 0.024, 64
 
 
@@ -122,7 +122,7 @@ def step_response(share, time):
 
 def point_load(steps, end, plane, load):
     """Slip on a freely sliding plane, less its mean, after a stress was put on it at t = 0."""
-    friction = st.SlipWeakening(weakening_rate=1e9, residual_strength=1e6)
+    friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(SOLID, plane, friction, st.Load(initial_stress=load))
     method = st.Rupture(loading_rate=1.0, implicit=False, time_step=end / steps)
     history = load_history(([0.0, 1.0], [2e6, 2e6]), None)

@@ -67,7 +67,7 @@ def test_full_correlation_makes_the_residual_proportional(problem, make_strength
 
 def test_residual_ratio_is_the_same_thing(problem, make_strength):
     tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=2)
-    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_ratio=0.5)
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.5)
     ratio = dataclasses.replace(problem, friction=friction)
     own = st.onset(ratio, tau_p, method=st.Equilibrium())
     given = {"strength": tau_p, "residual_strength": 0.5 * tau_p}

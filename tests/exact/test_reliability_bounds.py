@@ -148,7 +148,7 @@ class Uniform:
 
 
 @pytest.mark.parametrize(
-    ("chance", "target_cov", "least", "most"),
+    ("chance", "target_cv", "least", "most"),
     [
         (0.01, 0.3, 1000, 10**6),
         (0.03, 0.3, 100, 10**6),
@@ -156,11 +156,11 @@ class Uniform:
         (0.5, 0.2, 10, 99),
     ],
 )
-def test_counting_is_unbiased_whenever_it_stops(chance, target_cov, least, most):
+def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     repeats = 2000
     counts = [
         count_failures(
-            Uniform(i), 0, chance, target_cov=target_cov, least=least, max_evaluations=most
+            Uniform(i), 0, chance, target_cv=target_cv, least=least, max_evaluations=most
         )
         for i in range(repeats)
     ]
@@ -171,7 +171,7 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cov, least, most)
     reported = np.array([count.coefficient_of_variation for count, _ in counts])
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
     if most == 10**6:
-        assert reported.max() <= target_cov
+        assert reported.max() <= target_cv
     inside = [low <= chance <= high for low, high in (count.interval(0.95) for count, _ in counts)]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
@@ -199,7 +199,7 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
     found = np.array(
         [
             failure_probability(
-                problem, field, stress, method=method, algorithm=algorithm, target_cov=0.3, seed=i
+                problem, field, stress, method=method, algorithm=algorithm, target_cv=0.3, seed=i
             ).probability
             for i in range(150)
         ]

@@ -94,16 +94,16 @@ def test_quantiles_of_pooled_runs():
     for beta in (1.0, 3.0, 4.5):
         chance = norm.cdf(-beta)
         # dP/P = beta d(beta): the pooled c.o.v. is below 0.06, so the quantile is good to 0.02.
-        cov = tail.coefficient_of_variation(-beta)
-        assert cov < 0.07
-        assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cov / beta)
+        cv = tail.coefficient_of_variation(-beta)
+        assert cv < 0.07
+        assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cv / beta)
 
 
 def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
     tail = Tail(descents()[:10])
-    chance, cov = norm.cdf(-4.0), 0.3
-    low, high = stress_interval(tail, chance, cov, 0.95, -9.0)
-    width = log_width(cov, 0.95)
+    chance, cv = norm.cdf(-4.0), 0.3
+    low, high = stress_interval(tail, chance, cv, 0.95, -9.0)
+    width = log_width(cv, 0.95)
     # Ten pooled runs step by some 1e-4 of the probability.
     assert tail.probability(low) == pytest.approx(chance * math.exp(-width), rel=0.01)
     assert tail.probability(high) == pytest.approx(chance * math.exp(width), rel=0.01)
@@ -125,7 +125,7 @@ def test_runs_until_precise_are_unbiased(beta):
         runs = run_until_precise(
             make,
             lambda runs: Tail(runs).coefficient_of_variation(-beta),
-            target_cov=0.2,
+            target_cv=0.2,
             first=1000,
             largest=5000,
             max_evaluations=10**7,

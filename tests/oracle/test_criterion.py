@@ -12,7 +12,7 @@ from stiction.criterion.eigenproblem import exact_weight
 def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes, error):
     """Direct quadrature of the definition on the trigonometric interpolant of the profile."""
     problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=nodes), st.SlipWeakening(weakening_rate=0.5e12)
+        solid, st.Interface(length=0.1, nodes=nodes), st.LinearWeakening(weakening_rate=0.5e12)
     )
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
     half = problem.nucleation_length / 2.0
@@ -37,7 +37,7 @@ def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes,
 def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, largest):
     """Against a grid sixteen times finer, made by padding the spectrum with zeros."""
     problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=nodes), st.SlipWeakening(weakening_rate=0.5e12)
+        solid, st.Interface(length=0.1, nodes=nodes), st.LinearWeakening(weakening_rate=0.5e12)
     )
     tau_p = make_strength(0.25).sample(problem.interface, samples=512, seed=2)
     tau_n = st.nucleation_stress(problem, tau_p)
@@ -66,7 +66,7 @@ def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, la
 def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(solid, contrast):
     """The patch that lets go lies where there is no barrier, so its strength does not matter."""
     problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=384), st.SlipWeakening(weakening_rate=0.5e12)
+        solid, st.Interface(length=0.1, nodes=384), st.LinearWeakening(weakening_rate=0.5e12)
     )
     x = problem.interface.x
     # Uniform, and with a dip in the middle of the rest.

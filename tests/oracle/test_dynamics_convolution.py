@@ -47,7 +47,7 @@ def direct_convolution(run, start, steps):
 def test_slip_through_a_rupture_equals_that_of_the_full_history():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     interface = st.Interface(length=0.05, nodes=128)
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12))
     x = interface.x
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
     method = Rupture(loading_rate=3e9, implicit=False)

@@ -16,7 +16,7 @@ RATE = 0.5e12
 def system():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     return st.Problem(
-        solid, st.Interface(length=0.1, nodes=256), st.SlipWeakening(weakening_rate=RATE)
+        solid, st.Interface(length=0.1, nodes=256), st.LinearWeakening(weakening_rate=RATE)
     )
 
 
@@ -105,7 +105,7 @@ def test_everything_may_vary_along_the_interface(mode, ratio, plane):
     problem = st.Problem(
         solid,
         interface,
-        st.SlipWeakening(weakening_rate=rate, residual_strength=varied(2e5, 5e4, 5)),
+        st.LinearWeakening(weakening_rate=rate, residual_strength=varied(2e5, 5e4, 5)),
         st.Load(profile=profile, initial_stress=initial),
         mode=mode,
     )

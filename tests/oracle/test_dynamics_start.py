@@ -139,7 +139,7 @@ def test_loading_too_fast_begins_at_rest(problem):
 def test_where_no_equilibrium_is_followed_it_begins_at_rest(initial_stress, factor):
     interface = st.Interface(length=0.1, nodes=256)
     load = st.Load(initial_stress=initial_stress)
-    problem = st.Problem(SOLID, interface, st.SlipWeakening(weakening_rate=0.5e12), load)
+    problem = st.Problem(SOLID, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
     tau_p = profiles(problem, 1.0, 1)[0]
     tau_p[100:110] *= factor
     method = Rupture(loading_rate=1e8, stop="onset")
@@ -155,7 +155,7 @@ def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_fr
         st.Interface(length=0.1, nodes=64),
         st.Interface(length=(0.1, 0.1), nodes=(16, 16)),
     )
-    linear = st.SlipWeakening(weakening_rate=2e10)
+    linear = st.LinearWeakening(weakening_rate=2e10)
     curved = st.ExponentialWeakening(weakening_rate=2e10)
     assert static_setting(st.Problem(SOLID, line, linear)) is not None
     assert static_setting(st.Problem(SOLID, line, curved)) is None
@@ -168,7 +168,7 @@ def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits(problem):
     other = st.Problem(
         problem.solid,
         interface,
-        st.SlipWeakening(weakening_rate=4e11 + 5e10 * wave, residual_strength=1e5 + 2e4 * wave),
+        st.LinearWeakening(weakening_rate=4e11 + 5e10 * wave, residual_strength=1e5 + 2e4 * wave),
         st.Load(profile=1.0 + 0.1 * np.roll(wave, 40), initial_stress=2e4 * np.roll(wave, 90)),
     )
     rng = np.random.default_rng(7)
@@ -202,7 +202,7 @@ def test_runaway_knows_the_loads_of_the_whole_run(problem):
 
 def test_runaway_on_a_plane_is_refused():
     plane = st.Interface(length=(0.1, 0.1), nodes=(32, 32))
-    problem = st.Problem(SOLID, plane, st.SlipWeakening(weakening_rate=5e10))
+    problem = st.Problem(SOLID, plane, st.LinearWeakening(weakening_rate=5e10))
     method = Rupture(loading_rate=1e7, stop="runaway")
     with pytest.raises(st.InputError, match="stop: 'runaway' is known of lines only"):
         st.onset(problem, np.full((32, 32), 1e6), method=method)

@@ -85,7 +85,7 @@ def test_linear_programme_with_everything_varying(solid, make_strength):
     rate = 0.4e12 * (1.0 + 0.6 * np.sin(6 * np.pi * x))
     for mode in ("II", "III"):
         problem = st.Problem(
-            solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=rate), load, mode
+            solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=rate), load, mode
         )
         tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
         ours = st.onset(problem, tau_p, method=Equilibrium())
@@ -98,7 +98,7 @@ def test_linear_programme_with_everything_varying(solid, make_strength):
 
 
 def test_uniform_critical_slip(solid, make_strength):
-    friction = st.SlipWeakening(critical_slip=2e-6)
+    friction = st.LinearWeakening(critical_slip=2e-6)
     problem = st.Problem(solid, st.Interface(0.1, 256), friction)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
     ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
@@ -110,7 +110,7 @@ def test_interface_shorter_than_a_critical_patch(solid, make_strength):
     # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
     interface = st.Interface(0.1, 128)
     rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=rate))
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=rate))
     tau_p = make_strength(2.0).sample(interface, samples=4, seed=10)
     onset = st.onset(problem, tau_p, method=Equilibrium(slip=True))
     theirs = [by_linear_programme(problem, profile) for profile in tau_p]
@@ -139,7 +139,7 @@ def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
 def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, rough):
     x = np.arange(2048) / 2048
     rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
-    problem = st.Problem(solid, st.Interface(0.2, 2048), st.SlipWeakening(weakening_rate=rate))
+    problem = st.Problem(solid, st.Interface(0.2, 2048), st.LinearWeakening(weakening_rate=rate))
     setting = Setting(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     for row in range(4):
@@ -168,7 +168,7 @@ def test_patches_alike_on_a_long_interface(solid):
     here, and the dense factor must take over.
     """
     dip = 1e6 + 0.3e6 * np.cos(2.0 * np.pi * np.arange(128) / 128)
-    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    friction = st.LinearWeakening(weakening_rate=0.5e12)
     loads = []
     for periods in (1, 32):
         problem = st.Problem(solid, st.Interface(0.0135 * periods, 128 * periods), friction)
@@ -205,7 +205,7 @@ def test_events_against_relaxation(problem, low, high):
 
 def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
     """Most samples slide at the first instability; the few that do not are not an artefact."""
-    problem = st.Problem(solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12))
     tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
     onset = st.onset(problem, tau_p, method=Equilibrium())
     arrested = np.flatnonzero(onset.arrested_events.values)
@@ -242,7 +242,7 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
     strength = make_strength(0.5).sample(problem.interface, samples=20, seed=15)
     wide = 0.05e6 + 2.0 * (strength - 0.66e6)
     shifted = dataclasses.replace(
-        problem, friction=st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
+        problem, friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
     )
     one = st.onset(problem, wide, method=Equilibrium())
     two = st.onset(shifted, wide + 0.3e6, method=Equilibrium())
@@ -253,7 +253,7 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
 
 def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
     """With everything outside a window fixed, and without: the same outcome, twice each."""
-    problem = st.Problem(solid, st.Interface(0.4, 4096), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12))
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=2.6e6),
         spectrum=st.PowerLawSpectrum(
@@ -289,7 +289,7 @@ def test_nodes_that_do_not_weaken(problem, solid, make_strength, law):
     """Where tau_p is not above tau_r strength is constant; against relaxation with that law."""
     tau_p = 2.0 * make_strength(0.5).sample(problem.interface, samples=2, seed=16) - 0.8e6
     given = {"weakening_rate": 0.5e12} if law == "weakening_rate" else {"critical_slip": 3e-6}
-    friction = st.SlipWeakening(residual_strength=0.8e6, **given)
+    friction = st.LinearWeakening(residual_strength=0.8e6, **given)
     problem = st.Problem(solid, problem.interface, friction)
     constant = tau_p <= 0.8e6
     assert constant.any(axis=1).all()
@@ -309,7 +309,7 @@ def test_nodes_that_do_not_weaken(problem, solid, make_strength, law):
 def test_flat_stretches_just_above_the_residual(solid, make_strength, above):
     """Cut off at the residual strength, 1e-13 or 1e-9 of it above: an onset, and soon."""
     floor = 0.99e6
-    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=floor)
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=floor)
     problem = st.Problem(solid, st.Interface(0.1, 256), friction)
     tau_p = np.maximum(
         make_strength(0.5).sample(problem.interface, samples=3, seed=0), floor * (1.0 + above)
@@ -324,7 +324,7 @@ def test_flat_stretches_just_above_the_residual(solid, make_strength, above):
 
 def test_estimated_error_is_of_the_size_of_the_error(solid):
     """Against the same fields on a grid eight times as fine."""
-    fine, friction = st.Interface(0.1, 2048), st.SlipWeakening(weakening_rate=0.5e12)
+    fine, friction = st.Interface(0.1, 2048), st.LinearWeakening(weakening_rate=0.5e12)
     reference = st.Problem(solid, fine, friction)
     tau_p = st.paper.strength(reference, correlation_ratio=0.25).sample(fine, samples=40, seed=3)
     exact = st.onset(reference, tau_p, method=Equilibrium()).first_instability.values
@@ -349,7 +349,7 @@ def test_estimated_error_is_of_the_size_of_the_error(solid):
 @pytest.mark.parametrize("high", [1.66e6, 2.66e6])
 def test_sliding_is_proved(solid, high):
     """Without any length taken for unstoppable, the same loads and events."""
-    problem = st.Problem(solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12))
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=high),
         spectrum=st.PowerLawSpectrum(

@@ -9,7 +9,7 @@ import stiction as st
 from stiction.inference.marginal_fit import family_of
 from stiction.inference.noisy_marginal import without_noise
 
-VALUES = st.Lognormal(mean=1e6, cov=0.25, low=0.2e6).distribution.rvs(800, random_state=1)
+VALUES = st.Lognormal(mean=1e6, cv=0.25, low=0.2e6).distribution.rvs(800, random_state=1)
 
 
 @pytest.mark.parametrize(
@@ -35,8 +35,8 @@ def test_marginals_are_scipys_of_greatest_likelihood(given, family, fixed):
 def test_a_cut_normal_distribution_has_the_greatest_likelihood():
     found = family_of({"type": "truncated_normal", "low": 0.4e6}).fit(VALUES[VALUES > 0.4e6])
     best = found.distribution.logpdf(VALUES[VALUES > 0.4e6]).sum()
-    for mean, cov in ((1.01, 1.0), (0.99, 1.0), (1.0, 1.03), (1.0, 0.97)):
-        other = st.TruncatedNormal(mean=found.mean * mean, cov=found.cov * cov, low=0.4e6)
+    for mean, cv in ((1.01, 1.0), (0.99, 1.0), (1.0, 1.03), (1.0, 0.97)):
+        other = st.TruncatedNormal(mean=found.mean * mean, cv=found.cv * cv, low=0.4e6)
         assert other.distribution.logpdf(VALUES[VALUES > 0.4e6]).sum() < best
 
 
@@ -44,9 +44,9 @@ def test_a_cut_normal_distribution_has_the_greatest_likelihood():
 def test_noise_is_taken_out_of_a_marginal(name):
     """Of many independent values: two per cent of the standard deviation, by sampling."""
     truth = {
-        "lognormal": st.Lognormal(mean=1e6, cov=0.25),
-        "weibull": st.Weibull(mean=1e6, cov=0.25),
-        "gamma": st.Gamma(mean=1e6, cov=0.25),
+        "lognormal": st.Lognormal(mean=1e6, cv=0.25),
+        "weibull": st.Weibull(mean=1e6, cv=0.25),
+        "gamma": st.Gamma(mean=1e6, cv=0.25),
         "beta": st.Beta(alpha=1.5, beta=3.0, low=0.5e6, high=2e6),
     }[name]
     rng = np.random.default_rng(3)
@@ -79,7 +79,7 @@ def test_lengths_are_translated_as_the_page_says(exponent):
 def test_correlation_length_against_a_variogram():
     """GSTools fits the same record by least squares on a variogram: two estimates, one truth."""
     truth = st.RandomField(
-        st.Lognormal(mean=1e6, cov=0.1), st.ExponentialSpectrum(1e-3), mean_mode=True
+        st.Lognormal(mean=1e6, cv=0.1), st.ExponentialSpectrum(1e-3), mean_mode=True
     )
     interface = st.Interface(length=1.2, nodes=12_000)
     values = truth.sample(interface, seed=2)[0, :4000]

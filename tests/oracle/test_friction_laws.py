@@ -117,4 +117,4 @@ def test_exponential_rupture_is_the_limit_of_polygons(problem, make_strength):
     polygon = dataclasses.replace(problem, friction=st.PiecewiseWeakening.from_law(law, 32))
     slow = st.onset(polygon, tau_p, method=st.Equilibrium()).critical_stress.values
     np.testing.assert_allclose(slow, exact, rtol=1e-3)
-    assert (slow > stress(st.SlipWeakening(weakening_rate=0.5e12)) * (1.0 + 5e-5)).any()
+    assert (slow > stress(st.LinearWeakening(weakening_rate=0.5e12)) * (1.0 + 5e-5)).any()

@@ -61,7 +61,7 @@ def test_onset_and_sensitivity_equal_the_linear_programme(solid, seed):
     problem = st.Problem(
         solid,
         st.Interface((3.0 * LENGTH, 3.0 * LENGTH), NODES),
-        st.SlipWeakening(weakening_rate=RATE * (0.8 + 0.3 * noise(6.0, rng))),
+        st.LinearWeakening(weakening_rate=RATE * (0.8 + 0.3 * noise(6.0, rng))),
         load=st.Load(profile=1.0 + 0.4 * noise(6.0, rng), initial_stress=2e5 * noise(3.0, rng)),
     )
     strength = 0.66e6 + 1e6 * noise(rng.choice([2.0, 4.0, 8.0]), rng)
@@ -104,7 +104,7 @@ def wide():
     problem = st.Problem(
         solid,
         st.Interface((5.0 * LENGTH, 5.0 * LENGTH), shape),
-        st.SlipWeakening(weakening_rate=RATE, residual_strength=3.5e5),
+        st.LinearWeakening(weakening_rate=RATE, residual_strength=3.5e5),
     )
     strength = [0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(s), shape) for s in (20, 23, 0)]
     return problem, np.array(strength)

@@ -12,7 +12,7 @@ H_N = 2.0 * 0.57888694 * 1e9 / 0.67 / RATE
 
 def onsets(nodes, lengths, ratio, samples):
     plane = st.Interface(length=(lengths * H_N, lengths * H_N), nodes=(nodes, nodes))
-    problem = st.Problem(SOLID, plane, st.SlipWeakening(weakening_rate=RATE))
+    problem = st.Problem(SOLID, plane, st.LinearWeakening(weakening_rate=RATE))
     field = st.RandomField(
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         st.PowerLawSpectrum(correlation_length=ratio * H_N),

@@ -29,9 +29,9 @@ def apart(one, other):
     return abs(math.log(one.probability / other.probability)) / error
 
 
-def by(system, stress, algorithm, cov, *, method=LOCAL, seed=0):
+def by(system, stress, algorithm, cv, *, method=LOCAL, seed=0):
     return failure_probability(
-        *system, stress, method=method, algorithm=algorithm, target_cov=cov, seed=seed
+        *system, stress, method=method, algorithm=algorithm, target_cv=cv, seed=seed
     )
 
 
@@ -45,9 +45,9 @@ def test_subset_and_importance_against_plain_monte_carlo(system):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stress", "cov"), [(0.670e6, 0.06), (0.6656e6, 0.2)])
-def test_subset_and_importance_against_long_plain_monte_carlo(system, stress, cov):
-    plain = by(system, stress, "plain", cov)
+@pytest.mark.parametrize(("stress", "cv"), [(0.670e6, 0.06), (0.6656e6, 0.2)])
+def test_subset_and_importance_against_long_plain_monte_carlo(system, stress, cv):
+    plain = by(system, stress, "plain", cv)
     assert plain.evaluations > 100_000
     assert apart(by(system, stress, "subset", 0.07), plain) < 4.0
     assert apart(by(system, stress, "importance", 0.04), plain) < 4.0
@@ -80,7 +80,7 @@ def test_two_levels_where_patches_interact():
 
 @pytest.mark.parametrize("method", [LOCAL, Equilibrium()], ids=["local", "equilibrium"])
 def test_design_stress_has_the_probability_asked_for(system, method):
-    answer = design_stress(*system, probability=1e-5, method=method, target_cov=0.2)
+    answer = design_stress(*system, probability=1e-5, method=method, target_cv=0.2)
     back = by(system, answer.stress, "importance", 0.07, method=method)
     error = math.hypot(answer.coefficient_of_variation, back.coefficient_of_variation)
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
@@ -139,7 +139,7 @@ def test_against_openturns_subset_sampling():
         found.append(algorithm.getResult().getProbabilityEstimate())
     theirs, spread = np.mean(found), np.std(found, ddof=1) / math.sqrt(len(found))
     ours = failure_probability(
-        problem, field, stress, method=LOCAL, algorithm="subset", target_cov=0.1
+        problem, field, stress, method=LOCAL, algorithm="subset", target_cv=0.1
     )
     assert ours.probability < 1e-3
     error = math.hypot(spread, ours.probability * ours.coefficient_of_variation)

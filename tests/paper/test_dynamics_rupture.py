@@ -18,7 +18,7 @@ def final_speed(ratio, nodes):
     problem = st.Problem(
         solid,
         st.Interface(length=nodes * spacing, nodes=nodes),
-        st.SlipWeakening(weakening_rate=RATE),
+        st.LinearWeakening(weakening_rate=RATE),
     )
     load = STRENGTH / (1.0 + ratio)
     griffith = 2.0 * solid.effective_modulus("II") * STRENGTH**2 / (np.pi * RATE * load**2)

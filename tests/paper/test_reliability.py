@@ -21,7 +21,7 @@ def growth(mean_mode, stress):
             stress,
             method=st.LocalCriterion(),
             algorithm="importance",
-            target_cov=0.07,
+            target_cv=0.07,
         )
         for one in (problem, longer(problem, 4))
     )

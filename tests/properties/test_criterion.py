@@ -9,7 +9,7 @@ import stiction as st
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
     st.Interface(length=0.1, nodes=128),
-    st.SlipWeakening(weakening_rate=0.5e12),
+    st.LinearWeakening(weakening_rate=0.5e12),
 )
 STRENGTH = st.RandomField(
     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),

@@ -17,7 +17,7 @@ from stiction.dynamics.simulate import simulate_rupture
 NODES = 128
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 PROBLEM = st.Problem(
-    SOLID, st.Interface(length=0.05, nodes=NODES), st.SlipWeakening(weakening_rate=0.5e12)
+    SOLID, st.Interface(length=0.05, nodes=NODES), st.LinearWeakening(weakening_rate=0.5e12)
 )
 METHOD = Rupture(loading_rate=1e7)
 

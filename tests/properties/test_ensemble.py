@@ -64,7 +64,7 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
     problem = st.Problem(
         st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
         st.Interface(length=0.1, nodes=128),
-        st.SlipWeakening(weakening_rate=0.25e12),
+        st.LinearWeakening(weakening_rate=0.25e12),
     )
     strength = st.RandomField(
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),

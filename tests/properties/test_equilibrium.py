@@ -31,7 +31,7 @@ def problem_of(length, wave, varying):
     rate = 0.5e12 * (1.0 + 0.5 * np.cos(2 * x)) if varying else 0.5e12
     load = st.Load(profile=1.0 + wave * np.sin(x)) if wave else st.Load()
     return st.Problem(
-        SOLID, st.Interface(length, NODES), st.SlipWeakening(weakening_rate=rate), load
+        SOLID, st.Interface(length, NODES), st.LinearWeakening(weakening_rate=rate), load
     )
 
 
@@ -110,7 +110,7 @@ def test_translation_and_reflection(problem, tau_p, shift):
 @settings(max_examples=40, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
 def test_a_constant_shifts_the_load(problem, tau_p, constant):
-    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=constant)
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=constant)
     shifted = st.Problem(SOLID, problem.interface, friction)
     one, two = solve(problem, tau_p), solve(shifted, tau_p + constant)
     np.testing.assert_allclose(two.critical_load, one.critical_load + constant, rtol=1e-10)

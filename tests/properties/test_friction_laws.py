@@ -12,7 +12,7 @@ import stiction as st
 
 GAMMA = {"fracture_energy": 2.5, "residual_strength": 0.2e6}
 LAWS = {
-    "linear": st.SlipWeakening(**GAMMA),
+    "linear": st.LinearWeakening(**GAMMA),
     "exponential": st.ExponentialWeakening(**GAMMA),
     "bilinear": st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.4, 0.0], **GAMMA),
     "steepening": st.PiecewiseWeakening(slip=[0.4, 1.0], strength=[0.8, 0.0], **GAMMA),

@@ -19,7 +19,7 @@ METHOD = st.LocalCriterion()
 def plane():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
     interface = st.Interface(length=(5.0 * NUCLEATION, 4.0 * NUCLEATION), nodes=(48, 48))
-    return st.Problem(solid, interface, st.SlipWeakening(weakening_rate=RATE))
+    return st.Problem(solid, interface, st.LinearWeakening(weakening_rate=RATE))
 
 
 def field_of(ratio=0.7, **options):
@@ -135,7 +135,7 @@ def test_variance_ratios_on_an_infinite_plane_and_their_limits(plane):
 
 def test_failure_probability_is_that_of_counting(plane):
     field = field_of()
-    options = {"method": METHOD, "progress": False, "target_cov": 0.25}
+    options = {"method": METHOD, "progress": False, "target_cv": 0.25}
     onsets = st.monte_carlo(
         plane, field, method=METHOD, samples=3000, seed=9, progress=False
     ).critical_stress.values
@@ -197,7 +197,7 @@ def test_refusals_name_what_is_wrong(plane):
         st.onset(wide, np.full((48, 64), 1e6), method=METHOD)
     varying = np.full((48, 48), RATE)
     varying[3, 4] *= 0.9
-    uneven = dataclasses.replace(plane, friction=st.SlipWeakening(weakening_rate=varying))
+    uneven = dataclasses.replace(plane, friction=st.LinearWeakening(weakening_rate=varying))
     with pytest.raises(st.InputError, match="weakening_rate varies"):
         st.monte_carlo(uneven, field, method=METHOD, samples=2, progress=False)
     line = st.Problem(plane.solid, st.Interface(0.1, 512), plane.friction)

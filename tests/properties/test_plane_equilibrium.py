@@ -33,7 +33,7 @@ def plane(solid):
     return st.Problem(
         solid,
         st.Interface((6.0 * LENGTH, 4.0 * LENGTH), NODES),
-        st.SlipWeakening(weakening_rate=RATE),
+        st.LinearWeakening(weakening_rate=RATE),
     )
 
 
@@ -67,7 +67,7 @@ def test_sensitivity_is_the_gradient_of_the_mean_stress(solid):
     problem = st.Problem(
         solid,
         st.Interface((6.0 * LENGTH, 4.0 * LENGTH), NODES),
-        st.SlipWeakening(weakening_rate=RATE * (0.9 + 0.1 * smooth(5))),
+        st.LinearWeakening(weakening_rate=RATE * (0.9 + 0.1 * smooth(5))),
         load=st.Load(profile=1.0 + 0.3 * smooth(6), initial_stress=1e5 * smooth(7)),
     )
     strength = strength_of(1)
@@ -162,7 +162,7 @@ def test_discretization_error_is_of_the_size_of_the_error(solid):
         st.Problem(
             solid,
             st.Interface((4.0 * LENGTH, 4.0 * LENGTH), (nodes, nodes)),
-            st.SlipWeakening(weakening_rate=RATE),
+            st.LinearWeakening(weakening_rate=RATE),
         )
         for nodes in (128, 32)
     )

@@ -32,7 +32,7 @@ def test_the_same_seed_gives_the_same_numbers_for_any_workers(system, algorithm)
             stress,
             method=LOCAL,
             algorithm=algorithm,
-            target_cov=0.4,
+            target_cv=0.4,
             seed=seed,
             workers=workers,
         )
@@ -54,7 +54,7 @@ def test_two_levels_are_reproducible(system):
             0.665e6,
             method=Equilibrium(),
             algorithm="two_level",
-            target_cov=0.5,
+            target_cv=0.5,
             seed=2,
             workers=workers,
         )
@@ -66,7 +66,7 @@ def test_two_levels_are_reproducible(system):
 
 def test_plain_monte_carlo_counts_the_samples_of_the_ensemble(system):
     result = failure_probability(
-        *system, 0.69e6, method=LOCAL, algorithm="plain", target_cov=0.2, seed=7
+        *system, 0.69e6, method=LOCAL, algorithm="plain", target_cv=0.2, seed=7
     )
     ensemble = st.monte_carlo(*system, method=LOCAL, samples=result.evaluations, seed=7)
     below = ensemble["critical_stress"].values < 0.69e6
@@ -78,7 +78,7 @@ def test_plain_monte_carlo_counts_the_samples_of_the_ensemble(system):
 def test_failing_profiles_fail(system):
     for algorithm in ("subset", "importance"):
         result = failure_probability(
-            *system, 0.665e6, method=LOCAL, algorithm=algorithm, target_cov=0.4
+            *system, 0.665e6, method=LOCAL, algorithm=algorithm, target_cv=0.4
         )
         failing = result.failing_profiles
         again = st.onset(system[0], failing["strength"].values, method=LOCAL)
@@ -112,7 +112,7 @@ def test_weak_places_are_spread_over_the_interface(system):
     positions, runs = [], []
     for seed in range(12):
         result = failure_probability(
-            *system, 0.667e6, method=LOCAL, algorithm="subset", target_cov=0.3, seed=seed
+            *system, 0.667e6, method=LOCAL, algorithm="subset", target_cv=0.3, seed=seed
         )
         places = result.failing_profiles["critical_position"].values / system[0].interface.length
         positions.append(places)
@@ -131,7 +131,7 @@ def test_curve_and_design_stress_agree_and_are_monotone(system):
         method=LOCAL,
         smallest=1e-5,
         points_per_decade=2,
-        target_cov=0.3,
+        target_cv=0.3,
         plain_samples=4000,
     )
     stress, chance = curve["stress"].values, curve["probability"].values
@@ -144,7 +144,7 @@ def test_curve_and_design_stress_agree_and_are_monotone(system):
     assert chance[-1] == pytest.approx(1e-5, rel=0.05)
     np.testing.assert_allclose(curve["stress_above_bound"], stress - 0.66e6)
     design = design_stress(
-        *system, probability=float(chance[-1]), method=LOCAL, target_cov=0.3, seed=1
+        *system, probability=float(chance[-1]), method=LOCAL, target_cv=0.3, seed=1
     )
     # Independent seeds; the intervals are 95 % each, so they overlap unless both are far out.
     assert design.interval[0] < float(curve["stress_high"][-1])
@@ -174,7 +174,7 @@ def test_more_that_is_random_is_sampled_with_it(system):
         0.68e6,
         method=LOCAL,
         algorithm="plain",
-        target_cov=0.2,
+        target_cv=0.2,
     )
     ensemble = st.monte_carlo(
         problem,
@@ -190,7 +190,7 @@ def test_more_that_is_random_is_sampled_with_it(system):
         0.68e6,
         method=LOCAL,
         algorithm="subset",
-        target_cov=0.15,
+        target_cv=0.15,
     )
     error = math.hypot(rare.coefficient_of_variation, result.coefficient_of_variation)
     assert abs(math.log(rare.probability / result.probability)) < 4.0 * error

@@ -9,7 +9,7 @@ import stiction as st
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
-FRICTION = st.SlipWeakening(weakening_rate=3e11, residual_strength=2e5)
+FRICTION = st.LinearWeakening(weakening_rate=3e11, residual_strength=2e5)
 LINE = st.Problem(SOLID, st.Interface(length=0.04, nodes=64), FRICTION)
 PLANE = st.Problem(SOLID, st.Interface(length=(0.04, 0.03), nodes=(40, 36)), FRICTION)
 METHOD = st.Rupture(loading_rate=1e8)

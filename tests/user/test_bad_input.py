@@ -13,7 +13,7 @@ def make_problem(**options):
     arguments = {
         "solid": st.Solid(**GOOD_SOLID),
         "interface": st.Interface(length=0.1, nodes=256),
-        "friction": st.SlipWeakening(weakening_rate=0.5e12),
+        "friction": st.LinearWeakening(weakening_rate=0.5e12),
     }
     return st.Problem(**(arguments | options))
 
@@ -47,14 +47,14 @@ CASES = {
     "odd nodes": (lambda: st.Interface(length=0.1, nodes=65), ["nodes", "65", "even"]),
     "half a node": (lambda: st.Interface(length=0.1, nodes=64.5), ["nodes", "whole"]),
     "no length": (lambda: st.Interface(length=0.0, nodes=64), ["length", "positive"]),
-    "no rate": (lambda: st.SlipWeakening(), ["weakening_rate", "critical_slip", "got none"]),
+    "no rate": (lambda: st.LinearWeakening(), ["weakening_rate", "critical_slip", "got none"]),
     "both": (
-        lambda: st.SlipWeakening(weakening_rate=1.0, critical_slip=1.0),
+        lambda: st.LinearWeakening(weakening_rate=1.0, critical_slip=1.0),
         ["rate and critical_slip"],
     ),
-    "negative rate": (lambda: st.SlipWeakening(weakening_rate=[1.0, -2.0]), ["-2", "positive"]),
+    "negative rate": (lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]), ["-2", "positive"]),
     "negative residual": (
-        lambda: st.SlipWeakening(weakening_rate=1.0, residual_strength=-1.0),
+        lambda: st.LinearWeakening(weakening_rate=1.0, residual_strength=-1.0),
         ["residual_strength", "-1"],
     ),
     "profile nan": (lambda: st.Load(profile=[1.0, np.nan]), ["profile", "finite", "entry 1"]),
@@ -243,7 +243,7 @@ CASES = {
             st.Problem(
                 st.Solid(**GOOD_SOLID | {"plane": "strain"}),
                 st.Interface(length=(0.1, 0.1), nodes=(64, 64)),
-                st.SlipWeakening(weakening_rate=0.05e12),
+                st.LinearWeakening(weakening_rate=0.05e12),
             ),
             np.full((64, 64), 1e6),
             method=st.Rupture(loading_rate=1e7),
@@ -261,19 +261,19 @@ CASES = {
     ),
     "rate that varies": (
         lambda: st.onset(
-            make_problem(friction=st.SlipWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)),
+            make_problem(friction=st.LinearWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)),
             np.ones(256),
             method=st.LocalCriterion(),
         ),
         ["weakening_rate", "st.Equilibrium()"],
     ),
     "nucleation length of critical slip": (
-        lambda: make_problem(friction=st.SlipWeakening(critical_slip=1e-6)).nucleation_length,
+        lambda: make_problem(friction=st.LinearWeakening(critical_slip=1e-6)).nucleation_length,
         ["weakening_rate", "uniform"],
     ),
     "h_n longer than L": (
         lambda: st.onset(
-            make_problem(friction=st.SlipWeakening(weakening_rate=1e10)),
+            make_problem(friction=st.LinearWeakening(weakening_rate=1e10)),
             np.full(256, 1e6),
             method=st.LocalCriterion(),
         ),

@@ -80,7 +80,7 @@ LINEAR = """
 import numpy as np, stiction as st
 from stiction.friction import kernels
 ones = np.ones(3)
-law = st.SlipWeakening(weakening_rate=1.0).parameters
+law = st.LinearWeakening(weakening_rate=1.0).parameters
 print(kernels.strengths(law, ones, 0.0 * ones, ones, 0.5 * ones))
 """
 

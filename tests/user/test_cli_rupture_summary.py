@@ -13,7 +13,7 @@ from stiction.plot import films
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
     st.Interface(length=0.05, nodes=128),
-    st.SlipWeakening(weakening_rate=0.2e12),
+    st.LinearWeakening(weakening_rate=0.2e12),
 )
 
 

@@ -55,7 +55,7 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
     scope = {}
     for block in blocks(page, "python"):
         block = block.replace("bootstrap=200", "bootstrap=20").replace("[:20]", "[:2]")
-        exec(compile(block.replace("seed=1)", "seed=1, target_cov=0.3)"), page, "exec"), scope)
+        exec(compile(block.replace("seed=1)", "seed=1, target_cv=0.3)"), page, "exec"), scope)
     fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
     for name, value in truth.items():
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)

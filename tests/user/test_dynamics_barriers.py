@@ -17,7 +17,7 @@ from stiction.report.rupture_figures import rupture_figure
 NODES, LENGTH = 256, 0.05
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 PROBLEM = st.Problem(
-    SOLID, st.Interface(length=LENGTH, nodes=NODES), st.SlipWeakening(weakening_rate=0.5e12)
+    SOLID, st.Interface(length=LENGTH, nodes=NODES), st.LinearWeakening(weakening_rate=0.5e12)
 )
 X = np.arange(NODES) / NODES
 TAU_P = 1e6 - 2e5 * np.cos(2 * np.pi * X) + 5e4 * np.sin(10 * np.pi * X)
@@ -90,7 +90,7 @@ def test_an_infinite_barrier_is_drawn_as_a_gap(tmp_path):
 
 @pytest.mark.parametrize("height", [1e12, np.inf])
 def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(height):
-    friction = st.SlipWeakening(critical_slip=4e-6)
+    friction = st.LinearWeakening(critical_slip=4e-6)
     problem = dataclasses.replace(PROBLEM, friction=friction)
     run = simulate(barred(height), problem, stop="onset")
     assert run.attrs["stopped"] == "onset"
@@ -100,7 +100,7 @@ def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(heigh
 
 
 def test_a_grid_too_coarse_names_the_node_whose_nucleation_length_it_is():
-    problem = dataclasses.replace(PROBLEM, friction=st.SlipWeakening(critical_slip=2e-6))
+    problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=2e-6))
     with pytest.warns(AccuracyWarning, match=r"of the steepest weakening, W = .* Pa/m, spans"):
         simulate(TAU_P, problem, stop="onset")
 
@@ -127,7 +127,7 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
 
 
 def test_one_node_of_no_strength_costs_next_to_nothing():
-    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
     problem = dataclasses.replace(PROBLEM, friction=friction)
     tau_p = TAU_P + 0.3e6
     plain = st.onset(problem, tau_p, method=METHOD)
@@ -236,7 +236,7 @@ def test_loose_kernels_that_make_waves_grow_are_refused():
 )
 def test_poisson_ratios_that_waves_allow(plane, ratio):
     solid = dataclasses.replace(SOLID, poisson_ratio=ratio, plane=plane)
-    friction = st.SlipWeakening(weakening_rate=0.5e12 * solid.effective_modulus() / 1.33e9)
+    friction = st.LinearWeakening(weakening_rate=0.5e12 * solid.effective_modulus() / 1.33e9)
     problem = dataclasses.replace(PROBLEM, solid=solid, friction=friction)
     exact = float(st.onset(problem, TAU_P, method=st.Equilibrium()).critical_stress[0])
     found = st.onset(problem, TAU_P, method=dataclasses.replace(METHOD, loading_rate=1e5))
@@ -249,6 +249,6 @@ def test_poisson_ratios_are_refused_with_the_reason_of_their_plane_state():
         ("stress", -0.999, "nu >= -0.99 in plane stress"),
     ):
         solid = dataclasses.replace(SOLID, poisson_ratio=ratio, plane=plane)
-        friction = st.SlipWeakening(weakening_rate=1e9)
+        friction = st.LinearWeakening(weakening_rate=1e9)
         with pytest.raises(InputError, match=text):
             METHOD.prepare(st.Problem(solid, PROBLEM.interface, friction))

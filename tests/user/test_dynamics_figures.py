@@ -17,7 +17,7 @@ from stiction.report.rupture_figures import front_figure, rupture_figure
 def simulated():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     problem = st.Problem(
-        solid, st.Interface(length=0.05, nodes=128), st.SlipWeakening(weakening_rate=0.2e12)
+        solid, st.Interface(length=0.05, nodes=128), st.LinearWeakening(weakening_rate=0.2e12)
     )
     x = problem.interface.x
     tau_p = 1e6 - 2e5 * np.cos(2 * np.pi * x / 0.05) + 5e4 * np.sin(10 * np.pi * x / 0.05)

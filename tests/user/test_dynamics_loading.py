@@ -17,7 +17,7 @@ NODES = 128
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
     st.Interface(length=0.05, nodes=NODES),
-    st.SlipWeakening(weakening_rate=0.2e12),
+    st.LinearWeakening(weakening_rate=0.2e12),
 )
 X = np.arange(NODES) / NODES
 TAU_P = 1e6 - 2e5 * np.cos(2 * np.pi * X) + 5e4 * np.sin(10 * np.pi * X)
@@ -65,7 +65,7 @@ def test_kinetic_stress_is_that_of_the_first_global_sliding():
     problem = st.Problem(
         PROBLEM.solid,
         PROBLEM.interface,
-        st.SlipWeakening(weakening_rate=0.2e12, residual_strength=3e5),
+        st.LinearWeakening(weakening_rate=0.2e12, residual_strength=3e5),
     )
     load = ([0.0, 0.12, 0.1201, 0.1203, 0.121], [0.0, 1.2e6, 1.2e6, 1e5, 1e5])
     # Slides at its residual strength, is unloaded, and stands still at 0.1 MPa.

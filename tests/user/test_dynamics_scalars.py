@@ -17,7 +17,7 @@ ANGLE = 2 * np.pi * np.arange(NODES) / NODES
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
     st.Interface(length=LENGTH, nodes=NODES),
-    st.SlipWeakening(
+    st.LinearWeakening(
         weakening_rate=0.2e12 + 2e10 * np.sin(ANGLE), residual_strength=3e5 + 5e4 * np.cos(ANGLE)
     ),
     st.Load(profile=1.2 + 0.2 * np.cos(ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * ANGLE)),

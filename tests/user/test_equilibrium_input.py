@@ -87,7 +87,7 @@ def test_bounds_that_do_not_close_are_not_passed_over(gap):
 
 def test_grid_far_too_fine(solid):
     """Refused at once, with the number of nodes to take; there it works."""
-    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    friction = st.LinearWeakening(weakening_rate=0.5e12)
     fine = st.Interface(0.0072, 8192)
     with pytest.raises(st.InputError, match="spans 39.. of 8192 nodes.*interface.nodes <= 512"):
         Solver(st.Problem(solid, fine, friction))
@@ -99,21 +99,21 @@ def test_grid_far_too_fine(solid):
     assert onset.certificate_gap.item() < 1e-9 * onset.critical_load.item()
     with pytest.raises(st.InputError, match="interface.nodes"):
         st.onset(
-            st.Problem(solid, fine, st.SlipWeakening(weakening_rate=1e13)),
+            st.Problem(solid, fine, st.LinearWeakening(weakening_rate=1e13)),
             {"strength": np.full(8192, 0.9e6), "weakening_rate": 0.5e12},
             method=Equilibrium(),
         )
 
 
 def test_error_of_the_grid_needs_two_grids(solid):
-    friction = st.SlipWeakening(weakening_rate=0.5e12)
+    friction = st.LinearWeakening(weakening_rate=0.5e12)
     problem = st.Problem(solid, st.Interface(0.1, 258), friction)
     with pytest.raises(st.InputError, match="multiple of four.*got 258; take 260"):
         st.onset(problem, np.ones(258), method=Equilibrium(discretization_error=True))
 
 
 def test_warning_says_the_estimated_error(solid):
-    problem = st.Problem(solid, st.Interface(0.1, 128), st.SlipWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(solid, st.Interface(0.1, 128), st.LinearWeakening(weakening_rate=0.5e12))
     rng = np.random.default_rng(0)
     with pytest.warns(st.AccuracyWarning, match="by an estimated .* of 3 samples"):
         st.onset(

@@ -16,7 +16,7 @@ from stiction.inference import bootstrap
 
 ROOT = Path(__file__).parents[2]
 FIELD = st.RandomField(
-    st.Lognormal(mean=1e6, cov=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
+    st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
 )
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(length=COUNT * SPACING, nodes=COUNT)
@@ -43,7 +43,7 @@ def test_what_it_finds_is_what_was_put_in(plain):
     assert plain.parameters.keys() == plain.interval.keys()
     for name, (low, high) in plain.interval.items():
         assert low < high, name
-    assert "marginal.cov" in repr(plain)
+    assert "marginal.cv" in repr(plain)
     assert len(plain.repetitions) == 20
     assert plain.field.sample(PIECE, seed=1).shape == (1, COUNT)
 
@@ -90,7 +90,7 @@ def test_several_records_are_of_one_field(plain):
 
 def test_maps_are_fitted_too():
     truth = st.RandomField(
-        st.Weibull(mean=2e6, cov=0.3), st.SquaredExponentialSpectrum(1e-3), mean_mode=True
+        st.Weibull(mean=2e6, cv=0.3), st.SquaredExponentialSpectrum(1e-3), mean_mode=True
     )
     plane = st.Interface(length=(16e-3, 16e-3), nodes=(64, 64))
     values = truth.sample(plane, seed=1)[0, :48, :40]
@@ -205,7 +205,7 @@ def test_no_noise_found_is_not_no_noise(seed):
     Repetitions without noise mostly find none either: their intervals would end at next to nothing.
     """
     rough = st.RandomField(
-        st.Lognormal(mean=1e6, cov=0.3), st.ExponentialSpectrum(2e-3), mean_mode=True
+        st.Lognormal(mean=1e6, cv=0.3), st.ExponentialSpectrum(2e-3), mean_mode=True
     )
     record = rough.sample(st.Interface(length=0.12, nodes=600), seed=seed)[0, :200]
     record = record + 3e4 * np.random.default_rng(seed).standard_normal(200)

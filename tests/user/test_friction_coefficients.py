@@ -8,7 +8,7 @@ import stiction as st
 from stiction.cli.app import app
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
-COEFFICIENT = st.RandomField(st.Lognormal(mean=0.5, cov=0.15), SPECTRUM, of="friction_coefficient")
+COEFFICIENT = st.RandomField(st.Lognormal(mean=0.5, cv=0.15), SPECTRUM, of="friction_coefficient")
 PRESSURE = 2e6
 LOCAL = st.LocalCriterion()
 
@@ -17,7 +17,7 @@ def joint(pressure):
     return st.Problem(
         solid=st.Solid(youngs_modulus=2.6e9, poisson_ratio=0.3, density=1200.0),
         interface=st.Interface(length=0.1, nodes=256),
-        friction=st.SlipWeakening(weakening_rate=2e11, residual_ratio=0.3),
+        friction=st.LinearWeakening(weakening_rate=2e11, residual_ratio=0.3),
         load=st.Load(normal_pressure=pressure),
     )
 
@@ -44,7 +44,7 @@ def test_contradicting_moduli_are_refused(given, text):
 
 
 def test_coefficients_times_a_pressure_are_a_strength():
-    strength = st.RandomField(st.Lognormal(mean=0.5 * PRESSURE, cov=0.15), SPECTRUM)
+    strength = st.RandomField(st.Lognormal(mean=0.5 * PRESSURE, cv=0.15), SPECTRUM)
     options = {"method": LOCAL, "samples": 20, "seed": 1}
     given = st.monte_carlo(joint(PRESSURE), COEFFICIENT, **options)
     same = st.monte_carlo(joint(PRESSURE), strength, **options)
@@ -59,7 +59,7 @@ def test_coefficients_times_a_pressure_are_a_strength():
     [
         st.Beta(alpha=1.5, beta=3.0, low=0.3, high=0.8),
         {"type": "weibull_min", "c": 3.0, "scale": 0.5},
-        st.TruncatedNormal(mean=0.5, cov=0.2, low=0.3, high=0.9),
+        st.TruncatedNormal(mean=0.5, cv=0.2, low=0.3, high=0.9),
     ],
 )
 def test_every_marginal_scales(marginal):
@@ -73,7 +73,7 @@ def test_every_marginal_scales(marginal):
 
 def test_a_random_pressure_carries_the_strength_with_it():
     """Where strength is mu p, a higher pressure alone changes no coefficient at onset."""
-    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cov=0.1), SPECTRUM)
+    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)
     random = st.RandomInterface(strength=COEFFICIENT, normal_pressure=pressure)
     result = st.monte_carlo(
         joint(None), random, method=LOCAL, samples=4, seed=1, keep=["strength", "normal_pressure"]
@@ -83,7 +83,7 @@ def test_a_random_pressure_carries_the_strength_with_it():
 
 
 def test_failure_by_coefficient_is_failure_by_stress():
-    options = {"method": LOCAL, "target_cov": 0.3, "seed": 4, "algorithm": "plain"}
+    options = {"method": LOCAL, "target_cv": 0.3, "seed": 4, "algorithm": "plain"}
     by_coefficient = st.failure_probability(
         joint(PRESSURE), COEFFICIENT, friction_coefficient=0.4, **options
     )
@@ -94,13 +94,13 @@ def test_failure_by_coefficient_is_failure_by_stress():
 
 
 def test_failure_under_a_random_pressure_counts_each_samples_own():
-    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cov=0.1), SPECTRUM)
+    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)
     random = st.RandomInterface(strength=COEFFICIENT, normal_pressure=pressure)
     result = st.monte_carlo(joint(None), random, method=LOCAL, samples=4000, seed=9)
     least = float(result.friction_coefficient.quantile(0.05))
     found = st.failure_probability(
         joint(None), random, friction_coefficient=least, method=LOCAL, algorithm="plain",
-        target_cov=0.1, seed=1,
+        target_cv=0.1, seed=1,
     )  # fmt: skip
     # Both scatter: 0.05 by 7 % from 4,000 samples, the estimate by 10 %.
     assert found.probability == pytest.approx(0.05, rel=0.35)
@@ -108,7 +108,7 @@ def test_failure_under_a_random_pressure_counts_each_samples_own():
 
 def test_a_design_stress_has_a_safety_factor_and_a_coefficient():
     found = st.design_stress(
-        joint(PRESSURE), COEFFICIENT, probability=0.01, method=LOCAL, target_cov=0.3
+        joint(PRESSURE), COEFFICIENT, probability=0.01, method=LOCAL, target_cv=0.3
     )
     assert found.safety_factor == pytest.approx(found.typical_stress / found.stress)
     assert 1.0 < found.safety_factor < 2.0
@@ -118,7 +118,7 @@ def test_a_design_stress_has_a_safety_factor_and_a_coefficient():
 def test_what_lacks_a_pressure_is_refused():
     with pytest.raises(st.InputError, match="need a normal pressure"):
         st.monte_carlo(joint(None), COEFFICIENT, method=LOCAL, samples=2, seed=0)
-    strength = st.RandomField(st.Lognormal(mean=1e6, cov=0.15), SPECTRUM)
+    strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.15), SPECTRUM)
     with pytest.raises(st.InputError, match="friction_coefficient: needs a normal pressure"):
         st.failure_probability(joint(None), strength, friction_coefficient=0.3, method=LOCAL)
     with pytest.raises(st.InputError, match="either stress .* or friction_coefficient"):
@@ -138,7 +138,7 @@ def study_table():
         "random": {
             "strength": {
                 "of": "friction_coefficient",
-                "marginal": {"type": "lognormal", "mean": 0.5, "cov": 0.15, "low": 0.3},
+                "marginal": {"type": "lognormal", "mean": 0.5, "cv": 0.15, "low": 0.3},
                 "spectrum": {"type": "power_law", "correlation_length": 2e-3},
             }
         },
@@ -154,7 +154,7 @@ def test_a_study_file_may_say_it_all():
 
 RELIABILITY = [
     "reliability", "study.toml", "--out", "out", "--smallest", "0.01", "--plain-samples", "0",
-    "--target-cov", "0.5",
+    "--target-cv", "0.5",
 ]  # fmt: skip
 
 
@@ -186,7 +186,7 @@ def test_the_command_refuses_before_it_computes(tmp_path, monkeypatch, options, 
     if pressure is None:
         table["problem"].pop("load")
         table["random"]["strength"].pop("of")
-        table["random"]["strength"]["marginal"] = {"type": "lognormal", "mean": 1e6, "cov": 0.15}
+        table["random"]["strength"]["marginal"] = {"type": "lognormal", "mean": 1e6, "cv": 0.15}
         table["problem"]["friction"] = {"type": "linear", "weakening_rate": 2e11}
     st.Study.from_dict(table).to_toml("study.toml")
     with pytest.raises(st.InputError, match=text):

@@ -28,7 +28,7 @@ RUPTURE = st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4)
 def problem(solid):
     """17 nucleation lengths of 30 nodes."""
     interface = st.Interface(length=0.05, nodes=512)
-    return st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.5e12))
+    return st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12))
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def rough(tau_p):
 
 def test_no_law_is_taken_for_another(with_law, rough):
     """Each method answers differently for another law, or refuses it."""
-    linear = with_law(st.SlipWeakening(weakening_rate=0.5e12))
+    linear = with_law(st.LinearWeakening(weakening_rate=0.5e12))
     for method, laws in (
         (st.Equilibrium(), (DUAL, STEEPENING)),
         (RUPTURE, (EXPONENTIAL, DUAL, STEEPENING)),
@@ -152,8 +152,8 @@ def test_polygon_along_a_law_says_what_is_wrong():
 
 def test_residual_ratio_and_fracture_energy_are_taken(problem, tau_p):
     for law in (
-        st.SlipWeakening(fracture_energy=1.0),
-        st.SlipWeakening(weakening_rate=0.5e12, residual_ratio=0.3),
+        st.LinearWeakening(fracture_energy=1.0),
+        st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3),
     ):
         found = st.onset(dataclasses.replace(problem, friction=law), tau_p, method=st.Equilibrium())
         assert found.critical_stress.item() > tau_p.min()
@@ -234,7 +234,7 @@ def test_schema_asks_for_the_type_of_a_law():
 
     definitions = study_schema()["$defs"]
     linear, *others = definitions["Problem"]["properties"]["friction"]["anyOf"]
-    assert "SlipWeakening" in json.dumps(linear)
+    assert "LinearWeakening" in json.dumps(linear)
     assert len(others) == 2
     assert all(other["allOf"][1] == {"required": ["type"]} for other in others)
     assert "FrictionLaw" not in definitions

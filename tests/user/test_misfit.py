@@ -133,7 +133,7 @@ def test_files_that_are_not_taken(name, tmp_path):
 def test_a_sweep_in_a_study_file_finds_the_critical_slip(tmp_path):
     """The record is of a run with d_c = 2 um: in the sweep that one fits best."""
     problem = st.paper.problem(nodes=512)
-    rates = st.SlipWeakening(critical_slip=2e-6)
+    rates = st.LinearWeakening(critical_slip=2e-6)
     problem = dataclasses.replace(problem, friction=rates)
     strength = st.paper.strength(st.paper.problem(nodes=512), correlation_ratio=2.0)
     tau_p = strength.sample(problem.interface, seed=3)[0]

@@ -15,7 +15,7 @@ RESIDUAL = 0.95e6
 @pytest.fixture
 def half_weak(solid):
     """A problem and a strength that is below the residual strength at 29 % of the nodes."""
-    friction = st.SlipWeakening(critical_slip=2e-6, residual_strength=RESIDUAL)
+    friction = st.LinearWeakening(critical_slip=2e-6, residual_strength=RESIDUAL)
     problem = st.Problem(solid, st.Interface(length=0.1, nodes=512), friction)
     x = np.arange(512) / 512
     strength = 1e6 + 1e5 * np.cos(2 * np.pi * x) + 5e4 * np.cos(14 * np.pi * x)
@@ -43,7 +43,7 @@ def test_implicit_steps_pass_first_slip_below_the_residual_strength(half_weak):
 
 
 def test_nothing_but_barriers_and_constant_strength(solid):
-    friction = st.SlipWeakening(critical_slip=2e-6, residual_strength=RESIDUAL)
+    friction = st.LinearWeakening(critical_slip=2e-6, residual_strength=RESIDUAL)
     problem = st.Problem(solid, st.Interface(length=0.1, nodes=512), friction)
     strength = np.full(512, 0.9e6)
     strength[:50] = np.inf
@@ -57,7 +57,7 @@ def _of_residual(caught):
 
 @pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])
 def test_said_once(solid, what):
-    friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=0.7e6)
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.7e6)
     problem = st.Problem(solid, st.Interface(length=0.1, nodes=512), friction)
     field = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),

@@ -103,5 +103,5 @@ def test_text_of_the_user_is_escaped(problem):
 
 def test_what_a_problem_does_not_have_is_left_out(problem):
     rate = np.linspace(4e11, 6e11, problem.interface.size)
-    varied = st.Problem(problem.solid, problem.interface, st.SlipWeakening(weakening_rate=rate))
+    varied = st.Problem(problem.solid, problem.interface, st.LinearWeakening(weakening_rate=rate))
     assert "nucleation_length" not in shown(varied)

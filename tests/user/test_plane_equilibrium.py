@@ -37,7 +37,7 @@ def smooth(shape, seed=0, correlation=4.0):
 
 
 def plane_of(solid, nodes=(72, 64), length=(0.0208, 0.0156), **friction):
-    law = st.SlipWeakening(weakening_rate=RATE, **friction)
+    law = st.LinearWeakening(weakening_rate=RATE, **friction)
     return st.Problem(solid, st.Interface(length, nodes), law)
 
 
@@ -131,7 +131,7 @@ def test_refusals(solid, plane):
         st.Equilibrium(gap=1.0)
     with pytest.raises(st.InputError, match="wavenumbers"):
         st.Equilibrium(wavenumbers="finite differences")
-    line = st.Problem(solid, st.Interface(0.1, 256), st.SlipWeakening(weakening_rate=RATE))
+    line = st.Problem(solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=RATE))
     with pytest.raises(st.InputError, match="choice for planes only"):
         st.onset(line, np.full(256, 1e6), method=st.Equilibrium(wavenumbers="lattice"))
 

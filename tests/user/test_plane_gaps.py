@@ -68,7 +68,7 @@ def test_an_onset_in_a_gap_of_a_map_says_so():
     problem = st.Problem(
         solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
         interface=PLANE,
-        friction=st.SlipWeakening(weakening_rate=3e11),
+        friction=st.LinearWeakening(weakening_rate=3e11),
     )
     values = VALUES.copy()
     values[22:27, 5:9] = np.nan  # around the weakest line, x = 15 mm

@@ -129,7 +129,7 @@ def test_failing_profiles_are_drawn(path):
     plan = st.Study.from_toml(path).plans[0]
     found = st.failure_probability(
         plan.problem, plan.random, 0.72e6, method=plan.method, algorithm="plain",
-        target_cov=0.5, max_evaluations=300, progress=False,
+        target_cv=0.5, max_evaluations=300, progress=False,
     )  # fmt: skip
     assert found.failing_profiles.sizes["sample"] >= 2
     axes = weak_spot_figure(found.failing_profiles, plan.problem.nucleation_length, 0.72e6).axes[0]

@@ -19,7 +19,7 @@ def problem(**changes):
     return st.Problem(
         st.Solid(shear_modulus=given["G"], poisson_ratio=0.33, density=given["rho"]),
         st.Interface(length=given["L"], nodes=NODES),
-        st.SlipWeakening(**friction),
+        st.LinearWeakening(**friction),
         st.Load(normal_pressure=given["p"]),
     )
 
@@ -88,7 +88,7 @@ def test_what_people_study_raises_no_doubt(solid, friction, length, strength):
         h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
         nodes = max(64, 2 * int(4 * length / h_n))
         system = st.Problem(
-            st.Solid(*solid), st.Interface(length, nodes), st.SlipWeakening(friction)
+            st.Solid(*solid), st.Interface(length, nodes), st.LinearWeakening(friction)
         )
         spectrum = st.SquaredExponentialSpectrum(correlation_length=length / 20)
         field = st.RandomField(scipy.stats.uniform(0.9 * strength, 0.2 * strength), spectrum)

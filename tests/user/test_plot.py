@@ -36,7 +36,7 @@ def system():
 def plane():
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
     interface = st.Interface(length=(0.02, 0.01), nodes=(64, 32))
-    problem = st.Problem(solid, interface, st.SlipWeakening(weakening_rate=5e11))
+    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=5e11))
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     return problem, strength.sample(interface, seed=0)
 

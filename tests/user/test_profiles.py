@@ -22,7 +22,7 @@ def interface():
 @pytest.fixture(scope="module")
 def system(interface):
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-    return st.Problem(solid, interface, st.SlipWeakening(weakening_rate=0.15e12))
+    return st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.15e12))
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     )
     rows = system.sample({"strength": strength, "residual_strength": given, "initial_stress": 1e4})
     np.testing.assert_allclose(rows.residual_strength, plain.residual_strength, rtol=1e-14)
-    friction = st.SlipWeakening(weakening_rate=0.2e12, residual_strength=given)
+    friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=given)
     load = st.Load(profile=labelled(1.0 + x[::-1], x[::-1]))
     problem = st.Problem(system.solid, interface, friction, load)
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)

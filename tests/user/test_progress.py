@@ -211,7 +211,7 @@ def test_failure_probability_at_any_moment_when_time_is_up(system, algorithm, mo
         monkeypatch.setattr(estimate, "Meter", lambda *a, looks=looks, **b: Watched(looks))
         with pytest.warns(st.AccuracyWarning, match="raise time_limit"):
             found = st.failure_probability(
-                *system, 0.665e6, method=st.Equilibrium(), algorithm=algorithm, target_cov=1e-3
+                *system, 0.665e6, method=st.Equilibrium(), algorithm=algorithm, target_cv=1e-3
             )
         assert found.cut_short
         assert "cut short" in str(found)
@@ -229,7 +229,7 @@ def test_design_stress_and_curve_when_time_is_up(system, monkeypatch):
         monkeypatch.setattr(design, "Meter", lambda *a, looks=looks, **b: Watched(looks))
         with pytest.warns(st.AccuracyWarning, match="raise time_limit"):
             found = st.design_stress(
-                *system, probability=1e-9, method=st.LocalCriterion(), target_cov=1e-3
+                *system, probability=1e-9, method=st.LocalCriterion(), target_cv=1e-3
             )
         assert found.cut_short
         # P = 1e-9 lies .3 kPa above the bound.
@@ -238,7 +238,7 @@ def test_design_stress_and_curve_when_time_is_up(system, monkeypatch):
         curve = st.failure_curve(
             *system,
             method=st.LocalCriterion(),
-            target_cov=1e-3,
+            target_cv=1e-3,
             plain_samples=10**7,
             time_limit=0.5,
         )

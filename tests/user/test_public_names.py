@@ -43,7 +43,7 @@ import stiction as st
 
 solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, densty=1170.0)
 interface = st.Interface(length="0.1", nodes=1024)
-law = st.SlipWeakening(weakening_rat=5e11)
+law = st.LinearWeakening(weakening_rat=5e11)
 beta = st.Beta(alpha=1.5, beta=3.0, low=0.66e6)
 method = st.Equilibrum()
 problem = st.Problem(interface, solid, law)

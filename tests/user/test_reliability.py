@@ -54,12 +54,12 @@ def test_everything_wrong_is_named_at_once(system):
             *system,
             "low",
             method=st.LocalCriterion,
-            target_cov=0.0,
+            target_cv=0.0,
             confidence=1.0,
             max_evaluations=3,
         )
     text = str(caught.value)
-    for word in ("target_cov", "confidence", "max_evaluations", "stress", "method"):
+    for word in ("target_cv", "confidence", "max_evaluations", "stress", "method"):
         assert word in text
     with pytest.raises(st.InputError, match="seed"):
         failure_probability(*system, 0.67e6, method=LOCAL, seed=-1)
@@ -68,7 +68,7 @@ def test_everything_wrong_is_named_at_once(system):
     for workers in (0, "two", 1.5):
         with pytest.raises(st.InputError, match="workers"):
             failure_probability(*system, 0.67e6, method=LOCAL, workers=workers)
-    for name in ("target_cov", "confidence", "max_evaluations"):
+    for name in ("target_cv", "confidence", "max_evaluations"):
         for value in ("much", None if name != "max_evaluations" else True, [0.1]):
             with pytest.raises(st.InputError, match=name):
                 failure_probability(*system, 0.67e6, method=LOCAL, **{name: value})
@@ -100,7 +100,7 @@ def test_a_slow_method_goes_with_plain_sampling_only(system):
             failure_probability(*system, 0.69e6, method=rupture, algorithm=algorithm)
     with pytest.raises(st.InputError, match="monte_carlo"):
         design_stress(*system, probability=1e-3, method=rupture)
-    result = failure_probability(*system, 0.72e6, method=rupture, target_cov=0.2)
+    result = failure_probability(*system, 0.72e6, method=rupture, target_cv=0.2)
     assert result.algorithm == "plain"
     assert "rupture" in result.reason
     # Two hundred samples first, not a thousand.
@@ -111,7 +111,7 @@ def test_two_levels_need_a_uniform_weakening_rate(system):
     problem, field = system
     wave = 1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(256) / 256)
     varying = st.Problem(
-        problem.solid, problem.interface, st.SlipWeakening(weakening_rate=0.5e12 * wave)
+        problem.solid, problem.interface, st.LinearWeakening(weakening_rate=0.5e12 * wave)
     )
     with pytest.raises(st.InputError, match="weakening rate (varies|is not uniform)"):
         failure_probability(varying, field, 0.67e6, method=Equilibrium(), algorithm="two_level")
@@ -119,7 +119,7 @@ def test_two_levels_need_a_uniform_weakening_rate(system):
         failure_probability(varying, field, 0.67e6, method=Equilibrium(), algorithm="importance")
     with pytest.raises(st.InputError, match="names no cheaper method"):
         failure_probability(problem, field, 0.67e6, method=LOCAL, algorithm="two_level")
-    result = failure_probability(varying, field, 0.675e6, method=Equilibrium(), target_cov=0.4)
+    result = failure_probability(varying, field, 0.675e6, method=Equilibrium(), target_cv=0.4)
     assert result.algorithm == "subset"
     assert 0.0 < result.probability < 0.01
 
@@ -128,10 +128,10 @@ def test_auto_says_why(system):
     often = failure_probability(*system, 0.7e6, method=LOCAL)
     assert (often.algorithm, often.evaluations >= 1000) == ("plain", True)
     assert "frequent" in often.reason
-    rare = failure_probability(*system, 0.665e6, method=LOCAL, target_cov=0.3)
+    rare = failure_probability(*system, 0.665e6, method=LOCAL, target_cv=0.3)
     assert rare.algorithm == "subset"
     assert "rare" in rare.reason
-    both = failure_probability(*system, 0.665e6, method=Equilibrium(), target_cov=0.4)
+    both = failure_probability(*system, 0.665e6, method=Equilibrium(), target_cv=0.4)
     assert both.algorithm == "two_level"
     assert both.first_stage_evaluations > both.evaluations
     assert "c.o.v." in str(both)
@@ -145,7 +145,7 @@ def test_too_few_evaluations_return_what_there_is(system, algorithm):
             0.665e6,
             method=LOCAL,
             algorithm=algorithm,
-            target_cov=0.01,
+            target_cv=0.01,
             max_evaluations=2000,
         )
     assert result.evaluations <= 2000
@@ -164,7 +164,7 @@ def test_the_smallest_budgets_are_kept_to(system, algorithm, allowed):
             0.665e6,
             method=Equilibrium(),
             algorithm=algorithm,
-            target_cov=0.05,
+            target_cv=0.05,
             max_evaluations=allowed,
         )
     assert 0 < result.evaluations <= allowed
@@ -181,12 +181,12 @@ def test_auto_leaves_a_first_stage_that_picks_others():
         st.PowerLawSpectrum(correlation_length=2.0 * base.nucleation_length),
     )
     result = failure_probability(
-        base, field, 0.34e6, method=Equilibrium(), target_cov=0.5, max_evaluations=1500
+        base, field, 0.34e6, method=Equilibrium(), target_cv=0.5, max_evaluations=1500
     )
     assert result.algorithm == "subset"
     assert "the local criterion picks only" in result.reason
     answer = design_stress(
-        base, field, probability=5e-3, method=Equilibrium(), target_cov=0.5, max_evaluations=1500
+        base, field, probability=5e-3, method=Equilibrium(), target_cv=0.5, max_evaluations=1500
     )
     assert answer.algorithm == "subset"
     assert "only" in answer.reason
@@ -289,7 +289,7 @@ def test_onsets_that_pile_up_on_the_bound(system, algorithm):
             probability=1e-5,
             method=Piled("equilibrium"),
             algorithm=algorithm,
-            target_cov=0.3,
+            target_cv=0.3,
         )
     assert (answer.stress, answer.stress_above_bound) == (0.66e6, 0.0)
     assert not any("lies below" in text for text in answer.warnings)
@@ -300,7 +300,7 @@ def test_onsets_that_pile_up_on_the_bound(system, algorithm):
             probability=1e-12,
             method=Piled("equilibrium"),
             algorithm=algorithm,
-            target_cov=0.3,
+            target_cv=0.3,
             max_evaluations=100,
         )
     assert few.interval[0] == 0.66e6 <= few.interval[1]
@@ -316,10 +316,10 @@ def unbounded():
 
 
 def test_without_a_bound_nothing_is_said_of_one(unbounded):
-    found = failure_probability(*unbounded, 0.6e6, method=LOCAL, target_cov=0.3)
+    found = failure_probability(*unbounded, 0.6e6, method=LOCAL, target_cv=0.3)
     assert found.lower_bound == 0.0
     assert "bound" not in str(found)
-    answer = design_stress(*unbounded, probability=1e-3, method=LOCAL, target_cov=0.3)
+    answer = design_stress(*unbounded, probability=1e-3, method=LOCAL, target_cv=0.3)
     assert "bound" not in str(answer)
 
 
@@ -331,7 +331,7 @@ def test_arrest_makes_the_first_instability_likelier(unbounded):
             571.89e3,
             method=Equilibrium(),
             algorithm="importance",
-            target_cov=0.15,
+            target_cv=0.15,
             event=event,
         )
         for event in ("first_instability", "critical_stress")

@@ -13,7 +13,7 @@ def test_strength_below_the_residual_strength_is_said_before_computing(solid, ma
     """The marginal reaches down to 0.66 MPa; 4.7 % of it lie below 0.73 MPa, 60 % below 1 MPa."""
 
     def problem(residual):
-        friction = st.SlipWeakening(weakening_rate=0.5e12, residual_strength=residual)
+        friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=residual)
         return st.Problem(solid, st.Interface(length=0.1, nodes=256), friction)
 
     strength = make_strength(0.5)

@@ -26,7 +26,7 @@ def line_arrivals(script, spacing):
     length = 60e3
     line = st.Interface(length=length, nodes=round(length / spacing))
     away = np.abs(line.x - length / 2)
-    friction = st.SlipWeakening(
+    friction = st.LinearWeakening(
         critical_slip=script.CRITICAL_SLIP, residual_strength=script.RESIDUAL
     )
     initial = np.where(away <= 1500.0, script.INSIDE, script.AROUND)

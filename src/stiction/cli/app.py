@@ -18,7 +18,6 @@ from stiction.cli.explore import explore
 from stiction.cli.fit import fit
 from stiction.cli.infer import infer
 from stiction.cli.onset import onset
-from stiction.cli.paper import paper
 from stiction.cli.reliability import reliability
 from stiction.cli.runs import export, plot, report, status
 from stiction.cli.rupture import rupture
@@ -65,7 +64,6 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
 
 
 for command in (
-    paper,
     run,
     merge,
     onset,

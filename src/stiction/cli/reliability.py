@@ -65,7 +65,7 @@ def reliability(
     smallest: Annotated[float, typer.Option(help="Probability down to which the curve goes.")] = (
         1e-9
     ),
-    target_cov: Annotated[
+    target_cv: Annotated[
         float, typer.Option(help="Coefficient of variation at the smallest probability.")
     ] = 0.3,
     plain_samples: Annotated[
@@ -149,7 +149,7 @@ def reliability(
         random,
         method=method,
         smallest=smallest,
-        target_cov=target_cov,
+        target_cv=target_cv,
         plain_samples=plain_samples,
         seed=seed,
         event=event,
@@ -211,7 +211,7 @@ def reliability(
             random,
             method=method,
             smallest=smallest,
-            target_cov=target_cov,
+            target_cv=target_cv,
             plain_samples=plain_samples,
             seed=seed,
             event=event,

@@ -155,7 +155,7 @@ class Equilibrium:
             if not problem.friction.linear and not reasons:
                 reasons.append(
                     "on a plane it takes strength that falls linearly with slip only; use"
-                    " st.SlipWeakening(...)"
+                    " st.LinearWeakening(...)"
                 )
             if self.events:
                 reasons.append(

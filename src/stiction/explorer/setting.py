@@ -19,7 +19,7 @@ from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
 from stiction.errors import InputError, collect_warnings
 from stiction.evaluation import onset
-from stiction.friction.linear import SlipWeakening
+from stiction.friction.linear import LinearWeakening
 from stiction.interface import Interface
 from stiction.load import Load
 from stiction.problem import Problem
@@ -135,7 +135,7 @@ class Setting:
         return Problem(
             solid=SOLID,
             interface=Interface(length=self.length * 1e-3, nodes=self.nodes),
-            friction=SlipWeakening(
+            friction=LinearWeakening(
                 weakening_rate=self.weakening_rate, residual_strength=self.residual * 1e6
             ),
             load=Load(normal_pressure=self.pressure * 1e6),
@@ -182,7 +182,7 @@ problem = st.Problem(
         density={solid.density!r}, plane={solid.plane!r},
     ),
     interface=st.Interface(length={problem.interface.length!r}, nodes={problem.interface.nodes!r}),
-    friction=st.SlipWeakening(
+    friction=st.LinearWeakening(
         weakening_rate={friction.weakening_rate!r},
         residual_strength={friction.residual_strength!r},
     ),

@@ -15,14 +15,14 @@ from pydantic_core import CoreSchema
 from stiction._model import describe
 from stiction.friction.exponential import ExponentialWeakening
 from stiction.friction.law import FrictionLaw
-from stiction.friction.linear import SlipWeakening
+from stiction.friction.linear import LinearWeakening
 from stiction.friction.piecewise import PiecewiseWeakening
 
 
 def _tag(value: Any) -> str:
     if isinstance(value, dict):
         return str(value.get("type", "linear"))
-    if isinstance(value, SlipWeakening | ExponentialWeakening | PiecewiseWeakening):
+    if isinstance(value, LinearWeakening | ExponentialWeakening | PiecewiseWeakening):
         return value.type
     return "own" if isinstance(value, FrictionLaw) else describe(value)
 
@@ -38,7 +38,7 @@ class _Schema:
 
 
 Friction: TypeAlias = Annotated[
-    Annotated[SlipWeakening, Tag("linear")]
+    Annotated[LinearWeakening, Tag("linear")]
     | Annotated[ExponentialWeakening, Tag("exponential")]
     | Annotated[PiecewiseWeakening, Tag("piecewise")]
     | Annotated[FrictionLaw, Tag("own")],

@@ -47,7 +47,7 @@ def dissipated(slip: Array, drop: Array, rate: Array) -> Array:
 
 
 @model
-class SlipWeakening(FrictionLaw):
+class LinearWeakening(FrictionLaw):
     """Strength that falls linearly with slip: max(tau_p - W d, tau_r).
 
     Parameters
@@ -76,7 +76,7 @@ class SlipWeakening(FrictionLaw):
     Examples
     --------
     >>> import stiction as st
-    >>> st.SlipWeakening(critical_slip=2e-6, residual_strength=0.4e6).scale
+    >>> st.LinearWeakening(critical_slip=2e-6, residual_strength=0.4e6).scale
     ('critical_slip', 2e-06)
     """
 

@@ -162,7 +162,7 @@ def fit_field(
     Examples
     --------
     >>> import stiction as st
-    >>> truth = st.RandomField(st.Lognormal(mean=1e6, cov=0.2), st.ExponentialSpectrum(1e-3))
+    >>> truth = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
     >>> interface = st.Interface(length=0.1, nodes=1000)
     >>> fit = st.fit_field(truth.sample(interface, seed=2), interface, marginal="lognormal",
     ...                    spectrum="exponential", noise=0.0, bootstrap=40)

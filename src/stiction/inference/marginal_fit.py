@@ -140,7 +140,7 @@ def _lognormal(values: Array, fixed: dict[str, float]) -> Lognormal:
     mu, variance = float(logs.mean()), float(logs.var())
     excess = math.exp(mu + 0.5 * variance)
     mean = low + excess
-    return Lognormal(mean=mean, cov=math.sqrt(math.expm1(variance)) * excess / mean, low=low)
+    return Lognormal(mean=mean, cv=math.sqrt(math.expm1(variance)) * excess / mean, low=low)
 
 
 def _gamma(values: Array, fixed: dict[str, float]) -> Gamma:
@@ -149,7 +149,7 @@ def _gamma(values: Array, fixed: dict[str, float]) -> Gamma:
     mean = float(excess.mean())
     gap = math.log(mean) - float(np.log(excess).mean())
     shape = brentq(lambda a: math.log(a) - digamma(a) - gap, 1e-3, 1e9, xtol=1e-12, rtol=1e-12)
-    return Gamma(mean=low + mean, cov=mean / math.sqrt(shape) / (low + mean), low=low)
+    return Gamma(mean=low + mean, cv=mean / math.sqrt(shape) / (low + mean), low=low)
 
 
 def _weibull(values: Array, fixed: dict[str, float]) -> Weibull:
@@ -167,20 +167,20 @@ def _weibull(values: Array, fixed: dict[str, float]) -> Weibull:
     scale = math.exp(top) * float(power) ** (1.0 / shape)
     frozen = scipy.stats.weibull_min(shape, low, scale)
     mean = float(frozen.mean())
-    return Weibull(mean=mean, cov=float(frozen.std()) / mean, low=low)
+    return Weibull(mean=mean, cv=float(frozen.std()) / mean, low=low)
 
 
 def _truncated_normal(values: Array, fixed: dict[str, float]) -> TruncatedNormal:
     # An exponential family in y and y^2: maximum likelihood equates the moments.
     # Where they are wider than any cut normal distribution, the likelihood rises towards an
     # exponential or uniform one; the widest that can still be told from it is taken.
-    mean, cov = float(values.mean()), float(values.std()) / float(values.mean())
+    mean, cv = float(values.mean()), float(values.std()) / float(values.mean())
     low, high = fixed.get("low", 0.0), fixed.get("high")
     for _ in range(60):
         try:
-            return TruncatedNormal(mean=mean, cov=cov, low=low, high=high)
+            return TruncatedNormal(mean=mean, cv=cv, low=low, high=high)
         except InputError:
-            cov *= 0.97
+            cv *= 0.97
     raise InputError("marginal: no normal distribution cut at these bounds resembles the values")
 
 

@@ -58,7 +58,7 @@ def _of_lognormal(start: Lognormal) -> Search:
         variance = math.exp(2.0 * v[1])
         excess = math.exp(v[0] + 0.5 * variance)
         mean = low + excess
-        return Lognormal(mean=mean, cov=math.sqrt(math.expm1(variance)) * excess / mean, low=low)
+        return Lognormal(mean=mean, cv=math.sqrt(math.expm1(variance)) * excess / mean, low=low)
 
     return Search(
         np.array([math.log(scale), math.log(shape)]),
@@ -74,7 +74,7 @@ def _of_weibull(start: Weibull) -> Search:
     def marginal(v: Array) -> Weibull:
         frozen = scipy.stats.weibull_min(math.exp(v[1]), low, math.exp(v[0]))
         mean = float(frozen.mean())
-        return Weibull(mean=mean, cov=float(frozen.std()) / mean, low=low)
+        return Weibull(mean=mean, cv=float(frozen.std()) / mean, low=low)
 
     return Search(
         np.array([math.log(scale), math.log(shape)]),
@@ -90,7 +90,7 @@ def _of_gamma(start: Gamma) -> Search:
     def marginal(v: Array) -> Gamma:
         excess = math.exp(v[0] + v[1])
         mean = low + excess
-        return Gamma(mean=mean, cov=excess * math.exp(-0.5 * v[1]) / mean, low=low)
+        return Gamma(mean=mean, cv=excess * math.exp(-0.5 * v[1]) / mean, low=low)
 
     return Search(
         np.array([math.log(scale), math.log(shape)]),
@@ -141,7 +141,7 @@ def _of_truncated(start: TruncatedNormal) -> Search:
             (low - middle) / width, (high - middle) / width, middle, width
         )
         mean = float(frozen.mean())
-        return TruncatedNormal(mean=mean, cov=float(frozen.std()) / mean, low=low, high=start.high)
+        return TruncatedNormal(mean=mean, cv=float(frozen.std()) / mean, low=low, high=start.high)
 
     return Search(np.array([centre / unit, math.log(deviation / unit)]), distribution, marginal)
 

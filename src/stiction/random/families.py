@@ -1,6 +1,6 @@
 """Marginals in engineers' parameters: mean and coefficient of variation of what is measured.
 
-In each of them `mean` is the mean of the field and `cov` its standard deviation over its mean,
+In each of them `mean` is the mean of the field and `cv` its standard deviation over its mean,
 whatever the bound: the lower bound `low` shifts nothing but the shape. scipy's own parameters
 (shapes, loc, scale) follow from them.
 """
@@ -26,7 +26,7 @@ class _MeanAndCov:
     """Families above a lower bound, known by mean and coefficient of variation."""
 
     mean: Positive
-    cov: Positive
+    cv: Positive
     low: Real = 0.0
 
     @model_validator(mode="after")
@@ -43,7 +43,7 @@ class _MeanAndCov:
     @property
     def _ratio(self) -> float:
         """Standard deviation over the mean above the lower bound."""
-        return self.cov * abs(self.mean) / self._excess
+        return self.cv * abs(self.mean) / self._excess
 
 
 @model(kw_only=True)
@@ -54,7 +54,7 @@ class Lognormal(_MeanAndCov):
     ----------
     mean : float
         Mean of the field, such as 0.6e6 Pa; above `low`.
-    cov : float
+    cv : float
         Standard deviation over mean, positive.
     low : float
         Lower bound, 0 if left out.
@@ -67,7 +67,7 @@ class Lognormal(_MeanAndCov):
     Examples
     --------
     >>> import stiction as st
-    >>> round(st.Lognormal(mean=1e6, cov=0.2, low=0.3e6).distribution.std())
+    >>> round(st.Lognormal(mean=1e6, cv=0.2, low=0.3e6).distribution.std())
     200000
     """
 
@@ -89,7 +89,7 @@ class Weibull(_MeanAndCov):
     ----------
     mean : float
         Mean of the field; above `low`.
-    cov : float
+    cv : float
         Standard deviation over mean, positive.
     low : float
         Lower bound, 0 if left out.
@@ -106,7 +106,7 @@ class Weibull(_MeanAndCov):
     def _as_wide_as_can_be_solved(self) -> Weibull:
         if not 1e-3 < self._ratio < 10.0:
             raise InputError(
-                "cov: the standard deviation over the mean above low must lie between 0.001 and"
+                "cv: the standard deviation over the mean above low must lie between 0.001 and"
                 f" 10, got {self._ratio:g}"
             )
         return self
@@ -134,7 +134,7 @@ class Gamma(_MeanAndCov):
     ----------
     mean : float
         Mean of the field; above `low`.
-    cov : float
+    cv : float
         Standard deviation over mean, positive.
     low : float
         Lower bound, 0 if left out.
@@ -162,7 +162,7 @@ class TruncatedNormal:
     ----------
     mean : float
         Mean of the field, that is after the cut; between `low` and `high`.
-    cov : float
+    cv : float
         Standard deviation over mean, after the cut, positive.
     low : float
         0 if left out.
@@ -177,7 +177,7 @@ class TruncatedNormal:
     """
 
     mean: Real
-    cov: Positive
+    cv: Positive
     low: Real = 0.0
     high: Real | None = None
     type: Literal["truncated_normal"] = "truncated_normal"
@@ -196,7 +196,7 @@ class TruncatedNormal:
     @cached_property
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-        deviation = self.cov * abs(self.mean)
+        deviation = self.cv * abs(self.mean)
         top = math.inf if self.high is None else self.high
         excess, room = self.mean - self.low, top - self.mean
 
@@ -214,8 +214,8 @@ class TruncatedNormal:
         if found is None or not np.abs(moments(found.x)).max() < 1e-8:
             raise InputError(
                 f"no normal distribution cut at low={self.low:g} and high={top:g} has"
-                f" mean={self.mean:g} and cov={self.cov:g}: it would have to be wider than the cut"
-                " leaves; lower cov or the bound, or take st.Lognormal or st.Beta"
+                f" mean={self.mean:g} and cv={self.cv:g}: it would have to be wider than the cut"
+                " leaves; lower cv or the bound, or take st.Lognormal or st.Beta"
             )
         centre = self.mean + deviation * float(found.x[0])
         width = deviation * math.exp(float(found.x[1]))

@@ -210,7 +210,7 @@ Marginal: TypeAlias = Annotated[
         {
             "type": "object",
             "description": "type = 'beta' with alpha, beta, low, high; 'lognormal', 'weibull',"
-            " 'gamma' or 'truncated_normal' with mean, cov and low; or the name of a continuous"
+            " 'gamma' or 'truncated_normal' with mean, cv and low; or the name of a continuous"
             " scipy.stats distribution with its shapes, loc and scale",
             "properties": {"type": {"type": "string"}},
             "required": ["type"],

@@ -61,7 +61,7 @@ def by_counting(request: Request, reason: str) -> FailureProbability:
         request.state,
         request.seed,
         request.stress,
-        target_cov=request.target_cov,
+        target_cv=request.target_cv,
         least=request.pilot,
         max_evaluations=request.budget,
         start=request.spent,
@@ -71,12 +71,12 @@ def by_counting(request: Request, reason: str) -> FailureProbability:
 
 def counted(request: Request, count: Count, evaluations: int, reason: str) -> FailureProbability:
     """What a count says."""
-    state, cov = request.state, count.coefficient_of_variation
+    state, cv = request.state, count.coefficient_of_variation
     shown = [state.draws(request.seed, int(i), 1) for i in count.numbers[:SHOWN]]
     draws = np.concatenate(shown) if shown else np.empty((0, state.dimension))
     return FailureProbability(
         probability=count.probability,
-        coefficient_of_variation=cov,
+        coefficient_of_variation=cv,
         interval=count.interval(request.confidence),
         evaluations=evaluations,
         stress=request.stress,
@@ -86,8 +86,8 @@ def counted(request: Request, count: Count, evaluations: int, reason: str) -> Fa
         confidence=request.confidence,
         failing_profiles=profiles_of(state, draws),
         diagnostics={"failures": count.failures, "samples": count.samples},
-        cut_short=cut_short(request, cov),
-        warnings=say(missed(request, cov, evaluations)),
+        cut_short=cut_short(request, cv),
+        warnings=say(missed(request, cv, evaluations)),
     )
 
 
@@ -110,14 +110,14 @@ def subset_diagnostics(tail: Tail[Descent], stress: float) -> dict[str, float]:
         "levels": max(len(run.levels) for run in runs),
         "lowest_acceptance": min(level.acceptance for run in runs for level in run.levels),
         "largest_chain_correlation": max(level.correlation for run in runs for level in run.levels),
-        "chain_based_cov": math.sqrt(chain_based),
+        "chain_based_cv": math.sqrt(chain_based),
         "effective_families": 1.0 / variance if variance > 0.0 else math.inf,
     }
     if len(runs) > 3:
         values = np.array([run.probability(stress) for run in runs])
         share = np.array(weights(runs))
         spread = float(np.sum(share**2 * (values - tail.probability(stress)) ** 2))
-        found["spread_of_runs_cov"] = math.sqrt(
+        found["spread_of_runs_cv"] = math.sqrt(
             spread * len(runs) / (len(runs) - 1)
         ) / tail.probability(stress)
     return found
@@ -129,7 +129,7 @@ def subset_doubts(tail: Tail[Descent], diagnostics: dict[str, float]) -> list[st
     if diagnostics["effective_families"] < FEWEST_FAMILIES:
         texts.append(
             f"the failing samples descend from {diagnostics['effective_families']:.1f} independent"
-            " ones only: the coefficient of variation is itself uncertain; lower target_cov"
+            " ones only: the coefficient of variation is itself uncertain; lower target_cv"
         )
     if diagnostics["lowest_acceptance"] < 0.1:
         texts.append(
@@ -155,22 +155,22 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
     runs = run_until_precise(
         make,
         judge,
-        target_cov=request.target_cov,
+        target_cv=request.target_cv,
         first=first_size(SUBSET, request.budget),
         largest=SUBSET_MOST,
         max_evaluations=request.budget,
         meter=state.meter,
     )
     tail = Tail(runs)
-    probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
+    probability, cv = tail.probability(stress), tail.coefficient_of_variation(stress)
     evaluations = request.spent + sum(run.evaluations for run in runs)
     diagnostics = subset_diagnostics(tail, stress)
-    interval = lognormal_interval(probability, cov, request.confidence)
+    interval = lognormal_interval(probability, cv, request.confidence)
     if all(len(run.levels) == 1 for run in runs) and runs[0].complete:
         # So likely that there was nothing to go down to: the samples are independent.
         count = tally(np.concatenate([run.populations[0].values for run in runs]), stress)
-        cov, interval = count.coefficient_of_variation, count.interval(request.confidence)
-    doubts = missed(request, cov, evaluations)
+        cv, interval = count.coefficient_of_variation, count.interval(request.confidence)
+    doubts = missed(request, cv, evaluations)
     if not runs[0].complete:
         lowest = runs[0].levels[-1].threshold
         deep = len(runs[0].levels) >= MOST_LEVELS
@@ -190,7 +190,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
     chosen = failed[distinct(last.values[failed], SHOWN, generator(request.seed, 2))]
     return FailureProbability(
         probability=probability,
-        coefficient_of_variation=cov,
+        coefficient_of_variation=cv,
         interval=interval,
         evaluations=evaluations,
         stress=stress,
@@ -201,7 +201,7 @@ def by_subset(request: Request, reason: str) -> FailureProbability:
         levels=runs[0].levels,
         failing_profiles=profiles_of(state, last.draws[chosen]),
         diagnostics=diagnostics,
-        cut_short=cut_short(request, cov),
+        cut_short=cut_short(request, cv),
         warnings=say(doubts),
     )
 
@@ -228,17 +228,17 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
     runs = run_until_precise(
         make,
         judge,
-        target_cov=request.target_cov,
+        target_cv=request.target_cv,
         first=first_size(BRIDGE, request.budget),
         largest=BRIDGE_MOST,
         max_evaluations=request.budget,
         meter=state.meter,
     )
     tail = Tail(runs)
-    probability, cov = tail.probability(stress), tail.coefficient_of_variation(stress)
+    probability, cv = tail.probability(stress), tail.coefficient_of_variation(stress)
     evaluations = request.spent + sum(run.evaluations for run in runs)
-    doubts = missed(request, cov, evaluations)
-    interval = lognormal_interval(probability, cov, request.confidence)
+    doubts = missed(request, cv, evaluations)
+    interval = lognormal_interval(probability, cv, request.confidence)
     if probability == 0.0:
         descent = runs[0].descent
         reached = math.exp(descent.populations[-1].log_probability)
@@ -268,12 +268,12 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         "last_factor": last,
         "ceiling": largest.ceiling,
         "walk_acceptance": min(run.acceptance for run in runs),
-        "effective_families": 1.0 / cov**2 if cov > 0.0 else math.inf,
+        "effective_families": 1.0 / cv**2 if cv > 0.0 else math.inf,
     }
     chosen = distinct(largest.failing_values, SHOWN, generator(request.seed, 2))
     return FailureProbability(
         probability=probability,
-        coefficient_of_variation=cov,
+        coefficient_of_variation=cv,
         interval=interval,
         evaluations=evaluations,
         first_stage_evaluations=sum(run.first_stage_evaluations for run in runs),
@@ -285,7 +285,7 @@ def by_two_levels(request: Request, cheap: LimitState, reason: str) -> FailurePr
         levels=largest.descent.levels,
         failing_profiles=profiles_of(state, largest.failing[chosen]),
         diagnostics=diagnostics,
-        cut_short=cut_short(request, cov),
+        cut_short=cut_short(request, cv),
         warnings=say(doubts),
     )
 
@@ -325,19 +325,19 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         count += size
         sample = np.concatenate(found)
         probability = min(float(sample.mean()), 1.0)
-        cov = (
+        cv = (
             float(sample.std()) / probability / math.sqrt(count) if probability > 0.0 else math.inf
         )
-        if cov <= request.target_cov or count >= request.budget or state.meter.over:
+        if cv <= request.target_cv or count >= request.budget or state.meter.over:
             break
-        factor = min((cov / request.target_cov) ** 2, 4.0)
+        factor = min((cv / request.target_cv) ** 2, 4.0)
         wanted = 1.05 * count * factor
-        state.meter.expect(min(count * (cov / request.target_cov) ** 2, request.budget) - count)
+        state.meter.expect(min(count * (cv / request.target_cv) ** 2, request.budget) - count)
     total = float(sample.sum())
     share = float(sample.max()) / total if total > 0.0 else 1.0
     size_of = effective_size(sample)
-    doubts = missed(request, cov, count)
-    if cov > 0.0 and (size_of < FEWEST_WEIGHTS or share > LARGEST_SHARE):
+    doubts = missed(request, cv, count)
+    if cv > 0.0 and (size_of < FEWEST_WEIGHTS or share > LARGEST_SHARE):
         doubts.append(
             f"the weights are worth {size_of:.0f} equal ones only, and the largest is"
             f" {share:.0%} of the sum: the shift does not suit the failures; use 'subset'"
@@ -350,8 +350,8 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
     order = np.argsort(-np.log(rng.random(chances.size)) / np.maximum(chances, 1e-300))
     return FailureProbability(
         probability=probability,
-        coefficient_of_variation=cov,
-        interval=lognormal_interval(probability, cov, request.confidence),
+        coefficient_of_variation=cv,
+        interval=lognormal_interval(probability, cv, request.confidence),
         evaluations=count,
         stress=stress,
         lower_bound=state.bounds[0],
@@ -365,6 +365,6 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
             "effective_sample_size": size_of,
             "largest_weight_share": share,
         },
-        cut_short=cut_short(request, cov),
+        cut_short=cut_short(request, cv),
         warnings=say(doubts),
     )

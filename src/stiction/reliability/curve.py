@@ -95,7 +95,7 @@ def failure_curve(
     method: Method,
     smallest: float = 1e-9,
     points_per_decade: int = 3,
-    target_cov: float = 0.3,
+    target_cv: float = 0.3,
     plain_samples: int = 10_000,
     seed: int = 0,
     max_evaluations: int | None = None,
@@ -117,7 +117,7 @@ def failure_curve(
         Probability down to which the curve goes.
     points_per_decade : int
         Stresses a factor of ten in probability.
-    target_cov : float
+    target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
     plain_samples : int
         Samples of plain Monte Carlo to compare with; 0 for none.
@@ -149,7 +149,7 @@ def failure_curve(
     AccuracyWarning
         If the evaluations or the time allowed do not suffice.
     """
-    problems = check_target(target_cov, confidence, max_evaluations)
+    problems = check_target(target_cv, confidence, max_evaluations)
     problems += check_probability("smallest", smallest) + check_time_limit(time_limit)
     meter = Meter("failure_curve", show=progress, time_limit=time_limit)
     for name, value, least, most in (
@@ -171,7 +171,7 @@ def failure_curve(
         check=lambda state: refused_chains(state, max_evaluations),
     )
     request = TailRequest(
-        state, float(smallest), target_cov, int(seed), budget_of(state, max_evaluations)
+        state, float(smallest), target_cv, int(seed), budget_of(state, max_evaluations)
     )
     with meter:
         meter.expect(request.budget, at_most=True)
@@ -192,7 +192,7 @@ def failure_curve(
             f" {deepest:.2g}; {advice(state)}"
         ]
     short = (
-        float(tail.coefficient_of_variation(tail.quantile(deepest))) > target_cov
+        float(tail.coefficient_of_variation(tail.quantile(deepest))) > target_cv
         or onsets.size < plain_samples
     )
     cut = meter.over and (bool(doubts) or short)
@@ -205,11 +205,11 @@ def failure_curve(
     chances = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
     stress = np.array([tail.quantile(float(chance)) for chance in chances])
     found = np.array([tail.probability(float(s)) for s in stress])
-    cov = np.array([tail.coefficient_of_variation(float(s)) for s in stress])
+    cv = np.array([tail.coefficient_of_variation(float(s)) for s in stress])
     lowest = state.bounds[0]
-    pairs = zip(found, cov, strict=True)
+    pairs = zip(found, cv, strict=True)
     ends = np.array([lognormal_interval(float(p), float(c), confidence) for p, c in pairs])
-    pairs = zip(chances, cov, strict=True)
+    pairs = zip(chances, cv, strict=True)
     sides = np.array(
         [stress_interval(tail, float(p), float(c), confidence, lowest) for p, c in pairs]
     )
@@ -219,7 +219,7 @@ def failure_curve(
         "probability": found,
         "probability_low": ends[:, 0],
         "probability_high": ends[:, 1],
-        "coefficient_of_variation": cov,
+        "coefficient_of_variation": cv,
         "stress_low": sides[:, 0],
         "stress_high": sides[:, 1],
     }

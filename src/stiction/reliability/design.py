@@ -65,7 +65,7 @@ class DesignStress:
         Of `interval`.
     diagnostics : dict
     cut_short : bool
-        Whether `time_limit` ended it before `target_cov` was reached.
+        Whether `time_limit` ended it before `target_cv` was reached.
     warnings : tuple of str
         Why the result is not to be trusted; empty if it is.
     typical_stress : float
@@ -148,31 +148,31 @@ def _finish(
     reason: str,
     first_stage: int,
 ) -> DesignStress:
-    state, probability, target_cov = request.state, request.probability, request.target_cov
+    state, probability, target_cv = request.state, request.probability, request.target_cv
     lowest = state.bounds[0]
     evaluations = request.spent + sum(run.evaluations for run in tail.runs)
     doubts = []
     if tail.runs[0].complete:
         stress = tail.quantile(probability)
-        cov = tail.coefficient_of_variation(stress)
+        cv = tail.coefficient_of_variation(stress)
         least = math.nextafter(lowest, math.inf)
         on_it = tail.probability(least)
         if on_it >= probability:
-            stress, cov = lowest, tail.coefficient_of_variation(least)
+            stress, cv = lowest, tail.coefficient_of_variation(least)
             doubts.append(
                 f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa, as far as the"
                 f" method can tell: the stress at P = {probability:g} is the bound itself"
             )
-        interval = stress_interval(tail, probability, cov, confidence, lowest)
-        if cov > target_cov:
+        interval = stress_interval(tail, probability, cv, confidence, lowest)
+        if cv > target_cv:
             doubts.append(
-                f"the coefficient of variation of the probability is {cov:.3g}, not"
-                f" {target_cov:g}: {short_of(state, evaluations)}"
+                f"the coefficient of variation of the probability is {cv:.3g}, not"
+                f" {target_cv:g}: {short_of(state, evaluations)}"
             )
     else:
         # What was seen of the tail bounds the stress: below its lowest value nothing is known.
         seen = tail.runs[0].extent[0]
-        stress, cov, interval = seen, math.inf, (lowest, seen)
+        stress, cv, interval = seen, math.inf, (lowest, seen)
         place = f"the stress lies below {seen:.7g} Pa, the lowest seen"
         if not seen > lowest:
             stress, interval = lowest, (lowest, state.bounds[1])
@@ -188,7 +188,7 @@ def _finish(
         stress=stress,
         interval=interval,
         probability=probability,
-        coefficient_of_variation=cov,
+        coefficient_of_variation=cv,
         evaluations=evaluations,
         first_stage_evaluations=first_stage,
         lower_bound=lowest,
@@ -197,9 +197,9 @@ def _finish(
         confidence=confidence,
         diagnostics={
             "runs": len(tail.runs),
-            "effective_families": 1.0 / cov**2 if cov > 0.0 else math.inf,
+            "effective_families": 1.0 / cv**2 if cv > 0.0 else math.inf,
         },
-        cut_short=state.meter.over and cov > target_cov,
+        cut_short=state.meter.over and cv > target_cv,
         warnings=say(doubts),
     )
 
@@ -211,7 +211,7 @@ def design_stress(
     probability: float,
     method: Method,
     algorithm: Literal["auto", "subset", "two_level"] = "auto",
-    target_cov: float = 0.1,
+    target_cv: float = 0.1,
     seed: int = 0,
     max_evaluations: int | None = None,
     confidence: float = 0.95,
@@ -236,7 +236,7 @@ def design_stress(
         'auto' takes two levels for equilibrium if the probability is below 1 % and the local
         criterion picks the same plain samples as the weakest, else subset simulation by the
         method itself.
-    target_cov : float
+    target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
     seed, max_evaluations, confidence, event, workers, time_limit, progress
         As in `failure_probability`.
@@ -262,11 +262,11 @@ def design_stress(
     >>> problem = st.paper.problem(nodes=512)
     >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
     >>> method = st.LocalCriterion()
-    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cov=0.3)
+    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cv=0.3)
     >>> bool(found.stress > found.lower_bound)
     True
     """
-    problems = check_target(target_cov, confidence, max_evaluations)
+    problems = check_target(target_cv, confidence, max_evaluations)
     problems += check_probability("probability", probability) + check_time_limit(time_limit)
     meter = Meter("design_stress", show=progress, time_limit=time_limit)
     state = make_limit_state(
@@ -284,7 +284,7 @@ def design_stress(
         ),
     )
     request = TailRequest(
-        state, float(probability), target_cov, int(seed), budget_of(state, max_evaluations)
+        state, float(probability), target_cv, int(seed), budget_of(state, max_evaluations)
     )
     with meter:
         meter.expect(request.budget, at_most=True)

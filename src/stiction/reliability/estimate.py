@@ -50,12 +50,12 @@ LEAST_COV = 1e-6
 """A smaller coefficient of variation would take more than 1e12 failures."""
 
 
-def check_target(target_cov: Any, confidence: Any, max_evaluations: Any) -> list[str]:
+def check_target(target_cv: Any, confidence: Any, max_evaluations: Any) -> list[str]:
     """What is wrong with the options that all functions of this package share."""
     problems = []
-    if not (is_finite(target_cov) and target_cov >= LEAST_COV):
+    if not (is_finite(target_cv) and target_cv >= LEAST_COV):
         problems.append(
-            f"target_cov: must be a number >= {LEAST_COV:g}, got {describe(target_cov)}"
+            f"target_cv: must be a number >= {LEAST_COV:g}, got {describe(target_cv)}"
         )
     if not (is_real(confidence) and 0.0 < confidence < 1.0):
         problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
@@ -144,7 +144,7 @@ def failure_probability(
     method: Method,
     friction_coefficient: float | None = None,
     algorithm: Algorithm = "auto",
-    target_cov: float = 0.1,
+    target_cv: float = 0.1,
     seed: int = 0,
     max_evaluations: int | None = None,
     confidence: float = 0.95,
@@ -174,7 +174,7 @@ def failure_probability(
         them fail it counts failures among others; else it takes two levels for equilibrium, if
         the local criterion picks the same samples as the weakest, and subset simulation
         otherwise. `reason` in the result says which and why.
-    target_cov : float
+    target_cv : float
         Coefficient of variation to reach.
     seed : int
         Not negative. The result depends on it and not on the number of workers.
@@ -214,7 +214,7 @@ def failure_probability(
     Subset simulation: Au and Beck (2001), Papaioannou et al. (2015); its error from the ancestry
     of the failing samples, Lee and Whiteley (2018). Intervals are binomial (Clopper and Pearson,
     1934) for plain Monte Carlo, log-normal otherwise. Plain Monte Carlo counts until it has seen
-    2 + 1/target_cov^2 failures, which leaves its estimate unbiased (Haldane, 1945).
+    2 + 1/target_cv^2 failures, which leaves its estimate unbiased (Haldane, 1945).
 
     Examples
     --------
@@ -226,7 +226,7 @@ def failure_probability(
     >>> bool(0.0 < low < found.probability < high < 1.0)
     True
     """
-    problems = check_target(target_cov, confidence, max_evaluations)
+    problems = check_target(target_cv, confidence, max_evaluations)
     problems += check_time_limit(time_limit)
     if (stress is None) == (friction_coefficient is None):
         problems.append("stress: give either stress (Pa) or friction_coefficient")
@@ -250,7 +250,7 @@ def failure_probability(
     budget = budget_of(state, max_evaluations)
     pilot = min(PILOT, max(budget // 5, 50))
     limit = float(stress if stress is not None else (friction_coefficient or 0.0) * state.pressure)
-    request = Request(state, limit, float(target_cov), int(seed), budget, confidence, pilot)
+    request = Request(state, limit, float(target_cv), int(seed), budget, confidence, pilot)
     low, high = state.bounds
     if limit <= low:
         text = f"no interface slides at or below {low:g} Pa, where nothing slips"

@@ -71,9 +71,9 @@ def tally(values: Array, stress: float, first: int = 0) -> Count:
     return Count(failed.size, values.size, first + failed[:SHOWN])
 
 
-def failures_wanted(target_cov: float) -> int:
+def failures_wanted(target_cv: float) -> int:
     """How many failures make the standard error small enough: it falls like 1/sqrt(r - 1)."""
-    return 2 + math.ceil(1.0 / (target_cov * target_cov))
+    return 2 + math.ceil(1.0 / (target_cv * target_cv))
 
 
 def count_failures(
@@ -81,7 +81,7 @@ def count_failures(
     seed: int,
     stress: float,
     *,
-    target_cov: float,
+    target_cv: float,
     least: int,
     max_evaluations: int,
     start: int = 0,
@@ -98,7 +98,7 @@ def count_failures(
         If its time is over, what was counted until then is the answer.
     seed : int
         Sample i is that of `stiction.monte_carlo` with the same seed.
-    stress, target_cov : float
+    stress, target_cv : float
     least, max_evaluations : int
     start : int
         Number of the first sample.
@@ -114,7 +114,7 @@ def count_failures(
     TimeUp
         If its time is over before the first sample.
     """
-    wanted = failures_wanted(target_cov)
+    wanted = failures_wanted(target_cv)
     least = min(least, max_evaluations)
     parts: list[NDArray[np.bool_]] = []
     done = failures = 0

@@ -62,7 +62,7 @@ def run_until_precise(
     make: Callable[[int, int, int], AnyRun],
     judge: Callable[[Sequence[AnyRun]], float],
     *,
-    target_cov: float,
+    target_cv: float,
     first: int,
     largest: int,
     max_evaluations: int,
@@ -76,7 +76,7 @@ def run_until_precise(
         (samples, number of the run, evaluations left) to a run.
     judge : callable
         Coefficient of variation of what runs tell together.
-    target_cov : float
+    target_cv : float
     first, largest : int
         Size of the first run and of the largest; many runs of moderate size bound the memory.
     max_evaluations : int
@@ -106,12 +106,12 @@ def run_until_precise(
         if not run.complete:
             return runs or [run]
         runs = [*(earlier.light() for earlier in runs), run]
-        cov = judge(runs)
-        if cov <= target_cov:
+        cv = judge(runs)
+        if cv <= target_cv:
             return runs
         total = sum(r.samples for r in runs)
         price = sum(r.evaluations for r in runs) / total
-        wanted = MARGIN * total * (cov / target_cov) ** 2 - total if math.isfinite(cov) else total
+        wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
         if size < first or meter.over:

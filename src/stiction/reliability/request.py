@@ -15,7 +15,7 @@ class Request:
     Attributes
     ----------
     state : LimitState
-    stress, target_cov : float
+    stress, target_cv : float
     seed, budget : int
     confidence : float
     pilot : int
@@ -26,7 +26,7 @@ class Request:
 
     state: LimitState
     stress: float
-    target_cov: float
+    target_cv: float
     seed: int
     budget: int
     confidence: float
@@ -59,14 +59,14 @@ def advice(state: LimitState) -> str:
     return "raise time_limit" if state.meter.over else "raise max_evaluations"
 
 
-def missed(request: Request, cov: float, evaluations: int) -> list[str]:
+def missed(request: Request, cv: float, evaluations: int) -> list[str]:
     """That the estimate is less precise than asked for, if so, and what to do."""
-    if cov <= request.target_cov:
+    if cv <= request.target_cv:
         return []
     why = short_of(request.state, evaluations)
-    return [f"the coefficient of variation is {cov:.3g}, not {request.target_cov:g}: {why}"]
+    return [f"the coefficient of variation is {cv:.3g}, not {request.target_cv:g}: {why}"]
 
 
-def cut_short(request: Request, cov: float) -> bool:
+def cut_short(request: Request, cv: float) -> bool:
     """Whether it was the time that ended it."""
-    return request.state.meter.over and cov > request.target_cov
+    return request.state.meter.over and cv > request.target_cv

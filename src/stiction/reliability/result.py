@@ -56,7 +56,7 @@ class FailureProbability:
     diagnostics : dict
         Numbers that belong to the algorithm, by name.
     cut_short : bool
-        Whether `time_limit` ended it before `target_cov` was reached.
+        Whether `time_limit` ended it before `target_cv` was reached.
     warnings : tuple of str
         Why the estimate is not to be trusted; empty if it is.
     normal_pressure : float

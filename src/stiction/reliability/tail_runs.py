@@ -28,7 +28,7 @@ class TailRequest:
     Attributes
     ----------
     state : LimitState
-    probability, target_cov : float
+    probability, target_cv : float
     seed, budget : int
     spent : int
         Evaluations already made to choose the algorithm.
@@ -36,7 +36,7 @@ class TailRequest:
 
     state: LimitState
     probability: float
-    target_cov: float
+    target_cv: float
     seed: int
     budget: int
     spent: int = 0
@@ -54,7 +54,7 @@ class TailRequest:
             run_until_precise(
                 make,
                 judge,
-                target_cov=self.target_cov,
+                target_cv=self.target_cv,
                 first=first_size(first, self.budget),
                 largest=largest,
                 max_evaluations=self.budget,
@@ -102,12 +102,12 @@ def two_level_tail(request: TailRequest) -> Tail[Bridge]:
 
 
 def stress_interval(
-    tail: Tail[AnyTailRun], probability: float, cov: float, confidence: float, lowest: float
+    tail: Tail[AnyTailRun], probability: float, cv: float, confidence: float, lowest: float
 ) -> tuple[float, float]:
     """Stresses whose estimated probabilities bracket the one asked for."""
-    if not math.isfinite(cov):
+    if not math.isfinite(cv):
         return lowest, tail.runs[0].extent[1]
-    width = min(log_width(cov, confidence), 700.0)
+    width = min(log_width(cv, confidence), 700.0)
     below = probability * math.exp(-width)
     seen = tail.probability(np.nextafter(min(run.extent[0] for run in tail.runs), math.inf))
     low = tail.quantile(below) if below >= seen else lowest

@@ -128,7 +128,7 @@ def tail_study(
     *,
     method: Method,
     smallest: float = 1e-9,
-    target_cov: float = 0.3,
+    target_cv: float = 0.3,
     plain_samples: int = 10_000,
     seed: int = 0,
     event: Event = "critical_stress",
@@ -146,7 +146,7 @@ def tail_study(
         What is random; the spectrum of the strength must have a correlation length, and only the
         strength differs between the curves.
     method : LocalCriterion or Equilibrium
-    smallest, target_cov, plain_samples, seed, event, workers, progress
+    smallest, target_cv, plain_samples, seed, event, workers, progress
         As in `failure_curve`.
     time_limit : float, optional
         Seconds for each curve.
@@ -167,7 +167,7 @@ def tail_study(
     options: dict[str, Any] = {
         "method": method,
         "smallest": smallest,
-        "target_cov": target_cov,
+        "target_cv": target_cv,
         "plain_samples": plain_samples,
         "seed": seed,
         "event": event,

@@ -14,32 +14,32 @@ from stiction._typing import Array
 Integers = NDArray[np.int64]
 
 
-def log_width(cov: float, confidence: float) -> float:
+def log_width(cv: float, confidence: float) -> float:
     """Half the width of the interval of the logarithm of an estimate."""
-    if cov == 0.0:
+    if cv == 0.0:
         return 0.0
-    freedom = max(1.0, 1.0 / (cov * cov) - 1.0)
-    return float(stdtrit(freedom, 0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cov * cov))
+    freedom = max(1.0, 1.0 / (cv * cv) - 1.0)
+    return float(stdtrit(freedom, 0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cv * cv))
 
 
-def lognormal_interval(probability: float, cov: float, confidence: float) -> tuple[float, float]:
+def lognormal_interval(probability: float, cv: float, confidence: float) -> tuple[float, float]:
     """Interval of an estimate whose logarithm is about normal, within [0, 1].
 
-    The coefficient of variation is itself estimated, from about 1/cov^2 independent families or
+    The coefficient of variation is itself estimated, from about 1/cv^2 independent families or
     weights that matter, so Student's distribution takes the place of the normal one.
 
     Parameters
     ----------
     probability : float
         Estimate.
-    cov : float
+    cv : float
         Its coefficient of variation.
     confidence : float
         Such as 0.95.
     """
-    if not math.isfinite(cov):
+    if not math.isfinite(cv):
         return 0.0, 1.0
-    width = log_width(cov, confidence)
+    width = log_width(cv, confidence)
     high = probability * math.exp(min(width, 700.0))
     return probability * math.exp(-width), min(1.0, high)
 

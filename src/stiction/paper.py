@@ -1,0 +1,82 @@
+"""The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from stiction._checks import check_instance, is_finite
+from stiction._model import describe
+from stiction.errors import InputError
+from stiction.friction.linear import LinearWeakening
+from stiction.interface import Interface
+from stiction.problem import Problem
+from stiction.random.marginals import Beta
+from stiction.random.random_field import RandomField
+from stiction.random.spectra import PowerLawSpectrum
+from stiction.solid import Solid
+
+
+def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> Problem:
+    """The interface of Albertini, Karrer, Grigoriu and Kammer (2020).
+
+    G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m, W = 0.5 TPa/m, mode II. The strength above
+    the residual is all that matters to the onset, so the residual is zero.
+
+    Parameters
+    ----------
+    nodes : int
+        Number of nodes on the interface, even.
+    plane : {"stress", "strain"}
+        The paper says plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu), which
+        belongs to plane strain; ``plane="strain"`` gives the printed value.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    InputError
+        If the plane state is unknown or the nodes are too few.
+    """
+    return Problem(
+        solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
+        interface=Interface(length=0.1, nodes=nodes),
+        friction=LinearWeakening(weakening_rate=0.5e12, residual_strength=0.0),
+    )
+
+
+def strength(problem: Problem, correlation_ratio: float = 0.5) -> RandomField:
+    """The random strength of Albertini et al. (2020, Eqs. 2 to 7).
+
+    Beta(1.5, 3) on [0.66, 1.66] MPa; power-law spectrum (k^2 + lambda^2)^-4, truncated at
+    2.5 lambda, without the mean mode.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its nucleation length h_n sets the scale.
+    correlation_ratio : float
+        xi_0/h_n, positive; xi_0 = 2 pi/lambda.
+
+    Returns
+    -------
+    RandomField
+
+    Raises
+    ------
+    InputError
+        If the ratio is not positive, or h_n is not defined because W varies.
+    """
+    check_instance("problem", problem, Problem)
+    if not (is_finite(correlation_ratio) and correlation_ratio > 0.0):
+        given = describe(correlation_ratio)
+        raise InputError(f"correlation_ratio: must be a positive number, got {given}")
+    return RandomField(
+        marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        spectrum=PowerLawSpectrum(
+            correlation_length=correlation_ratio * problem.nucleation_length,
+            exponent=4.0,
+            truncation=2.5,
+        ),
+    )

@@ -1,1 +1,0 @@
-"""Published studies reproduced, one package each."""
