@@ -1,6 +1,7 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction import paper as paper
 from stiction import plot as plot
 from stiction.criterion.griffith import energy_release_rate as energy_release_rate
 from stiction.criterion.griffith import griffith_length as griffith_length
@@ -49,7 +50,6 @@ from stiction.load import Load as Load
 from stiction.merge import (
     merge_parts as merge_parts,
 )
-from stiction import paper as paper
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
 from stiction.random.custom_spectrum import CustomSpectrum as CustomSpectrum

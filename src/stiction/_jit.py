@@ -62,7 +62,9 @@ def _digest_of_sources() -> str:
     while waiting:
         for module, member in imported.findall(texts[waiting.pop()]):
             names = {module.decode(), f"{module.decode()}.{member.decode()}"}
-            new = {name for name in names & texts.keys() - reached if b"InputError" not in texts[name]}
+            new = {
+                name for name in names & texts.keys() - reached if b"InputError" not in texts[name]
+            }
             waiting += new
             reached |= new
     digest = hashlib.sha256()

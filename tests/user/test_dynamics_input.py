@@ -65,7 +65,10 @@ def test_unstable_time_step_is_refused_with_the_limit():
 def test_stability_limits(mode, ratio, plane, courant):
     solid = st.Solid(shear_modulus=1.0, poisson_ratio=ratio, density=1.0, plane=plane)
     problem = st.Problem(
-        solid, st.Interface(length=64.0, nodes=64), st.LinearWeakening(weakening_rate=0.05), mode=mode
+        solid,
+        st.Interface(length=64.0, nodes=64),
+        st.LinearWeakening(weakening_rate=0.05),
+        mode=mode,
     )
     # The figures are known to two digits.
     assert Rupture(loading_rate=1.0).medium(problem).largest_step == pytest.approx(

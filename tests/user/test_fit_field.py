@@ -15,9 +15,7 @@ from stiction.cli.app import app
 from stiction.inference import bootstrap
 
 ROOT = Path(__file__).parents[2]
-FIELD = st.RandomField(
-    st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
-)
+FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True)
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(length=COUNT * SPACING, nodes=COUNT)
 VALUES = FIELD.sample(st.Interface(length=3 * PIECE.length, nodes=3 * COUNT), seed=5)[0, :COUNT]

@@ -325,9 +325,7 @@ def by_importance(request: Request, reason: str) -> FailureProbability:
         count += size
         sample = np.concatenate(found)
         probability = min(float(sample.mean()), 1.0)
-        cv = (
-            float(sample.std()) / probability / math.sqrt(count) if probability > 0.0 else math.inf
-        )
+        cv = float(sample.std()) / probability / math.sqrt(count) if probability > 0.0 else math.inf
         if cv <= request.target_cv or count >= request.budget or state.meter.over:
             break
         factor = min((cv / request.target_cv) ** 2, 4.0)

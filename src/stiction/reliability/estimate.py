@@ -54,9 +54,7 @@ def check_target(target_cv: Any, confidence: Any, max_evaluations: Any) -> list[
     """What is wrong with the options that all functions of this package share."""
     problems = []
     if not (is_finite(target_cv) and target_cv >= LEAST_COV):
-        problems.append(
-            f"target_cv: must be a number >= {LEAST_COV:g}, got {describe(target_cv)}"
-        )
+        problems.append(f"target_cv: must be a number >= {LEAST_COV:g}, got {describe(target_cv)}")
     if not (is_real(confidence) and 0.0 < confidence < 1.0):
         problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
     if max_evaluations is not None and not is_whole(max_evaluations, 100):
