@@ -1,0 +1,284 @@
+"""An experiment: a problem, what is random in it, and the method that finds its onset."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction._checks import refusals
+from stiction._model import describe
+from stiction._typing import Array
+from stiction.errors import InputError, unknown_name
+from stiction.evaluation import Values, accepted, check_method, solve, variables_of
+from stiction.plausible import warn_of_units
+from stiction.problem import Problem
+from stiction.random.coefficients import (
+    in_stress,
+    mean_in_stress,
+    profiles_in_stress,
+    support_in_stress,
+)
+from stiction.random.draws import block_of
+from stiction.random.overlap import check_residual
+from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.results import Variable, along
+from stiction.sample import PROFILES, Sample
+
+SLOW = 32
+"""Methods that solve fewer samples at once take so long that drawing does not matter."""
+MOST_NODES = 1 << 20
+"""Nodes of all samples of planes that are solved at once: 8 MiB for each profile."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A problem, what is random in it, and a method, checked together once.
+
+    The numbers of sample i follow from the experiment, a seed and i alone, whoever computes them
+    and in whatever batches.
+
+    Parameters
+    ----------
+    problem : Problem
+    random : RandomInterface or RandomField
+        What is random; a field alone is the peak strength, Pa. Friction coefficients are turned
+        into stresses here if one pressure does that; otherwise `profiles` multiplies each node.
+    method : LocalCriterion, Equilibrium, Rupture or any other `Method`
+    keep : tuple of str
+        What is kept along the interface: random properties by name, and what the method adds. An
+        option of the method that is needed for it is switched on.
+    keep_samples : tuple of int, optional
+        Samples of which it is kept; all if None.
+
+    Raises
+    ------
+    InputError
+        Naming everything that does not fit.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> from stiction.ensemble.experiment import Experiment
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> experiment = Experiment(problem, strength, st.LocalCriterion())
+    >>> draws = experiment.draws(seed=0, first=0, count=3)
+    >>> experiment.onset(experiment.profiles(draws))["critical_stress"].shape
+    (3,)
+    """
+
+    problem: Problem
+    random: RandomInterface
+    method: Any
+    keep: tuple[str, ...] = ()
+    keep_samples: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        check_method(self.method)
+        if not isinstance(self.problem, Problem):
+            problems = [f"problem: must be a Problem, got {describe(self.problem)}"]
+            try:
+                as_random_interface(self.random)
+            except InputError as error:
+                problems += error.problems
+            raise InputError(problems)
+        problems = []
+        names: set[str] = set()
+        try:
+            random = in_stress(self.problem, as_random_interface(self.random))
+        except InputError as error:
+            problems += error.problems
+        else:
+            names = set(random.names)
+            object.__setattr__(self, "random", random)
+            for name, field in random.properties.items():
+                try:
+                    field.modes(self.problem.interface)
+                except InputError as error:
+                    problems += [f"{name}: {text}" for text in error.problems]
+        problems += refusals(self.problem, self.method)
+        if names and self.keep:
+            method, mistakes = _keeping(self.problem, self.method, self.keep, names)
+            object.__setattr__(self, "method", method)
+            problems += mistakes
+        if problems:
+            raise InputError(problems)
+
+    def by(self, method: Any) -> Experiment:
+        """Return the same experiment by another method."""
+        return dataclasses.replace(self, method=method)
+
+    @property
+    def dimension(self) -> int:
+        """Number of standard normal draws of a sample."""
+        return self.random.dimension(self.problem.interface)
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """What `results` returns, by name."""
+        interface, names = self.problem.interface, self.random.names
+        kept = {name: along(interface, PROFILES[name]) for name in self.keep if name in names}
+        return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
+
+    @property
+    def wide(self) -> tuple[str, ...]:
+        """Names of the variables that have a number at each node."""
+        return tuple(name for name, variable in self.variables.items() if variable.wide)
+
+    @property
+    def pressure(self) -> float:
+        """Mean normal pressure, Pa; NaN if there is none."""
+        if "normal_pressure" in self.random.names:
+            return float(self.random.properties["normal_pressure"].mean)
+        given = self.problem.load.normal_pressure
+        return float("nan") if given is None else float(np.mean(given))
+
+    def mean(self, name: str) -> float:
+        """Return the mean of a random property, in its unit (of a coefficient as a stress, Pa)."""
+        return mean_in_stress(self.problem, self.random.properties, name)
+
+    def support(self, name: str) -> tuple[float, float]:
+        """Return the bounds of a random property, in its unit (of a coefficient as a stress, Pa)."""
+        return support_in_stress(self.problem, self.random.properties, name)
+
+    def check_fields(self) -> None:
+        """Warn of fields that do not suit the grid, the interface, or their units.
+
+        Raises
+        ------
+        InputError
+            If most of the strength lies below the residual strength.
+        """
+        self.random.warn_if_inaccurate(self.problem.interface)
+        warn_of_units(self.problem, self.mean("strength"))
+        check_residual(self.problem, self.random.properties)
+
+    def draws(self, seed: int, first: int, count: int) -> Array:
+        """Return standard normal draws of samples first .. first + count - 1.
+
+        Parameters
+        ----------
+        seed, first, count : int
+
+        Returns
+        -------
+        (count, dimension) array
+            Row i depends on (seed, first + i) only.
+        """
+        return self.random.draws(self.problem.interface, count, seed, first)
+
+    def profiles(self, draws: Array) -> dict[str, Array]:
+        """Return the profiles of draws (samples, dimension) by name, (samples, *shape) each.
+
+        Coefficients are turned into stresses, Pa.
+        """
+        found = self.random.from_draws(self.problem.interface, draws)
+        return profiles_in_stress(self.problem, self.random, found)
+
+    def sample(self, profiles: Mapping[str, Array]) -> Sample:
+        """Return profiles as the method takes them, validated.
+
+        Raises
+        ------
+        InputError
+            Naming what is wrong with a sample.
+        """
+        # `check_fields` has warned of nodes of constant strength.
+        return self.problem.sample(profiles, accept=(*accepted(self.method), "constant"))
+
+    def onset(self, profiles: Mapping[str, Array]) -> Values:
+        """Solve profiles by name, (samples, *shape) each.
+
+        Returns
+        -------
+        dict of arrays
+            What the method returns, one row a sample, and with a normal pressure the
+            `friction_coefficient`. A row does not depend on the other samples.
+
+        Raises
+        ------
+        InputError
+            If a sample does not fit the method.
+        """
+        return solve(_solver(self.problem, self.method), self.sample(profiles))
+
+    def results(self, seed: int, first: int, count: int) -> Values:
+        """Return all `variables` of samples first .. first + count - 1, solved at once.
+
+        A plain computation without threads, for any executor.
+        """
+        profiles = self.profiles(self.draws(seed, first, count))
+        kept = {name: profiles[name] for name in self.keep if name in profiles}
+        return self.onset(profiles) | kept
+
+    @property
+    def batch(self) -> int:
+        """Samples to solve at once: as many as suit the method, and of planes the memory."""
+        interface, size = self.problem.interface, int(self.method.chunk_size)
+        block = block_of(len(interface.shape))
+        if block == 1:
+            return max(1, min(size, MOST_NODES // interface.size))
+        # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
+        return size if size < SLOW else max(size, block)
+
+    def batches(self, first: int, count: int, size: int | None = None) -> Iterator[tuple[int, int]]:
+        """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
+
+        Parameters
+        ----------
+        first, count : int
+        size : int, optional
+            Samples of a batch; `batch` if left out.
+        """
+        size = self.batch if size is None else size
+        start, end = first, first + count
+        while start < end:
+            stop = min(end, (start // size + 1) * size)
+            yield start, stop - start
+            start = stop
+
+    def keeps(self, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of these samples keep their wide variables."""
+        if self.keep_samples is None:
+            return np.ones(samples.size, dtype=np.bool_)
+        return np.isin(samples, self.keep_samples)
+
+
+@lru_cache(maxsize=8)
+def _solver(problem: Problem, method: Any) -> Any:
+    return method.prepare(problem)
+
+
+def _keeping(
+    problem: Problem, method: Any, keep: tuple[str, ...], random: set[str]
+) -> tuple[Any, list[str]]:
+    """The method with the options switched on that `keep` names, and what cannot be kept."""
+    switches = {
+        field.name
+        for field in dataclasses.fields(method)
+        if isinstance(getattr(method, field.name), bool)
+    }
+
+    def wide(name: str) -> bool:
+        wider = dataclasses.replace(method, **{name: True}) if name in switches else method
+        found = wider.variables(problem)
+        return name in found and found[name].wide
+
+    problems = []
+    for name in keep:
+        known = name in random or name in method.variables(problem)
+        if not known and name in switches and wide(name):
+            method = dataclasses.replace(method, **{name: True})
+        elif not known and name in PROFILES:
+            valid = ", ".join(sorted(random))
+            problems.append(f"keep: {name!r} is not random here (valid: {valid})")
+        elif not known:
+            names = {n for n in switches | set(method.variables(problem)) if wide(n)}
+            problems.append(unknown_name("keep", name, sorted(random | names)))
+    return method, problems
