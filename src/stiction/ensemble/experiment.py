@@ -140,11 +140,11 @@ class Experiment:
         return float("nan") if given is None else float(np.mean(given))
 
     def mean(self, name: str) -> float:
-        """Return the mean of a random property, in its unit (of a coefficient as a stress, Pa)."""
+        """Return the mean of a random property, in its unit; of a coefficient as a stress, Pa."""
         return mean_in_stress(self.problem, self.random.properties, name)
 
     def support(self, name: str) -> tuple[float, float]:
-        """Return the bounds of a random property, in its unit (of a coefficient as a stress, Pa)."""
+        """Return the bounds of a random property; those of a coefficient as a stress, Pa."""
         return support_in_stress(self.problem, self.random.properties, name)
 
     def check_fields(self) -> None:
