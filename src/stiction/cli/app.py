@@ -14,7 +14,6 @@ import typer
 
 from stiction import __version__
 from stiction.cli.common import echo
-from stiction.cli.explore import explore
 from stiction.cli.fit import fit
 from stiction.cli.infer import infer
 from stiction.cli.onset import onset
@@ -77,7 +76,6 @@ for command in (
     export,
     plot,
     report,
-    explore,
 ):
     app.command()(_interruptible(command))
 
