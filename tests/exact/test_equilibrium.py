@@ -236,3 +236,43 @@ def test_sensitivity_where_nodes_are_at_the_residual(wide):
             assert slope == pytest.approx(gradient[node], abs=1e-5)
             checked += 1
     assert checked >= 4
+
+
+@pytest.fixture
+def humped(solid):
+    """A line whose law falls more steeply beyond half of its slip, and smooth strengths."""
+    friction = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=8.6e10)
+    problem = st.Problem(solid, st.Interface(0.1, 96), friction)
+    field = st.RandomField(
+        marginal=st.Lognormal(mean=1e6, cv=0.25),
+        spectrum=st.PowerLawSpectrum(correlation_length=0.015),
+    )
+    return problem, field.sample(problem.interface, samples=8, seed=0)
+
+
+def test_sensitivity_where_a_node_that_weakens_more_steeply_is_the_instability(humped):
+    """Against finite differences, at the most sensitive node and along a random direction."""
+    problem, tau_p = humped
+    rng = np.random.default_rng(1)
+    found = st.onset(problem, tau_p, method=st.Equilibrium(sensitivity=True))
+    assert np.isnan(found.certificate_gap).sum() >= 3
+    for strength, gradient in zip(tau_p, found.sensitivity.values, strict=True):
+        unit = np.zeros(96)
+        unit[np.argmax(gradient)] = 1.0
+        for change in (unit, rng.standard_normal(96)):
+            both = {
+                "strength": np.array([strength + change, strength - change]),
+                "weakening_rate": problem.friction.weakening_rate,
+            }
+            above, below = st.onset(problem, both, method=st.Equilibrium()).first_instability
+            assert float(above - below) / 2.0 == pytest.approx(gradient @ change, rel=1e-5)
+
+
+def test_no_sensitivity_where_nodes_weaken_more_steeply_at_once(humped):
+    """Two dips alike: raising one of them leaves the other, lowering it does not."""
+    problem, tau_p = humped
+    half = tau_p[0][::2]
+    alike = np.concatenate((half, half))
+    with pytest.warns(st.AccuracyWarning, match="1 of 1 samples.*sensitivity is NaN"):
+        found = st.onset(problem, alike, method=st.Equilibrium(sensitivity=True))
+    assert np.isnan(found.sensitivity).all()

@@ -29,6 +29,8 @@ MARGIN = 1.5
 MOVED = 1e-3
 """Share of the largest added slip from which a node belongs to the patch of an event."""
 OVERSHOOT = 2.0 - AT_CORNER
+TOGETHER = 1e-9
+"""Share of the slip at a corner within which nodes reach their corners at once."""
 
 
 @dataclass
@@ -81,6 +83,18 @@ def present_pieces(sample: Sample, slip: Array) -> tuple[NDArray[np.int64], Arra
         share * sample.excess + (1.0 - share) * sample.residual,
         pieces.slopes[piece] * sample.rate,
     )
+
+
+def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
+    """Nodes that are at a corner beyond which they weaken more steeply."""
+    pieces = sample.pieces
+    corners = pieces.ends * sample.critical[:, None]
+    near = np.abs(slip[:, None] - corners) <= TOGETHER * corners
+    steeper = np.diff(pieces.slopes) > 0.0
+    found: NDArray[np.int64] = np.flatnonzero(
+        (near & steeper).any(axis=1) & (sample.critical > 0.0)
+    )
+    return found
 
 
 def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:

@@ -70,7 +70,8 @@ class Equilibrium:
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at fixed weakening rates.
+        Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
+        where several nodes begin to weaken more steeply at once: there is no derivative.
     slip : bool
         Also return the slip at the first instability.
     discretization_error : bool

@@ -20,6 +20,7 @@ from stiction.equilibrium.continuation import (
     follow,
     present_pieces,
     residual_nodes,
+    steep_corners,
 )
 from stiction.equilibrium.instability_jump import SLIDING, UNDECIDED
 from stiction.equilibrium.linear_program_cg import Solution
@@ -169,6 +170,12 @@ class Solver:
             values["slip"] = slips
         if self.sensitivity:
             values["sensitivity"] = multipliers * mean_profile
+            lost = int(np.isnan(multipliers).any(axis=1).sum())
+            if lost:
+                warn_accuracy(
+                    f"several nodes begin to weaken more steeply at once in {lost} of {count}"
+                    " samples: their first instability has no derivative, sensitivity is NaN"
+                )
         return values, events
 
     def _batch(
@@ -252,9 +259,38 @@ class Solver:
         _, length, centre = main_patch(multiplier)
         line[batch.POSITION] = centre * self.setting.spacing
         line[batch.LENGTH] = length * self.setting.spacing
+        corners = steep_corners(sample, state.slip)
+        if corners.size:
+            multiplier[:] = self._corner_sensitivity(sample, state.slip, piece, corners)
+            return
         # Of a piece that starts from share tau_p + (1 - share) tau_r; the share of the last is 0.
         moving = sample.critical > 0.0
         multiplier[moving] *= sample.pieces.starts[piece[moving]]
+
+    def _corner_sensitivity(
+        self, sample: Sample, slip: Array, piece: NDArray[np.int64], corners: NDArray[np.int64]
+    ) -> Array:
+        """Derivative by the peak strengths of the load at which a node reaches its corner.
+
+        Up to there A d = tau_0 p - q on the slipping nodes, with q the start of their pieces, and
+        the slip of node j is u_j (tau_p - tau_r)/W; with z = A^-1 e_j that is z (tau_0 p - q).
+        NaN where several nodes reach a corner at once: the derivatives of either side differ.
+        """
+        derivative = np.zeros(slip.size)
+        if corners.size > 1:
+            derivative[:] = np.nan
+            return derivative
+        pieces, node = sample.pieces, int(corners[0])
+        before = piece.copy()
+        before[node] -= 1
+        inside = np.flatnonzero(slip > 0.0)
+        matrix = self.setting.grid.column[np.abs(inside[:, None] - inside)]
+        matrix[np.diag_indices(inside.size)] -= (pieces.slopes[before] * sample.rate)[inside]
+        z = np.linalg.solve(matrix, (inside == node).astype(np.float64))
+        share = np.where(sample.critical > 0.0, pieces.starts[before], 1.0)
+        derivative[inside] = z * share[inside]
+        derivative[node] += pieces.ends[before[node]] * pieces.first / sample.rate[node]
+        return derivative / dot(z, sample.profile[inside], inside.size)
 
     def _sequences(
         self, rows: Samples, events: dict[int, list[Event]]
