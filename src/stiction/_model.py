@@ -75,22 +75,27 @@ def real_array(value: Any) -> Array:
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
 
 
+def is_unplaced(value: Any) -> bool:
+    """Whether a profile has coordinates or units of its own, which its problem resolves."""
+    own = ("dims", "to_xarray", "magnitude", "to_value")
+    return isinstance(value, dict) or any(hasattr(value, name) for name in own)
+
+
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
-    """A number, a read-only float64 array of shape (nodes,), or points that a problem will place.
+    """A number, a read-only float64 array of shape (*shape), or what a problem will place.
 
-    In TOML also a path to a profile, or a table {file, ...} with the options of `read_profile`.
+    In a study file also what its reader takes: a path, or a table {file, ...} with options.
     """
-    from stiction.labelled_arrays import simplified
-    from stiction.placed import Placed, placed_profile, quantity_of
-
-    if isinstance(value, Placed):
+    read = (info.context or {}).get("read")
+    if isinstance(value, str | Path | dict) and read is not None:
+        value = read(value, str(info.field_name))
+    if isinstance(value, str | Path):
+        raise ValueError(
+            "file names belong in a study file; in Python give a number, an array or"
+            " st.read_profile(path)"
+        )
+    if is_unplaced(value):
         return value
-    value = simplified(value, quantity_of(str(info.field_name)))
-    if isinstance(value, str | Path | dict) or hasattr(value, "dims"):
-        folder = (info.context or {}).get("folder")
-        value = placed_profile(value, str(info.field_name), folder)
-        if isinstance(value, Placed):
-            return value
     if isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
         number = _number(value)
         if not np.isfinite(number):
@@ -238,6 +243,8 @@ def explain(
 def _same(left: Any, right: Any) -> bool:
     if isinstance(left, np.ndarray) or isinstance(right, np.ndarray):
         return np.array_equal(left, right)
+    if hasattr(left, "identical"):
+        return type(left) is type(right) and bool(left.identical(right))
     return bool(left == right)
 
 
@@ -251,8 +258,12 @@ def _equal(self: Any, other: Any) -> bool:
 def _hashable(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return (value + 0.0).tobytes()  # zeros of both signs are equal, so they must hash alike
+    if hasattr(value, "identical"):  # labelled arrays cannot be hashed
+        return np.asarray(value).tobytes()
     if isinstance(value, dict):
         return tuple((key, _hashable(inner)) for key, inner in value.items())
+    if isinstance(value, list):
+        return tuple(map(_hashable, value))
     return value
 
 

@@ -18,7 +18,6 @@ from stiction._model import describe, to_plain
 from stiction._progress import Meter, Portions, Show
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profile_nodes import Gaps, check_gaps
 from stiction.results import (
@@ -258,7 +257,7 @@ def onset(
         profiles, numbers = without_gaps(profiles, measured)
         measured = None
     sample = problem.sample(profiles, accept=accepted(method))
-    warn_of_units(problem, sample.mean_strength, float(sample.residual_strength.mean()))
+    problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
     numbers = np.arange(sample.samples) if numbers is None else numbers
     result = label(problem, method, values, numbers, attributes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,9 +14,6 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.profile_nodes import Gaps, gaps_of
 from stiction.profiles import at_nodes
 
-if TYPE_CHECKING:
-    from stiction.problem import Problem
-
 Mask = NDArray[np.bool_]
 
 IN_GAP = "in_gap"
@@ -24,7 +21,7 @@ GAPS = "gaps"
 
 
 def gather(
-    problem: Problem, given: Mapping[str, Any], gaps: Gaps
+    problem: Any, given: Mapping[str, Any], gaps: Gaps
 ) -> tuple[dict[str, Any], Mask | None]:
     """What a caller gave, at the nodes, and where all of it was measured.
 
@@ -83,7 +80,7 @@ def without_gaps(
     return {name: kept(value) for name, value in values.items()}, np.flatnonzero(whole)
 
 
-def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Dataset:
+def with_gaps(problem: Any, result: xr.Dataset, measured: Mask) -> xr.Dataset:
     """A result that says where its profiles have gaps, and which onsets lie in one."""
     position = result["critical_position"]
     inside = (_inside_plane if problem.interface.is_plane else _inside)(
@@ -97,7 +94,7 @@ def with_gaps(problem: Problem, result: xr.Dataset, measured: Mask) -> xr.Datase
     return result
 
 
-def _inside_plane(problem: Problem, position: NDArray[np.float64], measured: Mask) -> Mask:
+def _inside_plane(problem: Any, position: NDArray[np.float64], measured: Mask) -> Mask:
     """Which onsets (samples, 2) lie at a node that was not measured."""
     interface = problem.interface
     position = position.reshape(-1, 2)
@@ -120,7 +117,7 @@ def _inside_plane(problem: Problem, position: NDArray[np.float64], measured: Mas
     return inside
 
 
-def _inside(problem: Problem, position: NDArray[np.float64], measured: Mask) -> Mask:
+def _inside(problem: Any, position: NDArray[np.float64], measured: Mask) -> Mask:
     """Which onsets lie in a gap; warns of them, and of critical patches that reach into one."""
     nodes, spacing = problem.interface.size, problem.interface.spacing
     measured = np.broadcast_to(measured, (position.size, nodes))

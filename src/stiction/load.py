@@ -17,6 +17,7 @@ from stiction._model import (
     Real,
     _plain,
     _profile,
+    is_unplaced,
     model,
 )
 from stiction._typing import Array
@@ -187,11 +188,14 @@ class Load:
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         problems = []
-        if not isinstance(self.profile, LoadShape) and not np.all(np.asarray(self.profile) > 0.0):
+        if isinstance(self.profile, LoadShape) or is_unplaced(self.profile):
+            pass
+        elif not np.all(np.asarray(self.profile) > 0.0):
             worst = np.asarray(self.profile).min()
             problems.append(f"profile must be positive everywhere, smallest given is {worst:g}")
-        if self.normal_pressure is not None and not np.mean(self.normal_pressure) > 0.0:
-            mean = np.mean(self.normal_pressure)
+        pressure = self.normal_pressure
+        if pressure is not None and not is_unplaced(pressure) and not np.mean(pressure) > 0.0:
+            mean = np.mean(pressure)
             problems.append(f"normal_pressure must be positive on average, its mean is {mean:g}")
         if problems:
             raise InputError(problems)

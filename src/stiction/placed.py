@@ -14,7 +14,7 @@ from stiction.interface import FEWEST, Interface
 from stiction.labelled_arrays import labelled
 from stiction.profile_files import read_npy
 from stiction.profile_nodes import Points, check_gaps
-from stiction.profiles import points_of
+from stiction.profiles import at_nodes, points_of
 from stiction.quantities import UNITS
 
 _READ = ("x", "value", "unit", "x_unit")
@@ -35,15 +35,12 @@ class Placed:
     points: Points
     interpolate: bool = False
     gaps: Any = "refuse"
+    dims = ("x",)
 
     def on(self, interface: Interface) -> Array:
         """Values at the nodes."""
         found = self.points.on(interface, interpolate=self.interpolate, gaps=self.gaps)
         return found.values
-
-    def __array__(self, dtype: Any = None, copy: Any = None) -> Array:
-        # For checks of range, which a gap does not fail; no order is promised.
-        return np.array(self.points.values[~np.isnan(self.points.values)], dtype=dtype)
 
     def plain(self) -> dict[str, Any]:
         """What TOML and JSON hold."""
@@ -60,6 +57,25 @@ class Placed:
 
     def __repr__(self) -> str:
         return f"<{self.points.values.size} points of a profile>"
+
+
+def on_nodes(name: str, given: Any, interface: Interface) -> Any:
+    """A profile with coordinates or units of its own as a number or an array at the nodes.
+
+    Raises
+    ------
+    InputError
+        Naming `name`.
+    """
+    quantity = quantity_of(name.rpartition(".")[2])
+    try:
+        if isinstance(given, dict):
+            given = placed_profile(given, quantity, None)
+        if isinstance(given, Placed):
+            return given.on(interface)
+    except InputError as error:
+        raise InputError([f"{name}: {text}" for text in error.problems]) from None
+    return np.asarray(at_nodes(name, given, quantity, interface).values)
 
 
 def placed_profile(given: Any, field: str, folder: Any) -> Any:

@@ -11,8 +11,10 @@ from pydantic_core import ArgsKwargs
 
 from stiction._checks import check_choice, is_finite
 from stiction._model import Mode, Positive, _number, describe, model
-from stiction.errors import InputError
-from stiction.plausible import warn_of_waves
+from stiction.errors import InputError, UnitWarning, warn_user
+
+SLOWEST, FASTEST = 0.3, 2e4
+"""m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
 
 
 @model
@@ -100,7 +102,14 @@ class Solid:
 
     @model_validator(mode="after")
     def _plausible(self) -> Solid:
-        warn_of_waves(self)
+        speed = self.shear_wave_speed
+        if not SLOWEST <= speed <= FASTEST:
+            warn_user(
+                f"solid: shear waves run at {speed:.4g} m/s, as in no solid; check the units of"
+                f" shear_modulus = {self.shear_modulus:g} Pa and density ="
+                f" {self.density:g} kg/m3",
+                UnitWarning,
+            )
         return self
 
     @property

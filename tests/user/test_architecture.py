@@ -17,8 +17,6 @@ SOURCES = ROOT / "src"
 PAGE = ROOT / "docs" / "architecture.md"
 
 DEFERRED = {
-    ("stiction._model", "stiction.placed"),
-    ("stiction._model", "stiction.labelled_arrays"),
     ("stiction.study.study", "stiction.study_run"),
     ("stiction.ensemble.distributed", "stiction.ensemble.slurm"),
     ("stiction.papers.albertini2020.studies.study_cache", "stiction.papers.albertini2020.studies"),

@@ -1,4 +1,4 @@
-"""Numbers in another unit than they are taken to be: a warning that names the likely one."""
+"""Numbers in another unit than they are taken to be: a warning."""
 
 import warnings
 
@@ -33,35 +33,29 @@ def ask(strength, **changes):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: problem(rho=1.17), "density = 1.17 in g/cm3"),
-        (lambda: st.Solid(1.0, 0.33, 1170.0), "shear_modulus = 1 in GPa"),
-        (lambda: problem(G=1e3, rho=1.17e-9, W=5e5), "density = 1.17e-09 in t/mm3"),
-        (lambda: problem(W=0.5e6), r"fills the interface.*weakening_rate = 500000 Pa/m in MPa/m"),
-        (lambda: ask(1.0), "strength is in MPa"),
-        (lambda: ask(0.3, p=5e6), "coefficient of 6e-08 at 5e.06 Pa.*strength is a friction coeff"),
-        (lambda: ask(1.2, d_c=2e-6), "strength: its mean, 1.2 Pa, .*strength is in MPa"),
-        (lambda: ask(1e6, d_c=2.0), "fills the interface.*critical_slip = 2 m in um"),
-        (lambda: ask(1e12, d_c=2.0), "1e.03 times the shear modulus"),
+        (lambda: problem(rho=1.17), "units of shear_modulus = 1e.09 Pa and density = 1.17 kg/m3"),
+        (lambda: st.Solid(1.0, 0.33, 1170.0), "shear waves run at 0.02924 m/s, as in no solid"),
+        (lambda: problem(W=0.5e6), "nucleation length 3.46e.03 m. fills the interface"),
+        (lambda: ask(1.0), "its mean, 1 Pa, is 1e-09 of the shear modulus"),
+        (lambda: ask(1e6, d_c=2.0), "fills the interface"),
+        (lambda: ask(1e12, d_c=2.0), "is 1e.03 of the shear modulus"),
     ],
 )
-def test_the_likely_unit_is_named(call, words):
+def test_a_wrong_unit_is_doubted(call, words):
     with pytest.warns(st.UnitWarning, match=words):
         call()
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [({"G": 1e3}, "shear_modulus = 1000 Pa in MPa"), ({"L": 100.0}, "length = 100 m in mm")],
-)
-def test_more_nodes_than_anybody_has_suggest_a_unit(changes, words):
-    with pytest.raises(st.InputError, match=f"so many suggest a wrong unit, perhaps .*{words}"):
+@pytest.mark.parametrize("changes", [{"G": 1e3}, {"L": 100.0}])
+def test_more_nodes_than_anybody_has_suggest_a_unit(changes):
+    with pytest.raises(st.InputError, match="so many suggest that a length, a modulus"):
         problem(**changes)
 
 
 def test_ensembles_warn_too_and_point_at_the_caller():
     spectrum = st.PowerLawSpectrum(correlation_length=4e-3)
     field = st.RandomField(scipy.stats.uniform(0.3, 0.2), spectrum)
-    with pytest.warns(st.UnitWarning, match="perhaps strength is") as caught:
+    with pytest.warns(st.UnitWarning, match="of the shear modulus") as caught:
         st.monte_carlo(problem(), field, method=st.LocalCriterion(), samples=2)
     assert {one.filename for one in caught if one.category is st.UnitWarning} == {__file__}
     with pytest.warns(st.UnitWarning):

@@ -1,5 +1,6 @@
 """Profiles of one's own: units, coordinates and gaps decide, wherever one enters."""
 
+import dataclasses
 import os
 import struct
 import warnings
@@ -456,7 +457,8 @@ class Quantity:
 
 def test_quantities_are_converted(system, strength):
     assert found(system, Quantity(strength * 1e-6, 1e6)) == pytest.approx(found(system, strength))
-    assert st.Load(initial_stress=Quantity(0.1, 1e6)).initial_stress == pytest.approx(1e5)
+    loaded = dataclasses.replace(system, load=st.Load(initial_stress=Quantity(0.1, 1e6)))
+    assert loaded.load.initial_stress == pytest.approx(1e5)
     number = xr.DataArray(0.1, attrs={"units": "MPa"})
     rows = system.sample({"strength": strength, "initial_stress": number})
     np.testing.assert_allclose(rows.initial_stress, 1e5)

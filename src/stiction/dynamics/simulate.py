@@ -40,7 +40,6 @@ from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.profiles import at_nodes
 from stiction.results import DIRECTION, Variable, along, coordinate
@@ -223,7 +222,7 @@ def simulate_rupture(
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
-    warn_of_units(problem, rows.mean_strength, float(rows.residual_strength.mean()))
+    problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
     history = uniform_rate(method.loading_rate) if load is None else load_history(load, end_time)
     warn_if_coarse(problem, rows)
     run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)

@@ -35,7 +35,6 @@ from stiction.errors import (
     warn_user,
 )
 from stiction.evaluation import Method, check_method
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.random.coefficients import in_stress, mean_in_stress
 from stiction.random.overlap import check_residual
@@ -194,7 +193,7 @@ def warn_of_fields(plans: Sequence[Plan]) -> None:
             meter.advance()
         for plan in plans:
             problem, fields = plan.problem, plan.random.properties
-            warn_of_units(problem, mean_in_stress(problem, fields, "strength"))
+            problem.warn_of_units(mean_in_stress(problem, fields, "strength"))
             check_residual(problem, fields)
             meter.advance()
     found_warnings = list(dict.fromkeys(caught))

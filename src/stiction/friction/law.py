@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from stiction._model import OptionalProfile, Profile, model
+from stiction._model import OptionalProfile, Profile, is_unplaced, model
 from stiction._typing import Array
 from stiction.errors import InputError
 
@@ -17,6 +17,11 @@ SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 
 NEARLY_RESIDUAL = 0.01
 """Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
+
+
+def _known(value: Any) -> Array:
+    """The numbers to check now; a profile that is not placed yet is checked once it is."""
+    return np.empty(0) if is_unplaced(value) else np.asarray(value)
 
 
 @model
@@ -47,24 +52,24 @@ class FrictionLaw:
                 f"give one of weakening_rate, critical_slip and fracture_energy, got {found}"
             )
         for name in given:
-            value = np.asarray(getattr(self, name))
+            value = _known(getattr(self, name))
             if not np.all(value > 0.0):
                 problems.append(
                     f"{name} must be positive everywhere, smallest given is {value.min():g}"
                 )
-        residual = np.asarray(self.residual_strength)
+        residual = _known(self.residual_strength)
         if not np.all(residual >= 0.0):
             problems.append(
                 f"residual_strength must not be negative, smallest given is {residual.min():g}"
             )
         if self.residual_ratio is not None:
-            ratio = np.asarray(self.residual_ratio)
+            ratio = _known(self.residual_ratio)
             if not np.all((ratio >= 0.0) & (ratio < 1.0)):
                 problems.append(
                     "residual_ratio must lie in [0, 1), given are values from"
                     f" {ratio.min():g} to {ratio.max():g}"
                 )
-            if np.any(residual != 0.0):
+            if is_unplaced(self.residual_strength) or np.any(residual != 0.0):
                 problems.append("give either residual_strength or residual_ratio, got both")
         if problems:
             raise InputError(problems)

@@ -9,13 +9,12 @@ from pydantic import BeforeValidator, model_validator
 
 from stiction._checks import check_count, check_instance
 from stiction._jit import jit
-from stiction._model import _number, model
+from stiction._model import _number, is_unplaced, model
 from stiction._typing import Array
 from stiction.errors import InputError
 from stiction.friction.kernels import register
 from stiction.friction.law import FrictionLaw
 from stiction.friction.linear import Linear, dissipated
-from stiction.placed import Placed
 
 
 class Polygon(NamedTuple):
@@ -251,7 +250,7 @@ class PiecewiseWeakening(FrictionLaw):
             "fracture_energy": area / law.integral,
         }
         scale, value = law.scale
-        if isinstance(value, Placed):
+        if is_unplaced(value):
             raise InputError(
                 f"law.{scale}: has points of its own; take the friction of a problem, which puts"
                 " them on its nodes"

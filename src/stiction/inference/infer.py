@@ -28,7 +28,6 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.posterior import BINS, Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
@@ -156,7 +155,7 @@ def infer(
     }
     with Meter("infer", show=progress) as meter:
         _, middle = parameters.at(parameters.theta(np.full((1, parameters.dimension), 0.5))[0])
-        warn_of_units(problem, middle.strength.mean)
+        problem.warn_of_units(middle.strength.mean)
         model, found = _modelled(parameters, method, measured, options, meter)
         likelihood = make_likelihood(model, measured.values, measured.positions)
         if found is None:

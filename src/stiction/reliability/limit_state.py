@@ -22,7 +22,6 @@ from stiction.ensemble.plan import sample_of
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
 from stiction.friction.law import SCALES
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.random.coefficients import (
     coefficients_of,
@@ -344,6 +343,6 @@ def make_limit_state(
     if found or state is None:
         raise InputError(found)
     state.random.warn_if_inaccurate(problem.interface)
-    warn_of_units(problem, mean_in_stress(problem, state.random.properties, "strength"))
+    problem.warn_of_units(mean_in_stress(problem, state.random.properties, "strength"))
     check_residual(problem, state.random.properties)
     return replace(state, workers=usable_cores() if workers is None else int(workers), meter=meter)

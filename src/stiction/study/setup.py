@@ -11,7 +11,7 @@ from stiction._model import explain
 from stiction.errors import InputError, unknown_name
 from stiction.problem import Problem
 from stiction.study.study import AnyMethod, Study
-from stiction.study.study_file import completed, read_sweep, read_toml
+from stiction.study.study_file import completed, read_sweep, read_toml, reading
 
 
 def read_setup(path: Path) -> tuple[Problem, Any]:
@@ -36,7 +36,7 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
             continue
         try:
             found[name] = pydantic.TypeAdapter(kind).validate_python(
-                given[name], context={"folder": folder}
+                given[name], context=reading(folder)
             )
         except pydantic.ValidationError as error:
             problems += explain(error, Study, prefix=(name,))

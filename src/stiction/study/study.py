@@ -43,7 +43,13 @@ from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.ensemble import Ensemble
-from stiction.study.study_file import completed, read_sweep, read_toml, refuse_first_version
+from stiction.study.study_file import (
+    completed,
+    read_sweep,
+    read_toml,
+    reading,
+    refuse_first_version,
+)
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
 
 AnyMethod: Any = Annotated[
@@ -330,7 +336,7 @@ class Study:
             given = completed(given, sweep)
         try:
             study: Study = pydantic.TypeAdapter(cls).validate_python(
-                given, context={"folder": folder, "trusted": trusted}
+                given, context={**reading(folder), "trusted": trusted}
             )
         except pydantic.ValidationError as error:
             texts = explain(error, cls)

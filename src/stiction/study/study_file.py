@@ -9,6 +9,7 @@ from typing import Any
 import pydantic
 
 from stiction.errors import InputError
+from stiction.placed import placed_profile
 from stiction.study.sweep import Sweep, unknown_keys
 
 FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_rate")
@@ -40,6 +41,13 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def reading(folder: str | Path | None) -> dict[str, Any]:
+    """Context of validation: profiles may be names of files relative to `folder`, unless None."""
+    if folder is None:
+        return {"folder": None}
+    return {"folder": folder, "read": lambda given, name: placed_profile(given, name, folder)}
 
 
 def read_sweep(given: Any, folder: str | Path | None, study: type) -> tuple[Any, list[str]]:
