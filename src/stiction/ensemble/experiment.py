@@ -16,7 +16,6 @@ from stiction._model import describe
 from stiction._typing import Array
 from stiction.errors import InputError, unknown_name
 from stiction.evaluation import Values, accepted, check_method, solve, variables_of
-from stiction.plausible import warn_of_units
 from stiction.problem import Problem
 from stiction.random.coefficients import (
     in_stress,
@@ -156,7 +155,7 @@ class Experiment:
             If most of the strength lies below the residual strength.
         """
         self.random.warn_if_inaccurate(self.problem.interface)
-        warn_of_units(self.problem, self.mean("strength"))
+        self.problem.warn_of_units(self.mean("strength"))
         check_residual(self.problem, self.random.properties)
 
     def draws(self, seed: int, first: int, count: int) -> Array:
