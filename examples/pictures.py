@@ -17,7 +17,6 @@ from PIL import Image
 
 import stiction as st
 from stiction.plot.style import INK, PAGE, PALE, QUIET, color, new_figure, paper_style
-from stiction.report.rupture_figures import rupture_figure
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400
@@ -110,13 +109,12 @@ def _density(axes: Axes, values: Any, index: int) -> None:
 
 
 def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
-    """The figure of `stiction rupture` without the load beside it, less high."""
-    figure = rupture_figure(run, problem)
-    figure.axes[3].remove()
-    figure.axes[0].get_gridspec().set_width_ratios([1e-3, 4.0, 0.08])
-    figure.axes[2].tick_params(labelleft=True)
-    figure.axes[2].set_ylabel("$t/T$")
-    figure.set_figheight(4.0)
+    """The strength above slip rate in space and time."""
+    figure = new_figure(PAGE, 4.0)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.4))
+    st.plot.field(problem, run["peak_strength"], ax=above)
+    above.set_xlabel("")
+    st.plot.rupture(run, problem=problem, ax=below)
     return figure
 
 

@@ -26,5 +26,5 @@ st.plot.front(run)
 
 # %%
 
-film = st.plot.film(run, Path(tempfile.mkdtemp()) / "rupture.gif", pictures=10)
+film = st.plot.film(run, Path(tempfile.mkdtemp()) / "rupture.gif", frames=10)
 print(film.stat().st_size // 1000, "kB")

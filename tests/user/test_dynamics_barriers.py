@@ -12,7 +12,6 @@ from stiction.dynamics.arrays import Nodes
 from stiction.dynamics.scale import stress_scale
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.plot import film
-from stiction.report.rupture_figures import rupture_figure
 
 NODES, LENGTH = 256, 0.05
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -84,8 +83,8 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
 def test_an_infinite_barrier_is_drawn_as_a_gap(tmp_path):
     fields = ["slip_rate", "shear_stress"]
     run = simulate(barred(np.inf), variables=fields, steps=True, every=20)
-    rupture_figure(run, PROBLEM).savefig(tmp_path / "figure.png")
-    assert film(run, tmp_path / "film.gif", pictures=2).exists()
+    st.plot.rupture(run).figure.savefig(tmp_path / "figure.png")
+    assert film(run, tmp_path / "film.gif", frames=2).exists()
 
 
 @pytest.mark.parametrize("height", [1e12, np.inf])

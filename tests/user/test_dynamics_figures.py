@@ -1,6 +1,5 @@
 """Figures and film of a rupture, from a small run."""
 
-import matplotlib.figure
 import numpy as np
 import pytest
 from PIL import Image
@@ -10,7 +9,6 @@ from stiction import InputError
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.plot import film
-from stiction.report.rupture_figures import front_figure, rupture_figure
 
 
 @pytest.fixture(scope="module")
@@ -24,26 +22,36 @@ def simulated():
     return problem, simulate_rupture(problem, tau_p, method=Rupture(loading_rate=1e8), every=5)
 
 
-def test_space_time_figure_has_its_four_panels(simulated, tmp_path):
+def test_units_follow_the_size_of_the_fault(simulated):
     problem, run = simulated
-    figure = rupture_figure(run, problem)
-    assert isinstance(figure, matplotlib.figure.Figure)
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert r"$\tau_\mathrm{p}$ (MPa)" in labels
-    assert r"$t - T$ (µs)" in labels
-    figure.savefig(tmp_path / "figure.png")
-    assert Image.open(tmp_path / "figure.png").size[0] > 500
+    axes = st.plot.rupture(run)
+    assert axes.get_xlabel() == "position $x$ (mm)"
+    assert axes.get_ylabel() == "time since the onset (µs)"
+    weak = st.LinearWeakening(weakening_rate=0.2e6)
+    large = st.Problem(problem.solid, st.Interface(length=5e4, nodes=128), weak)
+    run = run.assign_coords(time=run.time * 1e6)
+    axes = st.plot.rupture(run.assign(onset_time=run.onset_time * 1e6), problem=large)
+    assert axes.get_xlabel() == "position $x$ (km)"
+    assert axes.get_ylabel() == "time since the onset (s)"
 
 
-def test_front_figure_names_the_wave_speeds(simulated):
-    problem, run = simulated
-    texts = {text.get_text() for axes in front_figure(run, problem).axes for text in axes.texts}
-    assert {"$c_R$", "$c_s$", "$c_d$"} <= texts
+def test_a_rupture_that_begins_at_once_is_drawn(simulated, tmp_path):
+    _, run = simulated
+    at_once = run.assign(onset_time=run.onset_time * 0.0)
+    for whole in (False, True):
+        st.plot.rupture(at_once, whole=whole).figure.savefig(tmp_path / "rupture.png")
+    assert film(at_once, tmp_path / "film.gif", frames=2).exists()
+
+
+def test_the_front_names_the_wave_speeds(simulated):
+    _, run = simulated
+    texts = {text.get_text() for text in st.plot.front(run).texts}
+    assert texts == {"$c_R$", "$c_s$", "$c_d$"}
 
 
 def test_film_moves(simulated, tmp_path):
     _, run = simulated
-    path = film(run, tmp_path / "film.gif", pictures=6)
+    path = film(run, tmp_path / "film.gif", frames=6)
     moving = Image.open(path)
     assert moving.n_frames == 6
     first = np.asarray(moving.convert("RGB")).astype(int)
@@ -52,8 +60,8 @@ def test_film_moves(simulated, tmp_path):
 
 
 def test_what_is_missing_is_named(simulated, tmp_path):
-    problem, run = simulated
+    _, run = simulated
     with pytest.raises(InputError, match=r"\.gif or \.mp4, got 'film\.avi'"):
         film(run, tmp_path / "film.avi")
     with pytest.raises(InputError, match="has no slip_rate"):
-        rupture_figure(run.drop_vars("slip_rate"), problem)
+        st.plot.rupture(run.drop_vars("slip_rate"))

@@ -105,7 +105,7 @@ def test_maps_are_fitted_too():
     # 120 correlation areas.
     assert fit.field.mean == pytest.approx(2e6, rel=0.15)
     assert fit.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.15)
-    assert fit.plot().axes
+    assert st.plot.fit(fit).axes
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,8 @@ def test_arviz(posterior):
 
 
 def test_the_picture(posterior, tmp_path):
-    figure = posterior.plot(tmp_path / "posterior.png")
+    figure = st.plot.posterior(posterior)
+    figure.savefig(tmp_path / "posterior.png")
     assert (tmp_path / "posterior.png").stat().st_size > 20_000
     assert len(figure.subfigs[0].axes) == 9
     assert figure.subfigs[1].axes[0].get_xlabel() == "peak (MPa)"

@@ -124,16 +124,14 @@ def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
 
 
 def test_failing_profiles_are_drawn(path):
-    from stiction.report.reliability_figures import weak_spot_figure
-
     plan = st.Study.from_toml(path).plans[0]
     found = st.failure_probability(
         plan.problem, plan.random, 0.72e6, method=plan.method, algorithm="plain",
         target_cv=0.5, max_evaluations=300, progress=False,
     )  # fmt: skip
     assert found.failing_profiles.sizes["sample"] >= 2
-    axes = weak_spot_figure(found.failing_profiles, plan.problem.nucleation_length, 0.72e6).axes[0]
-    middle = axes.images[0].get_array()
+    axes = st.plot.weak_spots(found, problem=plan.problem)
+    middle = axes.collections[0].get_array()
     assert middle.min() < 0.9 * middle.mean()
 
 

@@ -113,25 +113,6 @@ def test_sweeps(system):
         st.plot.quantiles(result.isel(residual_strength=0, correlation_length=0))
 
 
-def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(system, tmp_path):
-    from stiction.report.run_figures import run_figures
-
-    problem, strength, _ = system
-    for number, one in enumerate((problem, make())):
-        study = st.Study(
-            problem=one,
-            random=strength,
-            method=st.LocalCriterion(),
-            ensemble=st.Ensemble(samples=40),
-        )
-        study.run(out=tmp_path / str(number))
-    labels = []
-    for number in (0, 1):
-        (drawn,) = run_figures(st.open_run(tmp_path / str(number)))
-        labels.append(drawn.figure.axes[0].get_xlabel())
-    assert labels == ["static friction coefficient", "critical stress (MPa)"]
-
-
 def test_failure_curve_and_weak_spots(system):
     problem, strength, _ = system
     method = st.LocalCriterion()
@@ -157,15 +138,13 @@ def test_path_and_rupture(system):
     with pytest.raises(st.InputError, match="slides at every load"):
         st.plot.equilibrium_path(path.isel(load=[2]))
     run = st.simulate_rupture(problem, tau_p[0], method=st.Rupture(loading_rate=1e8), every=20)
-    for axes, moment in ((st.plot.rupture(run), 0.0), (st.plot.rupture(run, whole=True), 1.0)):
+    for axes in (st.plot.rupture(run), st.plot.rupture(run, whole=True)):
         onset = axes.lines[0].get_xydata()[0]
-        assert onset == pytest.approx([run.critical_position.item() * 1e3, moment])
+        assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])
     assert {text.get_text() for text in st.plot.front(run).texts} == {"$c_R$", "$c_s$", "$c_d$"}
     with pytest.raises(st.InputError, match="give problem="):
         st.plot.rupture(run.drop_attrs())
     assert st.plot.rupture(run.drop_attrs(), problem=problem).lines
-    with pytest.raises(st.InputError, match=r"is of a plane; choose one line .*isel\(y="):
-        st.plot.rupture(run.expand_dims(y=2))
 
 
 def test_planes(plane):

@@ -1,69 +1,63 @@
-"""Tables and text of the report."""
+"""The page about a run."""
 
 import pytest
 
-from stiction.report.page import ShownClaim, render, thinned
-from stiction.report.tables import Table, shown
-from stiction.report.text import mathematics
-
-
-@pytest.mark.parametrize(
-    ("text", "html"),
-    [
-        ("tau_cr", "<i>τ</i><sub>cr</sub>"),
-        ("xi_0/h_n", "<i>ξ</i><sub>0</sub>/<i>h</i><sub>n</sub>"),
-        ("<tau_p>", "⟨<i>τ</i><sub>p</sub>⟩"),
-        ("k^-8", "<i>k</i><sup>\N{MINUS SIGN}8</sup>"),
-        ("L >> xi_0", "<i>L</i> ≫ <i>ξ</i><sub>0</sub>"),
-        ("G* = G (1+nu)", "<i>G</i>* = <i>G</i> (1+<i>\N{GREEK SMALL LETTER NU}</i>)"),
-        ("at -0.5", "at \N{MINUS SIGN}0.5"),
-        ("Secs. 3-4, the Cauchy", "Secs. 3-4, the Cauchy"),
-        ("a < b & c", "a &lt; b &amp; c"),
-        ("<script>", "&lt;script&gt;"),
-    ],
-)
-def test_symbols(text, html):
-    assert str(mathematics(text)) == html
+import stiction as st
+from stiction.report import Page, shown, write_report
 
 
 def test_entries():
-    assert [shown(each) for each in (1234567, 0.123456789, True, None, float("nan"), "a")] == [
+    assert [shown(each) for each in (1234567, 0.123456789, -0.5, None, float("nan"), "a")] == [
         "1,234,567",
         "0.12346",
-        "yes",
+        "\N{MINUS SIGN}0.5",
         "\N{EN DASH}",
         "\N{EN DASH}",
         "a",
     ]
 
 
-def test_table(tmp_path):
-    table = Table.of("t", "T", ("a", "b"), ((i, i / 3.0) for i in range(100)))
-    lines = table.write_csv(tmp_path).read_text().splitlines()
-    assert len(lines) == 101
-    assert float(lines[2].split(",")[1]) == 1.0 / 3.0  # full precision
-    rows, step = thinned(table)
-    assert (len(rows), step) == (50, 2)
-    with pytest.raises(ValueError, match="columns"):
-        Table.of("t", "T", ("a", "b"), [(1,)])
+def test_a_page_escapes_what_it_is_given():
+    page = Page("<T>")
+    page.text("1 & 2", warning=True)
+    page.table("Table", ["<b>"], [["<i>"]])
+    page.listing("File", "<script>")
+    html = page.html()
+    for text in ("<T>", "<b>", "<i>", "<script>", "1 & 2"):
+        assert text not in html
+    assert "&lt;script&gt;" in html
 
 
-def test_page_escapes_what_it_is_given():
-    claim = ShownClaim("Sec. 1", "<b>bold</b>", "", ("1 & 2",), "does not hold", "", "below 1 %")
-    html = render(
-        title="<T>",
-        lead="lead",
-        headline=[("does not hold", 1)],
-        points=["point"],
-        exceptions=[],
-        key_tables=[],
-        figures=[],
-        claims=[("Subject", [claim])],
-        limits=Table.of("limits", "Limits", ("word", "limit"), [("well", "1 %")]),
-        parameters=[],
-        notes=[],
-        provenance=[],
-    )
-    assert "<b>bold" not in html
-    assert "&lt;T&gt;" in html
-    assert 'class="does-not-hold"' in html
+def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(tmp_path):
+    plain = st.paper.problem(nodes=256)
+    strength = st.paper.strength(plain, correlation_ratio=0.5)
+    for pressure in (None, 5e6):
+        load = st.Load(normal_pressure=pressure)
+        problem = st.Problem(plain.solid, plain.interface, plain.friction, load)
+        ensemble = st.Ensemble(samples=40)
+        sweep = [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}] if pressure else []
+        study = st.Study(
+            problem=problem,
+            random=strength,
+            method=st.LocalCriterion(),
+            ensemble=ensemble,
+            sweep=sweep,
+        )
+        run = tmp_path / f"run-{pressure}"
+        study.run(out=run)
+        write_report(st.open_run(run), tmp_path / "report.html")
+        html = (tmp_path / "report.html").read_text()
+        assert html.count("<img") == 1 + bool(pressure)
+        assert ("Densities of the static friction coefficient" in html) == bool(pressure)
+        assert "[problem.solid]" in html
+
+
+def test_a_run_without_samples_is_refused(tmp_path):
+    class Empty:
+        path = tmp_path
+
+        def status(self):
+            return type("Status", (), {"done": 0})
+
+    with pytest.raises(st.InputError, match="no sample is stored yet"):
+        write_report(Empty(), tmp_path / "report.html")

@@ -14,11 +14,9 @@ import typer
 
 from stiction import __version__
 from stiction.cli.common import echo
-from stiction.cli.fit import fit
-from stiction.cli.infer import infer
 from stiction.cli.onset import onset
 from stiction.cli.reliability import reliability
-from stiction.cli.runs import export, plot, report, status
+from stiction.cli.runs import export, report, status
 from stiction.cli.rupture import rupture
 from stiction.cli.studies import check, merge, run, schema
 from stiction.errors import InputError, RunError
@@ -68,13 +66,10 @@ for command in (
     onset,
     rupture,
     reliability,
-    fit,
-    infer,
     check,
     schema,
     status,
     export,
-    plot,
     report,
 ):
     app.command()(_interruptible(command))

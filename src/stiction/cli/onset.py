@@ -97,12 +97,13 @@ def onset(
         raise typer.Exit(1)
     _print_gaps(results)
     if out is not None:
-        from stiction.report.onset_figure import write_onset_figure
+        from stiction import plot
+        from stiction.plot.style import save_figure
 
         with Meter("drawing the figure"):
-            write_onset_figure(
-                problem, profile.values, {n: r for n, (r, _) in results.items()}, out
-            )
+            drawn = {name: result for name, (result, _) in results.items()}
+            axes = plot.onset(drawn, profile.values, problem=problem)
+            save_figure(axes.figure, out)
         echo(f"figure: {out}")
 
 

@@ -44,6 +44,18 @@ def _both(answers: Mapping[Event, Any], value: Callable[[Any], float]) -> None:
     )
 
 
+COLUMNS = (
+    "stress",
+    "friction_coefficient",
+    "probability",
+    "probability_low",
+    "probability_high",
+    "coefficient_of_variation",
+    "plain_probability",
+    "rice_probability",
+)
+
+
 def reliability(
     study: StudyFile,
     out: Annotated[Path, typer.Option(help="Folder for table, data and figures.")] = Path(
@@ -71,10 +83,6 @@ def reliability(
     plain_samples: Annotated[
         int, typer.Option(help="Samples of plain Monte Carlo beside it; 0 for none.")
     ] = 10_000,
-    tails: Annotated[
-        bool,
-        typer.Option("--tails", help="Also: other correlation lengths, lengths, distributions."),
-    ] = False,
     event: Annotated[
         Event,
         typer.Option(
@@ -98,6 +106,7 @@ def reliability(
     --friction-coefficient counts each sample's own. The time limit holds for the curve and each
     answer.
     """
+    from stiction import plot
     from stiction.export import write_result
     from stiction.plot.style import save_figure
     from stiction.random.random_interface import as_random_interface
@@ -110,8 +119,6 @@ def reliability(
     )
     from stiction.reliability.limit_state import mean_pressure
     from stiction.reliability.result import bounded
-    from stiction.reliability.tails import tail_study
-    from stiction.report import reliability_figures as figures
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
@@ -156,16 +163,10 @@ def reliability(
         **others,
     )
     write_result(curve, out / "failure_curve.nc")
-    table = figures.curve_table(curve)
-    table.write_csv(out)
-    save(figures.curve_figure(curve), "failure_curve")
-    cells = [list(table.columns), *table.cells()]
-    for row, value in zip(cells[1:], curve["stress"].values, strict=True):
-        row[0] = f"{value:.7g}"  # near a bound five digits do not tell the points apart
-    widths = [max(len(row[i]) for row in cells) for i in range(len(table.columns))]
-    for row in cells:
-        line = "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        echo(line)
+    table = curve.reset_coords().to_dataframe()[[name for name in COLUMNS if name in curve]]
+    table.to_csv(out / "failure_curve.csv", index=False)
+    save(plot.failure_curve(curve).figure, "failure_curve")
+    echo(table.to_string(index=False, float_format="{:.7g}".format))
     lowest = curve.attrs["lower_bound"]
     bound = f"bound {lowest:.7g} Pa; " if bounded(lowest) else ""
     echo(f"{bound}{curve.attrs['evaluations']} evaluations; {method.label}, {curve.attrs['event']}")
@@ -187,10 +188,7 @@ def reliability(
         found = probabilities["critical_stress"]
         echo(f"  {found.algorithm}: {found.reason}")
         if found.failing_profiles.sizes and problem.friction.weakening_rate is not None:
-            spot = figures.weak_spot_figure(
-                found.failing_profiles, problem.nucleation_length, found.stress
-            )
-            save(spot, "weak_spots")
+            save(plot.weak_spots(found, problem=problem).figure, "weak_spots")
     if probability is not None:
         stresses = {
             event: design_stress(
@@ -205,18 +203,4 @@ def reliability(
             for event in events
         }
         _both(stresses, lambda answer: answer.stress)
-    if tails:
-        several = tail_study(
-            problem,
-            random,
-            method=method,
-            smallest=smallest,
-            target_cv=target_cv,
-            plain_samples=plain_samples,
-            seed=seed,
-            event=event,
-            **others,
-        )
-        figures.tail_table(several).write_csv(out)
-        save(figures.tail_figure(several), "failure_tails")
     echo(f"written to {out}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from stiction._progress import Meter, duration
-from stiction.cli.common import RunPath, echo, size, writable, writable_folder
+from stiction.cli.common import RunPath, echo, size, writable
 
 SHOWN = 20
 
@@ -90,24 +90,6 @@ def export(
     echo(f"{state.done} samples written to {out}")
 
 
-def plot(
-    run: RunPath,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the figures; the run's own by default.")
-    ] = None,
-) -> None:
-    """Draw densities of the onset, and its quantiles against what is swept (PNG and PDF)."""
-    from stiction.report.run_figures import write_figures
-    from stiction.stored_run import StoredRun
-
-    stored = StoredRun(run)
-    folder = writable_folder(out or _beside(run, "figures"))
-    with Meter("drawing the figures"):
-        paths = list(write_figures(stored, folder))
-    for path in paths:
-        echo(str(path))
-
-
 def report(
     run: RunPath,
     out: Annotated[
@@ -115,7 +97,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
-    from stiction.report.run_report import write_report
+    from stiction.report import write_report
     from stiction.stored_run import StoredRun
 
     stored = StoredRun(run)

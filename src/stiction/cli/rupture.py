@@ -71,13 +71,11 @@ def rupture(
     is and how fast), and with --film an animation. Speeds of the front are apparent: the distance
     between nodes over the time between their weakening.
     """
+    from stiction import plot
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
     from stiction.export import write_result
-    from stiction.plot.film_writer import can_write_mp4
-    from stiction.plot.films import film as write_film
     from stiction.plot.style import save_figure
-    from stiction.report.rupture_figures import front_figure, rupture_figure
     from stiction.study.setup import read_setup
     from stiction.study.study import Study
 
@@ -112,17 +110,13 @@ def rupture(
     write_result(result, out / "rupture.nc")
     echo(_summary(result, problem))
     with Meter("drawing the figures"):
-        for name, draw in (("rupture", rupture_figure), ("front", front_figure)):
-            figure = draw(result, problem)
+        for name, draw in (("rupture", plot.rupture), ("front", plot.front)):
+            axes = draw(result, problem=problem)
             for ending in ("png", "pdf"):
-                save_figure(figure, out / f"{name}.{ending}")
+                save_figure(axes.figure, out / f"{name}.{ending}")
     if film:
         with Meter("drawing the film"):
-            echo(f"film: {write_film(result, out / 'rupture.gif')}")
-            if can_write_mp4():
-                echo(f"film: {write_film(result, out / 'rupture.mp4')}")
-            else:
-                echo("no rupture.mp4: the program ffmpeg was not found")
+            echo(f"film: {plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")
 
 

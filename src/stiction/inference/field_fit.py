@@ -12,14 +12,13 @@ from stiction._brief import brief_html
 from stiction._typing import Array
 from stiction.inference.bootstrap import RANGES
 from stiction.inference.estimate import Estimate, Setting
-from stiction.inference.fit_figure import draw_fit
 from stiction.inference.records import Record
 from stiction.inference.whittle import Observed
 from stiction.quantities import UNITS
 from stiction.random.random_field import RandomField
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 @dataclass(frozen=True)
@@ -116,16 +115,6 @@ class FieldFit:
 
     def __repr__(self) -> str:
         return str(self)
-
-    def plot(self) -> Figure:
-        """Histogram and quantiles, spectrum with its band, correlation, and residuals.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Of five panels, as a notebook shows it; ``savefig`` writes it.
-        """
-        return draw_fit(self)
 
 
 @dataclass(frozen=True, eq=False)

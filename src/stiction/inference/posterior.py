@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,12 +17,11 @@ from stiction.errors import InputError
 from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.peaks import Peaks
-from stiction.inference.posterior_figure import posterior_figure
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 BINS = 40
 
@@ -190,23 +188,6 @@ class Posterior:
             dims={name: ["test"], "specimen_length": ["test"]},
             attrs={"sampler": self.sampler, "method": self.method},
         )
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Posterior against prior, pairs, and predicted against measured peaks.
-
-        Parameters
-        ----------
-        path : path, optional
-            Where to write it as well.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
-        figure = posterior_figure(self)
-        if path is not None:
-            figure.savefig(path, dpi=200)
-        return figure
 
     def __str__(self) -> str:
         width = max(map(len, self.names))

@@ -1,16 +1,16 @@
-"""Public plots: each takes a result, draws on axes (given as ``ax=``, or new ones), returns them.
+"""Plots of results: each function draws on axes (given as ``ax=``, or new ones) and returns them.
 
-Stresses are in MPa, lengths in mm; where the problem has a normal pressure, friction coefficients
-are shown with them or in their place. `film` writes a file. Figures of several panels, as the
-commands write them, are made of these in `stiction.report`.
+Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
+pressure, friction coefficients are drawn too. `fit` and `posterior` have several panels and
+return a figure; `film` writes a file.
 """
 
 from stiction.plot.distributions import monte_carlo, quantiles
 from stiction.plot.failure import failure_curve, weak_spots
 from stiction.plot.fields import field, nucleation_stress
 from stiction.plot.films import film
-from stiction.plot.onsets import onset
-from stiction.plot.paths import equilibrium_path
+from stiction.plot.fits import fit, posterior
+from stiction.plot.onsets import equilibrium_path, onset
 from stiction.plot.ruptures import front, rupture
 from stiction.plot.style import paper_style
 
@@ -19,11 +19,13 @@ __all__ = [
     "failure_curve",
     "field",
     "film",
+    "fit",
     "front",
     "monte_carlo",
     "nucleation_stress",
     "onset",
     "paper_style",
+    "posterior",
     "quantiles",
     "rupture",
     "weak_spots",

@@ -25,20 +25,20 @@ LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 def monte_carlo(
     result: Any, *, quantity: str | None = None, label: str | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw the density of an onset, of one ensemble, several, or along a sweep.
+    """Draw the density of an onset: of one ensemble, several, or along a sweep.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo` or `Study.run`. Several are told apart by their names; of a sweep over
-        one parameter up to six steps are drawn.
+        From `monte_carlo` or `Study.run`. Give several as a list, or by name. Of a sweep over one
+        parameter up to six steps are drawn.
     quantity : str, optional
-        A variable of the result. Left out: `friction_coefficient` where there is a pressure, else
+        A variable of the result; by default `friction_coefficient` if there is a pressure, else
         `critical_stress`. `critical_position` is drawn as a histogram.
     label : str, optional
-        Of the curve, for a legend of several calls.
+        Name of the curve in the legend.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
@@ -48,6 +48,10 @@ def monte_carlo(
     ------
     InputError
         If a result lacks the quantity, or is swept over several parameters.
+
+    See Also
+    --------
+    stiction.monte_carlo, stiction.statistics.density
 
     Examples
     --------
@@ -60,45 +64,41 @@ def monte_carlo(
     'critical stress (MPa)'
     """
     results = named(result)
-    if not results:
-        raise InputError("result: there is none to draw")
     single = isinstance(result, xr.Dataset)
     quantity = shown_quantity(next(iter(results.values())), quantity)
     with on_axes(ax) as axes:
+        along: list[str] = []
         for number, (name, one) in enumerate(results.items()):
             need(one, quantity)
             variable = one[quantity]
-            along = swept(variable)
+            along = _swept(variable)
             if len(along) > 1:
                 raise InputError(
                     f"result: is swept over {', '.join(along)}; choose steps of all but one with"
                     f" result.isel({along[0]}=0)"
                 )
             if along:
-                draw_sweep(axes, variable, along[0])
+                for i, step in enumerate(_chosen(variable.sizes[along[0]])):
+                    part = variable.isel({along[0]: step})
+                    _draw_values(axes, part, _step_text(variable[along[0]], step), i)
             else:
                 text = label if single else name
-                draw_values(axes, variable, text, number + len(axes.lines) * single)
-        finish_density(axes, variable)
+                _draw_values(axes, variable, text, number + len(axes.lines) * single)
+        _, unit, text = scaled(variable)
+        axes.set_xlabel(text)
+        axes.set_ylabel(f"density (1/{unit})" if unit else "density")
+        axes.set_ylim(bottom=0.0)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(title=described(one[along[0]]) if along else None)
+            axes.legend(title=scaled(variable[along[0]])[2] if along else None)
     return axes
 
 
-def draw_sweep(axes: Axes, variable: xr.DataArray, along: str) -> None:
-    """A curve for each of at most `CURVES` steps of a sweep."""
-    steps = np.unique(np.linspace(0, variable.sizes[along] - 1, CURVES).round().astype(int))
-    for number, step in enumerate(steps):
-        draw_values(axes, variable.isel({along: step}), step_text(variable[along][step]), number)
-
-
-def draw_values(axes: Axes, variable: xr.DataArray, label: str | None, number: int) -> None:
-    """Density of what is finite of a variable; of positions a histogram, of few values marks."""
-    values = finite(variable) * scaled(variable)[0]
-    is_place = variable.attrs.get("units") == "m"
+def _draw_values(axes: Axes, variable: xr.DataArray, label: str | None, number: int) -> None:
+    """Draw the density of a variable; of positions a histogram, of few values marks."""
+    values = _finite(variable) * scaled(variable)[0]
     if values.size == 0:
         return
-    if is_place:
+    if variable.attrs.get("units") == "m":
         cells = int(np.clip(values.size / 50, 5, 40))
         counts, edges = np.histogram(values, cells, density=True)
         axes.stairs(counts, edges, label=label, **series(number))
@@ -108,14 +108,6 @@ def draw_values(axes: Axes, variable: xr.DataArray, label: str | None, number: i
     else:
         zeros = np.zeros_like(values)
         axes.plot(values, zeros, "|", color=color(number), label=label, clip_on=False)
-
-
-def finish_density(axes: Axes, variable: xr.DataArray, name: str | None = None) -> None:
-    """Name the scales of densities."""
-    _, unit, text = scaled(variable)
-    axes.set_xlabel(f"{name} ({unit})" if name else text)
-    axes.set_ylabel(f"density (1/{unit})" if unit else "density")
-    axes.set_ylim(bottom=0.0)
 
 
 def quantiles(
@@ -130,13 +122,13 @@ def quantiles(
     Parameters
     ----------
     result : Dataset
-        From `Study.run` with a sweep, over one parameter or two; the second makes curves.
+        From `Study.run` with a sweep over one parameter or two; the second makes curves.
     quantity : str, optional
         As of `monte_carlo`.
     along : str, optional
-        Dimension along the abscissa; the longest if left out.
+        Dimension along the abscissa; the longest by default.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
@@ -150,64 +142,68 @@ def quantiles(
         If the result is not swept, or over more than two parameters.
     """
     variable = result[shown_quantity(result, quantity)]
-    dims = sorted(swept(variable), key=lambda dim: -variable.sizes[dim])
+    dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
     if not 1 <= len(dims) <= 2 or (along is not None and along not in dims):
         raise InputError(
             f"result: quantiles are drawn along a sweep over one or two parameters, got"
             f" {', '.join(dims) or 'none'}" + (f" and along={along!r}" if along else "")
         )
     along = along or dims[0]
-    within = [dim for dim in dims if dim != along]
+    within = next((dim for dim in dims if dim != along), None)
+    curves = [(None, variable)]
+    if within is not None:
+        steps = _chosen(variable.sizes[within])
+        curves = [
+            (_step_text(variable[within], step), variable.isel({within: step})) for step in steps
+        ]
     place, ticks = _places(variable[along])
-    steps: list[int | None] = [None]
-    if within:
-        last = variable.sizes[within[0]] - 1
-        steps = [int(s) for s in np.unique(np.linspace(0, last, CURVES).round().astype(int))]
     with on_axes(ax, height=3.2) as axes:
-        for number, step in enumerate(steps):
-            part = variable if step is None else variable.isel({within[0]: step})
-            label = None if step is None else step_text(variable[within[0]][step])
+        for number, (label, part) in enumerate(curves):
             table = _table(part, along)
-            if step is None:
-                low, high = table[0], table[4]
-                axes.fill_between(place, low, high, color=color(0), alpha=0.12, linewidth=0)
-            band = 0.25 if step is None else 0.12
-            style: dict[str, Any] = {"color": color(number), "alpha": band, "linewidth": 0}
-            axes.fill_between(place, table[1], table[3], **style)
+            style: dict[str, Any] = {"color": color(number), "linewidth": 0}
+            if label is None:
+                axes.fill_between(place, table[0], table[4], alpha=0.12, **style)
+            axes.fill_between(place, table[1], table[3], alpha=0.12 if label else 0.25, **style)
             errors = np.abs(table[5:] - table[2])
             axes.errorbar(
                 place, table[2], yerr=errors, capsize=2, label=label, **series(number, marker=True)
             )
-        axes.set_xlabel(described(variable[along]))
+        axes.set_xlabel(scaled(variable[along])[2])
         axes.set_ylabel(scaled(variable)[2])
         if ticks is not None:
             axes.set_xticks(place, ticks)
-        elif _is_log(place):
+        elif _is_geometric(place):
             axes.set_xscale("log")
             if place.size <= 8:  # powers of ten would not name the steps
                 axes.set_xticks(place, [f"{value:.3g}" for value in place])
                 axes.minorticks_off()
-        if within:
-            axes.legend(title=described(variable[within[0]]))
+        if within is not None:
+            axes.legend(title=scaled(variable[within])[2])
     return axes
 
 
-def swept(variable: xr.DataArray) -> list[str]:
-    """Its dimensions other than the sample and the direction of a component."""
+def _swept(variable: xr.DataArray) -> list[str]:
+    """Return the dimensions other than the sample and the direction of a component."""
     return [str(dim) for dim in variable.dims if dim not in ("sample", DIRECTION)]
 
 
-def finite(values: Any) -> NDArray[np.float64]:
-    """What is finite of an array, flat."""
+def _chosen(steps: int) -> list[int]:
+    """Return at most `CURVES` steps of a sweep, spread evenly."""
+    spread = np.linspace(0, steps - 1, min(CURVES, steps))
+    return [int(step) for step in np.unique(spread.round())]
+
+
+def _finite(values: Any) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64).ravel()
     return array[np.isfinite(array)]
 
 
 def _table(part: xr.DataArray, along: str) -> NDArray[np.float64]:
-    """Quantiles at `LEVELS` and the interval of the median, (7, steps), as shown."""
+    """Return quantiles at `LEVELS` and the interval of the median, (7, steps), as drawn."""
+    factor = scaled(part)[0]
     columns = []
     for step in range(part.sizes[along]):
-        values = finite(part.isel({along: step})) * scaled(part)[0]
+        values = _finite(part.isel({along: step})) * factor
         if values.size == 0:
             columns.append(np.full(7, np.nan))
             continue
@@ -219,16 +215,15 @@ def _table(part: xr.DataArray, along: str) -> NDArray[np.float64]:
 
 
 def _places(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], list[str] | None]:
-    """Where on the axis the steps are, and their names if they are no numbers."""
+    """Return the places of the steps on the axis, and their names if they are not numbers."""
     values = coordinate.values
     if values.dtype.kind in "if" and np.unique(values).size == values.size:
-        return values.astype(np.float64) * _unit(coordinate)[0], None
-    return np.arange(values.size, dtype=np.float64), [
-        step_text(coordinate[i]) for i in range(len(values))
-    ]
+        return values.astype(np.float64) * scaled(coordinate)[0], None
+    names = [_step_text(coordinate, i) for i in range(values.size)]
+    return np.arange(values.size, dtype=np.float64), names
 
 
-def _is_log(place: NDArray[np.float64]) -> bool:
+def _is_geometric(place: NDArray[np.float64]) -> bool:
     """Whether the steps are more nearly geometric than arithmetic."""
     ordered = np.sort(place)
     if ordered.size < 3 or ordered[0] <= 0.0:
@@ -237,27 +232,10 @@ def _is_log(place: NDArray[np.float64]) -> bool:
     return bool(np.std(log) / np.mean(log) < np.std(linear) / np.mean(linear))
 
 
-def _unit(coordinate: xr.DataArray) -> tuple[float, str]:
-    """Factor and unit in which a swept quantity is shown."""
-    unit = str(coordinate.attrs.get("units", "1"))
-    if unit == "m" and np.max(np.abs(coordinate.values)) < 1.0:
-        return 1e3, "mm"
-    if unit == "Pa" and np.max(np.abs(coordinate.values)) >= 1e4:
-        return 1e-6, "MPa"
-    return 1.0, unit
-
-
-def described(coordinate: xr.DataArray) -> str:
-    """Name and unit of what is swept."""
-    name = str(coordinate.name).replace("_", " ")
-    unit = _unit(coordinate)[1]
-    return name if unit == "1" else f"{name} ({unit})"
-
-
-def step_text(step: xr.DataArray) -> str:
-    """The value of one step of a sweep."""
-    value = step.item()
-    if isinstance(value, float):
-        return f"{value * _unit(step)[0]:.4g}"
+def _step_text(coordinate: xr.DataArray, step: int) -> str:
+    """Return the value of one step of a sweep in the unit of its name."""
+    value = coordinate.values[step]
+    if isinstance(value, float | np.floating):
+        return f"{value * scaled(coordinate)[0]:.4g}"
     text = str(value)
     return text if len(text) <= 40 else text[:37] + "..."

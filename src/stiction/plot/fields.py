@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
-from stiction._typing import Array
 from stiction.criterion.nucleation import nucleation_stress as local_average
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.plot import maps
-from stiction.plot.axes import MEGA, MILLI, add_friction_scale, add_legend, on_axes
+from stiction.plot.axes import add_friction_scale, add_legend, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, QUIET, series
 from stiction.problem import Problem
 from stiction.sample import PROFILES
@@ -35,11 +35,11 @@ def field(
     where : Problem or Interface
     profile : array
         Of shape (nodes,) or (samples, nodes), of which the first six are drawn; on a plane (nx,
-        ny).
+        ny) or (samples, nx, ny), of which the first is drawn.
     quantity : str
-        What it is, 'strength' (Pa) unless said otherwise; a name that `RandomInterface` knows.
+        Name of the property, as `RandomInterface` uses it; 'strength' (Pa) by default.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def field(
     Raises
     ------
     InputError
-        If the profile does not fit the interface, or the quantity is not known.
+        If the profile does not fit the interface, or the quantity is unknown.
 
     Examples
     --------
@@ -61,36 +61,40 @@ def field(
     interface = where.interface if isinstance(where, Problem) else where
     if not isinstance(interface, Interface):
         raise InputError(f"where: must be a Problem or an Interface, got {type(where).__name__}")
-    factor, text = _shown(quantity)
-    if interface.is_plane:
-        values = rows_of(interface, profile)[0] * factor
-        with on_axes(ax, height=1.0 + 4.0 * maps.relative_height(interface)) as axes:
-            bar = maps.image(axes, interface, values, cmap="cividis")
-            axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
-            maps.label(axes)
-        return axes
+    if quantity not in PROFILES:
+        raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
     rows = rows_of(interface, profile)
+    factor, unit = unit_for(PROFILES[quantity].units, rows)
+    name = " ".join(filter(None, (quantity.replace("_", " "), _SYMBOLS.get(quantity))))
+    text = with_unit(name, unit)
+    if interface.is_plane:
+        with on_axes(ax, height=maps.height(interface)) as axes:
+            bar = maps.image(axes, interface, rows[0] * factor, cmap="cividis")
+            axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
+            maps.label(axes, interface)
+        return axes
     with on_axes(ax, width=PAGE, height=2.4) as axes:
+        x = places(interface)
         for number, row in enumerate(rows[:MOST_LINES]):
             style = {"color": INK} if rows.shape[0] == 1 else series(number)
-            axes.plot(interface.x * MILLI, row * factor, linewidth=0.9, label=str(number), **style)
+            axes.plot(x, row * factor, linewidth=0.9, label=str(number), **style)
         finish_line(axes, interface, text)
         if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
-            add_friction_scale(axes, where, "y")
+            add_friction_scale(axes, where, "y", factor)
     return axes
 
 
 def nucleation_stress(problem: Problem, strength: Any, *, ax: Axes | None = None) -> Axes:
-    """Draw the strength, its average over the nucleation length, and where that is least.
+    """Draw the strength, its average over the nucleation length, and the minimum of that.
 
     Parameters
     ----------
     problem : Problem
-        With one weakening rate.
+        With a uniform weakening rate.
     strength : array
         tau_p, Pa, of shape (nodes,), on a plane (nx, ny).
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
@@ -112,35 +116,34 @@ def nucleation_stress(problem: Problem, strength: Any, *, ax: Axes | None = None
     interface = problem.interface
     tau_p = rows_of(interface, strength)[0]
     tau_n = local_average(problem, tau_p)
-    text = r"nucleation stress $\tau_n$ (MPa)"
+    factor, unit = unit_for("Pa", tau_p)
+    lowest = int(tau_n.argmin())
     if interface.is_plane:
-        with on_axes(ax, height=1.0 + 4.0 * maps.relative_height(interface)) as axes:
-            bar = maps.image(axes, interface, tau_n * MEGA, cmap="cividis")
+        with on_axes(ax, height=maps.height(interface)) as axes:
+            bar = maps.image(axes, interface, tau_n * factor, cmap="cividis")
+            text = rf"nucleation stress $\tau_n$ ({unit})"
             axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
-            i, j = np.unravel_index(int(tau_n.argmin()), tau_n.shape)
-            dx, dy = interface.spacings
-            axes.plot(
-                i * dx * MILLI, j * dy * MILLI, "o", markerfacecolor="white", markeredgecolor=INK
-            )
-            maps.label(axes)
+            scale, _ = unit_for("m", interface.lengths)
+            entry = np.unravel_index(lowest, tau_n.shape)
+            place = [i * h * scale for i, h in zip(entry, interface.spacings, strict=True)]
+            axes.plot(*place, "o", markerfacecolor="white", markeredgecolor=INK)
+            maps.label(axes, interface)
         return axes
     with on_axes(ax, width=PAGE, height=2.6) as axes:
-        x = interface.x * MILLI
-        axes.plot(x, tau_p * MEGA, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-        axes.plot(x, tau_n * MEGA, label=r"nucleation stress $\tau_n$", **series(0))
-        lowest = int(tau_n.argmin())
-        axes.plot(
-            x[lowest], tau_n[lowest] * MEGA, "o", color=series(2)["color"],
-            label=rf"minimum {tau_n[lowest] * MEGA:.4f} MPa",
-        )  # fmt: skip
-        finish_line(axes, interface, "stress (MPa)")
-        add_friction_scale(axes, problem, "y")
+        x = places(interface)
+        axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
+        axes.plot(x, tau_n * factor, label=r"nucleation stress $\tau_n$", **series(0))
+        least = tau_n[lowest] * factor
+        text = rf"minimum {least:.4f} {unit}"
+        axes.plot(x[lowest], least, "o", color=series(2)["color"], label=text)
+        finish_line(axes, interface, with_unit("stress", unit))
+        add_friction_scale(axes, problem, "y", factor)
         add_legend(axes, ax)
     return axes
 
 
-def rows_of(interface: Interface, profile: Any) -> Array:
-    """A profile as (samples, *shape).
+def rows_of(interface: Interface, profile: Any) -> NDArray[np.float64]:
+    """Return a profile as (samples, *shape).
 
     Raises
     ------
@@ -157,17 +160,14 @@ def rows_of(interface: Interface, profile: Any) -> Array:
     return values.reshape(-1, *shape)
 
 
+def places(interface: Interface) -> NDArray[np.float64]:
+    """Return the places of the nodes of a line in the unit of its axis."""
+    return interface.x * unit_for("m", interface.lengths)[0]
+
+
 def finish_line(axes: Axes, interface: Interface, text: str) -> None:
     """Name the scales of profiles along a line."""
-    axes.set_xlim(0.0, interface.extent * MILLI)
-    axes.set_xlabel("position $x$ (mm)")
+    factor, unit = unit_for("m", interface.lengths)
+    axes.set_xlim(0.0, interface.extent * factor)
+    axes.set_xlabel(f"position $x$ ({unit})")
     axes.set_ylabel(text)
-
-
-def _shown(quantity: str) -> tuple[float, str]:
-    if quantity not in PROFILES:
-        raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
-    unit = PROFILES[quantity].units
-    factor, unit = {"Pa": (MEGA, "MPa"), "m": (1e6, "um")}.get(unit, (1.0, unit))
-    name = " ".join(filter(None, (quantity.replace("_", " "), _SYMBOLS.get(quantity))))
-    return factor, f"{name} ({unit})" if unit != "1" else name

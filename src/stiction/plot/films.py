@@ -2,41 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.animation import FFMpegWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
 
 from stiction._checks import as_path, check_count
-from stiction.plot.axes import MEGA, MICRO, MILLI
-from stiction.plot.film_writer import check_film_name, write_film
-from stiction.plot.plane_films import plane_film
-from stiction.plot.ruptures import need, shown_strength
+from stiction.errors import InputError
+from stiction.plot import maps
+from stiction.plot.axes import need, problem_of, unit_for
+from stiction.plot.ruptures import COLORS, DECADES, KEEP, finite_strength, rate_scale, since_onset
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
 
+Frames = tuple[Figure, list[Any], Callable[[int], None]]
+"""A figure, the artists that move in it, and a function that shows a frame."""
 
-def film(
-    run: xr.Dataset,
-    path: str | Path,
-    *,
-    pictures: int = 160,
-    rate: int = 20,
-) -> Path:
-    """Write a film of a rupture: stress and strength above, slip rate below.
 
-    Of a plane it shows slip rate and shear stress side by side.
+def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20) -> Path:
+    """Write a film of a rupture: stress and slip rate.
 
     Parameters
     ----------
-    run : xarray.Dataset
-        From `simulate_rupture` or `open_rupture`, with `slip_rate` and `shear_stress`.
+    run : Dataset
+        From `simulate_rupture`, with `slip_rate` and `shear_stress`.
     path : path
-        Ends in .gif, or in .mp4 where ffmpeg is installed (matplotlib's writer finds it).
-    pictures : int
-        At most so many; they are spread evenly over the frames of the run, which lie closer in
-        time as the interface accelerates.
-    rate : int
-        Pictures a second.
+        Ends in .gif, or in .mp4 if the program ffmpeg is installed.
+    frames : int
+        Maximum number of frames, evenly spaced over those of the run, which lie closer in time
+        as the interface accelerates.
+    fps : int
+        Frames per second.
 
     Returns
     -------
@@ -45,47 +47,130 @@ def film(
     Raises
     ------
     InputError
-        If a variable was not kept, or the file type is not known.
+        If a variable was not kept, or the file type is unknown.
     """
-    need(run, "slip_rate", "shear_stress", "peak_strength", plane=True)
-    check_count("pictures", pictures, 1)
-    check_count("rate", rate, 1)
+    need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
+    check_count("frames", frames, 1)
+    check_count("fps", fps, 1)
     target = as_path("path", path)
-    check_film_name(target)
-    if "y" in run.dims:
-        return plane_film(run, target, pictures=pictures, rate=rate)
-    x = run["x"].values * MILLI
-    times, onset = run["time"].values, float(run["onset_time"])
-    stress = run["shear_stress"].values * MEGA
-    slip_rate = np.maximum(run["slip_rate"].values, 1e-9)
-    strength = shown_strength(run)
-    mean = run["mean_stress"].values * MEGA
+    if target.suffix not in (".gif", ".mp4"):
+        raise InputError(f"path: must end in .gif or .mp4, got {target.name!r}")
+    if target.suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError(f"path: {target.name!r} needs the program ffmpeg; use a .gif instead")
+    shown = np.unique(np.linspace(0, run.sizes["time"] - 1, frames).round().astype(int))
     with paper_style():
-        figure = new_figure(PAGE * 0.9, 3.8)
-        above, below = figure.subplots(2, 1, sharex=True)
-        above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
-        (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
-        above.set_ylabel("stress (MPa)")
-        highest = np.nanmax(strength)
-        margin = 0.06 * (highest - np.nanmin(strength))
-        above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
-        above.legend(loc="upper right", ncols=2)
-        (moving,) = below.semilogy(x, slip_rate[0], color=ACCENT)
-        below.set_ylim(1e-7, 100.0)
-        below.set_xlim(0.0, x[-1] + x[1] - x[0])
-        below.set_xlabel("$x$ (mm)")
-        below.set_ylabel("slip rate (m/s)")
-        clock = above.text(0.0, 1.04, " ", transform=above.transAxes, color=QUIET)
+        prepare = _plane_film if "y" in run.dims else _line_film
+        figure, moving, show = prepare(run)
+        FigureCanvasAgg(figure).draw()
+        figure.set_layout_engine("none")  # the panels must not move between frames
+        if target.suffix == ".gif":
+            _write_gif(target, figure, moving, show, shown, fps)
+        else:
+            writer = FFMpegWriter(fps=fps)
+            with writer.saving(figure, str(target), figure.dpi):
+                for i in shown:
+                    show(i)
+                    writer.grab_frame()
+    return target
 
-        def show(i: int) -> None:
-            line.set_ydata(stress[i])
-            moving.set_ydata(slip_rate[i])
-            clock.set_text(
-                f"$t - T$ = {(times[i] - onset) * MICRO:,.1f} µs,  "
-                rf"$\langle\tau\rangle$ = {mean[i]:.3f} MPa"
-            )
 
-        moving_parts = [line, moving, clock]
-        return write_film(
-            target, figure, moving_parts, show, times.size, pictures=pictures, rate=rate
+def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, Callable[[int], None]]:
+    """Return a line of text above axes with time and mean stress, and how to set it."""
+    since, _ = since_onset(run)
+    late = since[since > 0.0]
+    factor, unit = unit_for("s", late if late.size else since)
+    stress, stress_unit = unit_for("Pa", run["mean_stress"].values)
+    mean = run["mean_stress"].values * stress
+    text = axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET)
+
+    def show(i: int) -> None:
+        text.set_text(
+            f"{factor * since[i]:,.1f} {unit} since the onset,  "
+            rf"$\langle\tau\rangle$ = {mean[i]:.3f} {stress_unit}"
         )
+
+    return text, show
+
+
+def _line_film(run: xr.Dataset) -> Frames:
+    length, unit = unit_for("m", run["x"].values)
+    x = run["x"].values * length
+    factor, stress_unit = unit_for("Pa", finite_strength(run))
+    stress, strength = run["shear_stress"].values * factor, finite_strength(run) * factor
+    top = max(float(run["slip_rate"].max()), 1e-12)
+    rate = np.maximum(run["slip_rate"].values, 1e-10 * top)
+    figure = new_figure(PAGE * 0.9, 3.8)
+    above, below = figure.subplots(2, 1, sharex=True)
+    above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
+    (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
+    above.set_ylabel(f"stress ({stress_unit})")
+    highest = np.nanmax(strength)
+    margin = 0.06 * (highest - min(np.nanmin(strength), stress.min()))
+    above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
+    above.legend(loc="upper right", ncols=2)
+    (moving,) = below.semilogy(x, rate[0], color=ACCENT)
+    below.set_ylim(10.0**-DECADES * top, 3.0 * top)
+    below.set_xlim(0.0, x[-1] + x[1] - x[0])
+    below.set_xlabel(f"position $x$ ({unit})")
+    below.set_ylabel("slip rate (m/s)")
+    clock, tick = _clock(above, run)
+
+    def show(i: int) -> None:
+        line.set_ydata(stress[i])
+        moving.set_ydata(rate[i])
+        tick(i)
+
+    return figure, [line, moving, clock], show
+
+
+def _plane_film(run: xr.Dataset) -> Frames:
+    interface = problem_of(run).interface
+    rate = run["slip_rate"].values
+    factor, unit = unit_for("Pa", run["shear_stress"].values)
+    stress = run["shear_stress"].values * factor
+    norm = rate_scale(rate, 4.0)
+    low, high = np.quantile(stress, [0.001, 0.999])
+    figure = new_figure(PAGE * 1.15, 3.4)
+    left, right = figure.subplots(1, 2, sharey=True)
+    slip = maps.image(
+        left, interface, np.ma.masked_less(rate[0], norm.vmin), norm=norm, cmap=COLORS
+    )
+    load = maps.image(right, interface, stress[0], vmin=low, vmax=high, cmap="cividis")
+    for axes, image, text in (
+        (left, slip, "slip rate (m/s)"),
+        (right, load, f"shear stress ({unit})"),
+    ):
+        figure.colorbar(image, ax=axes, label=text, location="bottom", shrink=0.9)
+        maps.label(axes, interface)
+        axes.label_outer()
+    clock, tick = _clock(left, run)
+
+    def show(i: int) -> None:
+        slip.set_data(np.ma.masked_less(rate[i], norm.vmin).T)
+        load.set_data(stress[i].T)
+        tick(i)
+
+    return figure, [slip, load, clock], show
+
+
+def _write_gif(
+    path: Path, figure: Figure, moving: list[Any], show: Any, shown: Any, fps: int
+) -> None:
+    """Draw the frames one by one; only the moving parts are drawn again."""
+    canvas = FigureCanvasAgg(figure)
+    for part in moving:
+        part.set_animated(True)
+    canvas.draw()
+    background = canvas.copy_from_bbox(figure.bbox)
+    images = []
+    for i in shown:
+        show(i)
+        canvas.restore_region(background)
+        for part in moving:
+            figure.draw_artist(part)
+        frame = Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
+        # Without dithering the parts that stand still stay still.
+        images.append(frame.quantize(64, dither=Image.Dither.NONE))
+    images[0].save(
+        path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
+    )

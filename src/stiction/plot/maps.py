@@ -1,4 +1,4 @@
-"""Fields of a plane as maps: x to the right, y upwards, a node the centre of its cell."""
+"""Fields of a plane as maps: x to the right, y upwards, a node at the centre of its cell."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from numpy.typing import NDArray
 
-from stiction._typing import Array
 from stiction.interface import Interface
-from stiction.plot.axes import MILLI
+from stiction.plot.axes import unit_for
 
 GREYS = LinearSegmentedColormap.from_list("pale greys", ["#6e6e6e", "#fbfbfb"])
 """Light enough for outlines to be seen on it."""
@@ -19,14 +18,16 @@ BAR: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "pad": 0.02, "aspect
 
 
 def edges(interface: Interface) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of the map, mm."""
+    """Return left, right, bottom and top of the map in the unit of its axes."""
+    factor, _ = unit_for("m", interface.lengths)
     (x, y), (dx, dy) = interface.lengths, interface.spacings
-    left, right, bottom, top = -0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy
-    return left * MILLI, right * MILLI, bottom * MILLI, top * MILLI
+    return (
+        -0.5 * dx * factor, (x - 0.5 * dx) * factor, -0.5 * dy * factor, (y - 0.5 * dy) * factor
+    )  # fmt: skip
 
 
-def image(axes: Axes, interface: Interface, field: Array, **options: Any) -> Any:
-    """A field (nx, ny) of a plane."""
+def image(axes: Axes, interface: Interface, field: NDArray[Any], **options: Any) -> Any:
+    """Draw a field (nx, ny) of a plane and return the image."""
     return axes.imshow(
         field.T, origin="lower", extent=edges(interface), interpolation="nearest", aspect="equal",
         **options,
@@ -36,12 +37,15 @@ def image(axes: Axes, interface: Interface, field: Array, **options: Any) -> Any
 def outline(
     axes: Axes, interface: Interface, mask: NDArray[np.bool_], ink: str, width: float
 ) -> None:
-    """The border of a set of nodes, closed across the borders of the map."""
+    """Draw the border of a set of nodes, closed across the borders of the map."""
     if not mask.any() or mask.all():
         return
     padded = np.pad(mask.astype(float), 1, mode="wrap")
-    (dx, dy), (nx, ny) = interface.spacings, mask.shape
-    x, y = np.arange(-1, nx + 1) * dx * MILLI, np.arange(-1, ny + 1) * dy * MILLI
+    factor, _ = unit_for("m", interface.lengths)
+    x, y = (
+        np.arange(-1, n + 1) * h * factor
+        for h, n in zip(interface.spacings, mask.shape, strict=True)
+    )
     axes.contour(x, y, padded.T, levels=[0.5], colors=[ink], linewidths=[width])
     keep_edges(axes, interface)
 
@@ -53,13 +57,14 @@ def keep_edges(axes: Axes, interface: Interface) -> None:
     axes.set_ylim(bottom, top)
 
 
-def label(axes: Axes) -> None:
+def label(axes: Axes, interface: Interface) -> None:
     """Name the directions."""
-    axes.set_xlabel("$x$ (mm), direction of slip")
-    axes.set_ylabel("$y$ (mm)")
+    _, unit = unit_for("m", interface.lengths)
+    axes.set_xlabel(f"$x$ ({unit}), direction of slip")
+    axes.set_ylabel(f"$y$ ({unit})")
 
 
-def relative_height(interface: Interface) -> float:
-    """Of a map over its width, within what fits on a page."""
+def height(interface: Interface, more: float = 1.0) -> float:
+    """Return the height of a figure, inches, with one map and `more` for the rest."""
     x, y = interface.lengths
-    return float(np.clip(y / x, 0.2, 2.0))
+    return more + 4.0 * float(np.clip(y / x, 0.2, 2.0))

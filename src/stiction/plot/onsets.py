@@ -1,4 +1,4 @@
-"""One profile and where each method sees sliding begin."""
+"""Where each method sees sliding begin on a profile, and how slip grows before that."""
 
 from __future__ import annotations
 
@@ -6,30 +6,35 @@ import itertools
 from collections.abc import Mapping
 from typing import Any
 
+import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import PowerNorm
 from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
 
-from stiction._typing import Array
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.equilibrium.plane_patches import critical_patch
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed
+from stiction.interface import Interface
 from stiction.plot import maps
 from stiction.plot.axes import (
-    MEGA,
-    MILLI,
     add_friction_scale,
     add_legend,
     named,
     need,
     on_axes,
     problem_of,
+    unit_for,
+    with_unit,
 )
-from stiction.plot.fields import finish_line, rows_of
+from stiction.plot.fields import finish_line, places, rows_of
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, marker, series
 from stiction.problem import Problem
+
+Array = NDArray[np.float64]
 
 _GAP: dict[str, Any] = {"facecolor": PALE, "alpha": 0.6, "linewidth": 0.0, "zorder": 0.0}
 _NAMES = {
@@ -52,27 +57,31 @@ def onset(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `stiction.onset` with this strength; several methods are told apart by their names.
-        On a plane the local criterion's critical ellipse is drawn, and with ``slip`` and
-        ``sensitivity`` (options of `Equilibrium`) what slips at the onset.
+        From `stiction.onset` with this strength. Give several methods as a list, or by name. On a
+        plane the critical ellipse of the local criterion is drawn, and, for an `Equilibrium` with
+        ``slip=True`` and ``sensitivity=True``, what slips at the onset.
     strength : array
         tau_p, Pa, of shape (nodes,) or (samples, nodes); on a plane (nx, ny) or (samples, nx, ny).
     problem : Problem, optional
-        Needed only where the result does not hold it.
+        Needed only if the result does not hold it.
     sample : int
-        Which one, counted from 0.
+        Number of the sample, counted from 0.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Stresses in MPa over mm; beside them friction coefficients where there is a pressure.
+        With a second scale of friction coefficients if there is a pressure.
 
     Raises
     ------
     InputError
-        If something does not fit together.
+        If results, strength and problem do not fit together.
+
+    See Also
+    --------
+    stiction.onset
 
     Examples
     --------
@@ -84,8 +93,6 @@ def onset(
     'position $x$ (mm)'
     """
     results = named(result)
-    if not results:
-        raise InputError("result: there is none to draw")
     for one in results.values():
         need(one, "critical_load", "critical_position")
     problem = problem_of(next(iter(results.values())), problem)
@@ -98,73 +105,66 @@ def onset(
         )
     chosen = {name: one.isel(sample=slice(sample, sample + 1)) for name, one in results.items()}
     if problem.interface.is_plane:
-        height = 2.0 + 4.0 * maps.relative_height(problem.interface)
-        with on_axes(ax, height=height) as axes:
-            bar = draw_plane_onset(axes, problem, rows[sample], chosen)
-            axes.figure.colorbar(bar, ax=axes, label=r"strength $\tau_p$ (MPa)", **maps.BAR)
+        with on_axes(ax, height=maps.height(problem.interface, 2.0)) as axes:
+            _draw_plane(axes, problem, rows[sample], chosen)
             add_legend(axes, ax)
         return axes
     with on_axes(ax, width=PAGE, height=2.8) as axes:
-        draw_line_onset(axes, problem, rows[sample], chosen)
+        _draw_line(axes, problem, rows[sample], chosen)
         add_legend(axes, ax)
     return axes
 
 
-def draw_line_onset(
+def _draw_line(
     axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
 ) -> None:
-    """The onset on a line, without a legend; of one sample, by the types of the methods."""
     interface = problem.interface
-    x = interface.x * MILLI
-    spans = listed(next(iter(results.values()))) if results else []
+    x = places(interface)
+    factor, unit = unit_for("Pa", tau_p)
+    length, length_unit = unit_for("m", interface.lengths)
+    spans = listed(next(iter(results.values())))
     measured = tau_p.copy()
     for begin, end in spans:
-        measured[_between(problem, begin, end)] = np.nan
-        _shade(axes, problem, begin, end)
+        measured[_between(interface, begin, end)] = np.nan
+        _shade(axes, interface, begin, end)
     if spans:
-        axes.plot(x, tau_p * MEGA, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
+        axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
         axes.fill([], [], **_GAP, label="not measured, filled in")
-    axes.plot(x, measured * MEGA, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
+    axes.plot(x, measured * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
     try:
         averaged = nucleation_stress(problem, tau_p)
-        axes.plot(x, averaged * MEGA, label=r"nucleation stress $\tau_n$", **series(0))
-    except InputError:  # no single nucleation length: the strength alone is shown
+        axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
+    except InputError:  # no single nucleation length: the strength alone is drawn
         pass
     for number, (name, result) in enumerate(results.items()):
-        place = float(result["critical_position"][0]) * MILLI
-        load = float(result["critical_load"][0]) * MEGA
+        place = float(result["critical_position"][0]) * length
+        remark = " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
         axes.plot(
             place,
-            load,
+            float(result["critical_load"][0]) * factor,
             linestyle="none",
             marker=marker(number),
             markersize=7.0 - number,
             markerfacecolor="none" if number else color(number + 1),
             markeredgecolor=color(number + 1),
             markeredgewidth=1.2,
-            label=f"{_label(name, result)} at {place:.2f} mm{_remark(result)}",
+            label=f"{_label(name, result)} at {place:.2f} {length_unit}{remark}",
         )
-    finish_line(axes, interface, "shear stress (MPa)")
+    finish_line(axes, interface, with_unit("shear stress", unit))
     axes.margins(y=0.08)
-    add_friction_scale(axes, problem, "y")
+    add_friction_scale(axes, problem, "y", factor)
 
 
-def draw_plane_onset(
-    axes: Axes,
-    problem: Problem,
-    field: Array,
-    results: Mapping[str, xr.Dataset],
-    *,
-    cmap: Any = None,
-) -> Any:
-    """A field of a plane (Pa) as a map with the onset by each method; the image is returned.
-
-    What slips is drawn where a result has `slip` and `sensitivity`, else the critical ellipse.
-    """
-    exact = next((one for one in results.values() if has_maps(one)), None)
+def _draw_plane(
+    axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
+) -> None:
+    exact = next((one for one in results.values() if {"slip", "sensitivity"} <= set(one)), None)
     interface = problem.interface
-    cmap = cmap or (maps.GREYS if exact is not None else "cividis")
-    drawn = maps.image(axes, interface, field * MEGA, cmap=cmap)
+    factor, unit = unit_for("Pa", tau_p)
+    length, length_unit = unit_for("m", interface.lengths)
+    shades = maps.GREYS if exact is not None else "cividis"
+    drawn = maps.image(axes, interface, tau_p * factor, cmap=shades)
+    axes.figure.colorbar(drawn, ax=axes, label=rf"strength $\tau_p$ ({unit})", **maps.BAR)
     if exact is not None:
         inside, _ = critical_patch(exact["sensitivity"].values[0], interface.spacings)
         maps.outline(axes, interface, exact["slip"].values[0] > 0.0, color(1), 0.9)
@@ -172,53 +172,116 @@ def draw_plane_onset(
         axes.plot([], [], color=color(1), linewidth=0.9, label="slips at the first instability")
         axes.plot([], [], color=ACCENT, linewidth=1.6, label="critical patch")
     for number, (name, result) in enumerate(results.items()):
-        x, y = result["critical_position"].values[0] * MILLI
+        x, y = result["critical_position"].values[0] * length
         axes.plot(
             x, y, linestyle="none", marker=marker(number), markersize=6.0 - number,
             markerfacecolor="white", markeredgecolor=INK, markeredgewidth=1.1,
-            label=f"{_label(name, result)} at ({x:.2f}, {y:.2f}) mm",
+            label=f"{_label(name, result)} at ({x:.2f}, {y:.2f}) {length_unit}",
         )  # fmt: skip
         if exact is None and "critical_aspect" in result:
-            _ellipse(axes, problem, x, y, result["critical_patch_extent"].values[0] * MILLI)
+            _ellipse(axes, interface, x, y, result["critical_patch_extent"].values[0] * length)
     maps.keep_edges(axes, interface)
-    maps.label(axes)
-    return drawn
-
-
-def has_maps(result: xr.Dataset) -> bool:
-    """Whether it says what slips at the onset."""
-    return {"slip", "sensitivity"} <= set(result)
+    maps.label(axes, interface)
 
 
 def _label(name: str, result: xr.Dataset) -> str:
-    text = f"{_NAMES.get(name, name)}: {float(result['critical_load'][0]) * MEGA:.4f} MPa"
+    load = float(result["critical_load"][0])
+    factor, unit = unit_for("Pa", load)
+    text = f"{_NAMES.get(name, name)}: {load * factor:.4f} {unit}"
     if "friction_coefficient" in result:
         text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
     return text
 
 
-def _ellipse(axes: Axes, problem: Problem, x: float, y: float, extent: Array) -> None:
-    lengths = [length * MILLI for length in problem.interface.lengths]
+def _ellipse(axes: Axes, interface: Interface, x: float, y: float, extent: Array) -> None:
+    factor, _ = unit_for("m", interface.lengths)
+    lengths = [length * factor for length in interface.lengths]
     for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
         place = (x + i * lengths[0], y + j * lengths[1])
         axes.add_patch(Ellipse(place, *extent, fill=False, edgecolor="white", linewidth=0.9))
 
 
-def _between(problem: Problem, begin: float, end: float) -> Any:
-    """The nodes of a gap, which may lie across x = 0."""
-    x, half = problem.interface.x, 0.5 * problem.interface.spacing
+def _between(interface: Interface, begin: float, end: float) -> Any:
+    """Return the nodes of a gap, which may lie across x = 0."""
+    x, half = interface.x, 0.5 * interface.spacing
     after, before = x > begin - half, x < end + half
     return after & before if begin <= end else after | before
 
 
-def _shade(axes: Axes, problem: Problem, begin: float, end: float) -> None:
-    # From the last measured node to the next one.
-    length, spacing = problem.interface.extent * MILLI, problem.interface.spacing * MILLI
-    left, right = begin * MILLI - spacing, end * MILLI + spacing
-    pieces = [(left, right)] if begin <= end else [(left, length), (0.0, right)]
+def _shade(axes: Axes, interface: Interface, begin: float, end: float) -> None:
+    """Shade a gap from the last measured node to the next one."""
+    factor, _ = unit_for("m", interface.lengths)
+    left, right = (begin - interface.spacing) * factor, (end + interface.spacing) * factor
+    pieces = [(left, right)] if begin <= end else [(left, interface.extent * factor), (0.0, right)]
     for piece in pieces:
         axes.axvspan(*piece, **_GAP)
 
 
-def _remark(result: xr.Dataset) -> str:
-    return " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
+def equilibrium_path(
+    path: xr.Dataset,
+    *,
+    load: int | None = None,
+    problem: Problem | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw slip along the interface at each load of a path; on a plane a map at one load.
+
+    Parameters
+    ----------
+    path : Dataset
+        From `stiction.equilibrium_path`; loads at which the interface slides are left out.
+    load : int, optional
+        Number of the load on a plane; the highest in equilibrium by default.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If no load of the path is in equilibrium.
+    """
+    need(path, "slip", "sliding")
+    interface = problem_of(path, problem).interface
+    factor, unit = unit_for("Pa", path["load"].values)
+    loads = path["load"].values * factor
+    balanced = np.flatnonzero(~path["sliding"].values)
+    if balanced.size == 0:
+        raise InputError("path: the interface slides at every load of it; give lower ones")
+    if interface.is_plane:
+        number = int(balanced[-1]) if load is None else load
+        if number not in balanced:
+            raise InputError(
+                f"load: {number} is not in equilibrium; of this path loads {balanced.min()} to"
+                f" {balanced.max()} are"
+            )
+        slip = path["slip"].values[number]
+        scale, slip_unit = unit_for("m", slip)
+        with on_axes(ax, height=maps.height(interface, 1.2)) as axes:
+            # Slip grows steeply with the load: a root shows small patches beside large ones.
+            norm = PowerNorm(0.4, vmin=0.0, vmax=max(float(slip.max()) * scale, 1e-300))
+            drawn = maps.image(axes, interface, slip * scale, cmap="viridis", norm=norm)
+            maps.outline(axes, interface, slip > 0.0, "white", 0.4)
+            share = 100.0 * (slip > 0.0).mean()
+            title = rf"$\tau_0$ = {loads[number]:.4f} {unit}, {share:.2g} % slips"
+            axes.set_title(title, fontsize=7.5)
+            maps.label(axes, interface)
+            axes.figure.colorbar(drawn, ax=axes, label=f"slip ({slip_unit})", **maps.BAR)
+        return axes
+    scale, slip_unit = unit_for("m", path["slip"].values[balanced])
+    with on_axes(ax, width=PAGE, height=2.6) as axes:
+        shades = matplotlib.colormaps["viridis_r"](np.linspace(0.12, 1.0, balanced.size))
+        for shade, number in zip(shades, balanced.tolist(), strict=True):
+            slip = path["slip"].values[number] * scale
+            text = f"{loads[number]:.4f} {unit}"
+            axes.plot(places(interface), slip, color=shade, linewidth=0.9, label=text)
+        finish_line(axes, interface, f"slip ({slip_unit})")
+        axes.set_ylim(bottom=0.0)
+        if balanced.size <= 8:
+            axes.legend(title=r"load $\tau_0$")
+    return axes

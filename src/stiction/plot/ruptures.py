@@ -1,4 +1,4 @@
-"""One rupture in space and time, and the speed of its front."""
+"""One rupture: slip rate in space and time, and the speed of its front."""
 
 from __future__ import annotations
 
@@ -7,21 +7,24 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
-from stiction.errors import InputError
-from stiction.plot.axes import MEGA, MICRO, MILLI, on_axes, problem_of
-from stiction.plot.style import INK, PAGE, series
+from stiction.plot import maps
+from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.fields import finish_line, places
+from stiction.plot.style import ACCENT, INK, PAGE, series
 from stiction.problem import Problem
 
-Floats = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 COLORS = "inferno_r"
-SLOWEST, FASTEST = 1e-6, 10.0
-"""Ends of the scale of colours, m/s."""
+DECADES = 7.0
+"""Of slip rate below the largest that are drawn."""
 BEFORE = 0.11
-"""Creep before the onset that is shown, in units of L/c_s."""
+"""Time before the onset that is drawn, in units of L/c_s."""
+KEEP = "; keep it with simulate_rupture(save=st.Save(...))"
 
 
 def rupture(
@@ -31,145 +34,176 @@ def rupture(
     whole: bool = False,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw slip rate in space and time.
+    """Draw slip rate in space and time; on a plane the advance of the front.
 
     Parameters
     ----------
     run : Dataset
-        From `simulate_rupture` or `open_rupture`, with `slip_rate`.
+        From `simulate_rupture`, on a line with `slip_rate`.
     problem : Problem, optional
-        Needed only where the run does not hold it.
+        Needed only if the run does not hold it.
     whole : bool
-        From the first slip on, time over that of the onset, T; else from shortly before the onset.
+        On a line: draw all frames instead of those from shortly before the onset on.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
-        A dot marks the onset. What slips slower than 1 um/s is white.
+        A dot marks the onset, from which time counts. On a line, what slips seven decades slower
+        than the fastest point is white; on a plane, the front is drawn at equal intervals of time
+        on a map of the strength.
 
     Raises
     ------
     InputError
-        If the slip rate was not kept, or the run is of a plane.
+        If a variable was not kept.
     """
-    need(run, "slip_rate", "onset_time", "critical_position")
+    need(run, "onset_time", "critical_position")
     problem = problem_of(run, problem)
-    x, times = run["x"].values, run["time"].values
-    rate, onset = run["slip_rate"].values, float(run["onset_time"])
+    if problem.interface.is_plane:
+        need(run, "peak_strength", "arrival_time")
+        with on_axes(ax, height=maps.height(problem.interface, 1.6)) as axes:
+            _draw_front(axes, run, problem)
+        return axes
+    need(run, "slip_rate", hint=KEEP)
     with on_axes(ax, width=PAGE, height=3.4) as axes:
-        if whole:
-            mesh = draw_mesh(axes, x, times / onset, rate)
-            axes.set_ylabel("$t/T$")
-        else:
-            near = near_onset(problem, times, onset)
-            mesh = draw_mesh(axes, x, (times[near] - onset) * MICRO, rate[near])
-            axes.set_ylabel(r"$t - T$ (µs)")
-        mark_onset(axes, run, 1.0 if whole else 0.0)
-        axes.set_xlim(0.0, problem.interface.extent * MILLI)
-        axes.set_xlabel("position $x$ (mm)")
-        axes.figure.colorbar(mesh, ax=axes, extend="both", label="slip rate (m/s)")
+        mesh, text = _draw_space_time(axes, run, problem, whole)
+        finish_line(axes, problem.interface, text)
+        axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
     return axes
 
 
 def front(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the apparent speed of the rupture front along the interface, against the wave speeds.
+    """Draw the apparent speed of the rupture front against the wave speeds.
 
     Patches that grow ahead of the front can make it look faster than c_d.
 
     Parameters
     ----------
     run : Dataset
-        From `simulate_rupture` or `open_rupture`.
+        From `simulate_rupture`.
     problem : Problem, optional
-        Needed only where the run does not hold it.
+        Needed only if the run does not hold it.
     ax : matplotlib.axes.Axes, optional
-        To draw on; new ones if left out.
+        Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
+        On a plane along x and along y through the critical position.
 
     Raises
     ------
     InputError
         If the front was not recorded.
     """
-    need(run, "front_speed")
+    need(run, "front_speed", "critical_position")
     problem = problem_of(run, problem)
-    solid = problem.solid
+    interface, solid = problem.interface, problem.solid
+    factor, unit = unit_for("m", interface.lengths)
+    speed = run["front_speed"].values
     with on_axes(ax) as axes:
-        axes.plot(run["x"].values * MILLI, run["front_speed"].values, ".", color=INK, markersize=2)
+        if interface.is_plane:
+            i, j = _critical_node(run, problem)
+            lines = {"x": speed[:, j], "y": speed[i, :]}
+            for number, (dim, values) in enumerate(lines.items()):
+                place = interface.coordinates[dim] * factor
+                style = {"markersize": 2.5, "color": (INK, ACCENT)[number]}
+                axes.plot(place, values, ".", label=f"along ${dim}$", **style)
+            axes.legend()
+        else:
+            axes.plot(places(interface), speed, ".", color=INK, markersize=2)
         waves = [("$c_R$", solid.rayleigh_wave_speed), ("$c_s$", solid.shear_wave_speed)]
         if problem.mode == "II":
             waves.append(("$c_d$", solid.dilatational_wave_speed))
-        sides = ("top", "bottom", "center")  # c_R and c_s lie close
+        sides = ("top", "bottom", "center")  # c_R and c_s lie close together
         for i, (name, value) in enumerate(waves):
             axes.axhline(value, linewidth=0.9, **series(i + 1))
-            place_of = axes.get_yaxis_transform()
-            axes.text(1.01, value, name, transform=place_of, va=sides[i], color=INK)
+            transform = axes.get_yaxis_transform()
+            axes.text(1.01, value, name, transform=transform, va=sides[i], color=INK)
         axes.set_ylim(0.0, 1.6 * waves[-1][1])
-        axes.set_xlim(0.0, problem.interface.extent * MILLI)
-        axes.set_xlabel("$x$ (mm)")
+        axes.set_xlim(0.0, max(interface.lengths) * factor)
+        axes.set_xlabel(f"position ({unit})")
         axes.set_ylabel("front speed (m/s)")
     return axes
 
 
-def need(run: xr.Dataset, *names: str, plane: bool = False) -> None:
-    """Refuse a run without these variables, or of a plane where that cannot be drawn.
+def since_onset(run: xr.Dataset) -> tuple[Array, str]:
+    """Return the times of the frames, s, and their name: from the onset, if there is one."""
+    onset = float(run["onset_time"])
+    if np.isfinite(onset):
+        return run["time"].values - onset, "time since the onset"
+    return run["time"].values, "time"
 
-    Raises
-    ------
-    InputError
-        That says how to keep them, or how to take a line out of a plane.
-    """
-    if not isinstance(run, xr.Dataset):
-        raise InputError(f"run: must be an xarray.Dataset, got {type(run).__name__}")
-    missing = [name for name in names if name not in run]
-    if missing:
-        raise InputError(
-            f"run: has no {', '.join(missing)}; keep it with simulate_rupture(variables=...), or "
-            "read a stored run with open_rupture"
+
+def _critical_node(run: xr.Dataset, problem: Problem) -> tuple[int, ...]:
+    interface = problem.interface
+    return tuple(
+        round(float(at) / h) % n
+        for at, h, n in zip(
+            np.atleast_1d(run["critical_position"]), interface.spacings, interface.shape,
+            strict=True,
         )
-    if "y" in run.dims and not plane:
-        raise InputError("run: is of a plane; choose one line of it with run.isel(y=...)")
+    )  # fmt: skip
 
 
-def shown_strength(run: xr.Dataset) -> Floats:
-    """Peak strength, MPa, with gaps where it is infinite."""
-    strength = run["peak_strength"].values * MEGA
+def rate_scale(rate: Array, decades: float) -> LogNorm:
+    """Return the scale of colours: some decades below the largest slip rate."""
+    top = max(float(rate.max()), 1e-12)
+    return LogNorm(top * 10.0**-decades, top)
+
+
+def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem, whole: bool) -> tuple[Any, str]:
+    """Draw slip rate and the onset; return the mesh and the label of the time."""
+    since, name = since_onset(run)
+    rate = run["slip_rate"].values
+    norm = rate_scale(rate, DECADES)
+    if not whole:
+        before = BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
+        near = since >= -before
+        if near.sum() > 2:
+            since, rate = since[near], rate[near]
+    factor, unit = unit_for("s", since)
+    length, _ = unit_for("m", problem.interface.lengths)
+    x, spacing = problem.interface.x, problem.interface.spacing
+    along = np.append(x, x[-1] + spacing) - 0.5 * spacing
+    middle = 0.5 * (since[1:] + since[:-1])
+    edges = np.concatenate([since[:1], middle, since[-1:]])
+    mesh = axes.pcolormesh(
+        along * length, edges * factor, np.ma.masked_less(rate, norm.vmin), norm=norm,
+        cmap=COLORS, rasterized=True,
+    )  # fmt: skip
+    place = float(run["critical_position"]) * length
+    if np.isfinite(float(run["onset_time"])):
+        axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
+    return mesh, with_unit(name, unit)
+
+
+def finite_strength(run: xr.Dataset) -> Array:
+    """Return the peak strength, Pa, NaN where it is infinite."""
+    strength = run["peak_strength"].values
     return np.where(np.isfinite(strength), strength, np.nan)
 
 
-def near_onset(problem: Problem, times: Floats, onset: float) -> NDArray[np.intp]:
-    """Numbers of the frames from shortly before the onset on."""
-    before = BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
-    near = np.flatnonzero(times >= onset - before)
-    return near if near.size > 2 else np.arange(times.size)
-
-
-def mark_onset(axes: Axes, run: xr.Dataset, moment: float) -> None:
-    """A dot where and when the interface begins to slide."""
-    place = float(run["critical_position"]) * MILLI
-    axes.plot([place], [moment], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
-
-
-def draw_mesh(axes: Axes, x: Floats, times: Floats, rate: Floats) -> Any:
-    """Slip rate on a logarithmic scale; what sticks stays white."""
-    shown = np.ma.masked_less(rate, SLOWEST)
-    spacing = x[1] - x[0]
-    along = np.append(x - 0.5 * spacing, x[-1] + 0.5 * spacing)
-    return axes.pcolormesh(
-        along * MILLI,
-        _edges(times),
-        shown,
-        norm=LogNorm(SLOWEST, FASTEST),
-        cmap=COLORS,
-        rasterized=True,
-    )
-
-
-def _edges(centres: Floats) -> Floats:
-    middle = 0.5 * (centres[1:] + centres[:-1])
-    return np.concatenate([centres[:1], middle, centres[-1:]])
+def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
+    """Draw the front at equal intervals of time on a map of the strength."""
+    interface = problem.interface
+    strength = finite_strength(run)
+    factor, unit = unit_for("Pa", strength)
+    drawn = maps.image(axes, interface, strength * factor, cmap="Greys")
+    axes.figure.colorbar(drawn, ax=axes, label=rf"strength $\tau_p$ ({unit})", **maps.BAR)
+    since = run["arrival_time"].values - float(run["onset_time"])
+    scale, time_unit = unit_for("s", since)
+    later = since[np.isfinite(since) & (since > 0.0)]
+    length, _ = unit_for("m", interface.lengths)
+    if later.size and np.ptp(later) > 0.0:
+        x, y = (length * place for place in interface.coordinates.values())
+        levels = np.linspace(0.0, scale * float(later.max()), 10)[1:-1]
+        lines = axes.contour(x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9)
+        bar = ScalarMappable(lines.norm, lines.cmap)
+        text = f"front ({time_unit} since the onset)"
+        axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)
+    place = [length * float(one) for one in run["critical_position"]]
+    axes.plot(*place, "o", color=ACCENT, markersize=4.0, markeredgecolor="white")
+    maps.label(axes, interface)

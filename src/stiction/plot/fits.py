@@ -1,0 +1,278 @@
+"""What a fit is judged by: a random field fitted to profiles, a posterior from peaks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+from numpy.typing import NDArray
+from scipy import fft
+
+from stiction.inference.estimate import bands, simulate
+from stiction.inference.field_fit import FieldFit
+from stiction.inference.posterior import Posterior
+from stiction.inference.whittle import Observed
+from stiction.plot.axes import unit_for, with_unit
+from stiction.plot.style import (
+    ACCENT,
+    INK,
+    PAGE,
+    PALE,
+    QUIET,
+    color,
+    new_figure,
+    panel,
+    paper_style,
+)
+from stiction.quantities import UNITS
+
+Array = NDArray[np.float64]
+
+SHOWN = 100
+"""Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
+LAGS = 2.5
+"""Correlation lengths that the panel of the correlation shows."""
+
+
+def fit(found: FieldFit) -> Figure:
+    """Draw a fitted random field beside the records.
+
+    Parameters
+    ----------
+    found : FieldFit
+        From `stiction.fit_field`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        (a) Values and the fitted marginal; (b) quantiles of the data against those of the fit;
+        (c) correlation, as the window leaves it; (d) spectrum. Shaded in (a) and (b): 90 % of the
+        fits to records simulated from the fitted field; in (c) and (d): 90 % of such records.
+    """
+    details = found._details
+    one = max(details.observed, key=lambda record: record.window.shape[0])
+    setting = replace(details.setting, windows=tuple(one.window for _ in one.periodograms))
+    rng = np.random.default_rng(0)
+    simulated = [
+        np.mean([one.window.periodogram(r) for r in simulate(details.estimate, setting, rng)], 0)
+        for _ in range(SHOWN)
+    ]
+    with paper_style():
+        figure = new_figure(PAGE, 5.4)
+        panels = figure.subplots(2, 2).ravel()
+        _histogram(panels[0], found)
+        _quantiles(panels[1], found)
+        _correlation(panels[2], found, one, simulated)
+        _spectrum(panels[3], found, one, simulated)
+        for letter, axes in zip("abcd", panels, strict=True):
+            panel(axes, letter)
+    return figure
+
+
+def _histogram(axes: Axes, found: FieldFit) -> None:
+    details = found._details
+    values = details.values
+    factor, unit = unit_for(UNITS[found.quantity], values)
+    counts, _, _ = axes.hist(values * factor, bins=40, density=True, color=PALE, label="measured")
+    at = np.linspace(values.min(), values.max(), 400)
+    spread = [one.marginal.distribution.pdf(at) for one in details.repeated[:SHOWN]]
+    _band(axes, at * factor, np.array(spread) / factor)
+    noisy = details.estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
+    name = "fitted, without the noise" if noisy else "fitted"
+    density = found.field.marginal.distribution.pdf(at) / factor
+    axes.plot(at * factor, density, color=color(1), label=name)
+    # A density that is infinite at a bound must not set the scale of the panel.
+    axes.set_ylim(0.0, 1.6 * np.max(counts))
+    axes.set_xlabel(with_unit(found.quantity.replace("_", " "), unit))
+    axes.set_ylabel(f"density (1/{unit})" if unit else "density")
+    axes.legend()
+
+
+def _quantiles(axes: Axes, found: FieldFit) -> None:
+    details = found._details
+    values = details.setting.marginal.quiet(details.values, details.estimate.model.noise)
+    factor, unit = unit_for(UNITS[found.quantity], values)
+    share = (np.arange(200) + 0.5) / 200
+    expected = found.field.marginal.distribution.ppf(share) * factor
+    spread = np.array([one.marginal.distribution.ppf(share) for one in details.repeated[:SHOWN]])
+    _band(axes, expected, spread * factor)
+    ends = [expected[0], expected[-1]]
+    axes.plot(ends, ends, color=color(1), linewidth=1.0)
+    axes.plot(expected, np.quantile(values, share) * factor, ".", color=INK, markersize=3)
+    axes.set_xlabel(with_unit("quantile of the fit", unit))
+    axes.set_ylabel(with_unit("quantile of the data", unit))
+
+
+def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
+    model = found._details.estimate.model
+    spacing = one.window.spacings[0]
+    most = LAGS * model.spectrum.correlation_length
+    count = int(np.clip(round(most / spacing), 12, one.window.shape[0] // 2))
+    factor, unit = unit_for("m", count * spacing)
+    lag = np.arange(count) * spacing * factor
+
+    def correlation(power: Array) -> Array:
+        covariance = fft.irfftn(power, one.window.shape)
+        along: Array = covariance.reshape(covariance.shape[0], -1)[:count, 0]
+        return along / along[0]
+
+    _band(axes, lag, np.array([correlation(power) for power in simulated]))
+    measured = correlation(one.average)
+    axes.plot(lag, measured, ".", color=INK, markersize=3, label="measured")
+    axes.plot(lag, correlation(model.expectation(one)), color=color(1), label="fitted")
+    axes.axhline(0.0, color=QUIET, linewidth=0.6)
+    axes.set_xlabel(with_unit("lag along x", unit))
+    axes.set_ylabel("correlation in the window")
+    axes.legend()
+
+
+def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
+    scale, unit = unit_for(UNITS[found.quantity], found._details.values)
+    model = found._details.estimate.model
+    factor = float(np.prod(one.window.spacings)) * scale**2
+
+    def averaged(power: Array) -> Array:
+        """Return wavenumbers of bands, and a periodogram averaged over them."""
+        return np.array(bands(one, power, 4))[:, [0, 2]].T
+
+    k, expected = averaged(model.expectation(one))
+    measured = averaged(one.average)[1]
+    _band(axes, k, factor * np.array([averaged(power)[1] for power in simulated]))
+    axes.plot(k, factor * expected, color=color(1), label="fitted, through the window")
+    axes.plot(k, factor * measured, ".", color=INK, markersize=4, label="measured, averaged")
+    if model.noise**2 > 1e-6 * expected.max():
+        style = {"color": ACCENT, "linewidth": 0.8, "linestyle": "--"}
+        axes.axhline(factor * model.noise**2, label="noise", **style)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=0.1 * factor * min(measured.min(), expected.min()))
+    dimension = "m" if len(one.window.shape) == 1 else "m²"
+    axes.set_xlabel("wavenumber (rad/m)")
+    axes.set_ylabel(f"spectral density ({f'{unit}² ' if unit else ''}{dimension})")
+    axes.legend()
+
+
+def _band(axes: Axes, at: Array, rows: Array) -> None:
+    low, high = np.nanquantile(rows, [0.05, 0.95], axis=0)
+    axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
+
+
+def posterior(found: Posterior) -> Figure:
+    """Draw a posterior against its prior, pairs of parameters, and the predicted peaks.
+
+    Parameters
+    ----------
+    found : Posterior
+        From `stiction.infer`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Each parameter before (grey) and after the tests on the diagonal, with the information
+        gained (nats); pairs below; on the right the measured and predicted peaks.
+    """
+    names = found.names
+    count = len(names)
+    size = max(2.0 * count, 4.0)
+    prior = found.likelihood.model.prior
+    drawn = prior.theta(np.random.default_rng(0).random((20_000, prior.dimension)))
+    before, after, labels = [], [], []
+    for values, name in zip(drawn.T, names, strict=True):
+        factor, unit = _unit_of(name, values)
+        before.append(values * factor)
+        after.append(found.draws[name].ravel() * factor)
+        labels.append(with_unit(name, unit))
+    with paper_style():
+        figure = new_figure(size + 3.2, size)
+        left, right = figure.subfigures(1, 2, width_ratios=[size, 3.2])
+        panels = left.subplots(count, count, squeeze=False)
+        for i, j in np.ndindex(count, count):
+            axes = panels[i, j]
+            if j > i:
+                axes.set_axis_off()
+            elif i == j:
+                _draw_marginal(axes, before[i], after[i])
+                text = f"{found.information[names[i]]:.2f} nats"
+                axes.set_title(text, fontsize=8, loc="left")
+            else:
+                step = max(1, after[i].size // 1500)
+                style = {"color": INK, "markersize": 1.5, "alpha": 0.35}
+                axes.plot(after[j][::step], after[i][::step], ".", **style)
+                axes.set_xlim(*np.quantile(before[j], [0.002, 0.998]))
+                axes.set_ylim(*np.quantile(before[i], [0.002, 0.998]))
+                for name, values in (("x", before[j]), ("y", before[i])):
+                    if _is_wide(values):
+                        _make_logarithmic(axes, name)
+            axes.tick_params(labelbottom=i == count - 1, labelleft=j == 0 < i)
+            axes.set_xlabel(labels[j] if i == count - 1 else "")
+            axes.set_ylabel(labels[i] if j == 0 < i else "")
+        panels[0, 0].legend()
+        _draw_peaks(right, found)
+    return figure
+
+
+def _unit_of(name: str, values: Array) -> tuple[float, str]:
+    """Return the unit of a parameter by the last part of its key."""
+    last = name.split(".")[-1]
+    if last.endswith(("length", "slip")):
+        return unit_for("m", values)
+    stresses = ("low", "high", "loc", "scale", "mean", "strength", "stress", "pressure")
+    if last.endswith(stresses) and np.abs(values).max() > 1e3:
+        return unit_for("Pa", values)
+    return 1.0, ""
+
+
+def _is_wide(values: Array) -> bool:
+    low, high = np.quantile(values, [0.002, 0.998])
+    return bool(low > 0.0 and high > 6.0 * low)
+
+
+def _draw_marginal(axes: Axes, before: Array, after: Array) -> None:
+    low, high = np.quantile(before, [0.002, 0.998])
+    bins = (np.geomspace if _is_wide(before) else np.linspace)(low, high, 46)
+    styles: tuple[dict[str, Any], ...] = (
+        {"color": PALE, "histtype": "stepfilled", "label": "prior"},
+        {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2},
+    )
+    for values, style in zip((before, after), styles, strict=True):
+        axes.hist(values, bins=bins, weights=np.full(values.size, 1.0 / values.size), **style)
+    axes.set_yticks([])
+    if _is_wide(before):
+        _make_logarithmic(axes, "x")
+
+
+def _make_logarithmic(axes: Axes, name: str) -> None:
+    """Make an axis logarithmic with plain numbers at 1, 2, 5, 10, ..."""
+    getattr(axes, f"set_{name}scale")("log")
+    axis = getattr(axes, f"{name}axis")
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ScalarFormatter())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _draw_peaks(figure: Any, found: Posterior) -> None:
+    """Draw the distribution functions of the measured and predicted peaks."""
+    peaks, error = found.peaks, found.likelihood.model.error
+    panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
+    for axes, length, values, more in zip(
+        panels, peaks.lengths, peaks.values, found.predicted, strict=True
+    ):
+        factor, unit = unit_for("1" if peaks.coefficients else "Pa", values)
+        ordered = np.sort(values) * factor
+        steps = (np.arange(ordered.size) + 0.5) / ordered.size
+        levels = np.linspace(0.002, 0.998, 250)
+        axes.plot(np.quantile(more, levels) * factor, levels, color=INK, label="predicted")
+        axes.plot(ordered, steps, "o", color=ACCENT, markersize=3.5, label="measured")
+        if error > 0.0:
+            style = {"fmt": "none", "ecolor": ACCENT, "elinewidth": 0.6, "alpha": 0.6}
+            axes.errorbar(ordered, steps, xerr=error * factor, **style)
+        name = "coefficient of friction" if peaks.coefficients else "peak"
+        axes.set_xlabel(with_unit(name, unit))
+        axes.set_ylabel("share of tests")
+        text = f"{values.size} tests" + ("" if length is None else f", length {length:g} m")
+        axes.set_title(text, fontsize=8, loc="left", color=QUIET)
+        axes.legend()

@@ -1,0 +1,228 @@
+"""A result as one self-contained HTML page: text, figures and tables."""
+
+from __future__ import annotations
+
+import base64
+import io
+import itertools
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import tomli_w
+import xarray as xr
+from matplotlib.figure import Figure
+
+from stiction import __version__, plot
+from stiction.ensemble.files import write_whole
+from stiction.errors import InputError
+from stiction.plot.axes import scaled, shown_quantity
+from stiction.plot.style import PAGE, new_figure, panel, paper_style
+from stiction.results import DIRECTION
+from stiction.statistics.estimates import mean, standard_deviation
+from stiction.statistics.quantiles import quantiles
+from stiction.stored_run import StoredRun
+
+MOST_ROWS = 200
+MOST_FIGURES = 12
+LEVELS = (0.05, 0.5, 0.95)
+
+
+@dataclass
+class Page:
+    """Text, figures, tables and listings in the order in which they are added.
+
+    Attributes
+    ----------
+    title : str
+    parts : list of dict
+    """
+
+    title: str
+    parts: list[dict[str, Any]] = field(default_factory=list)
+
+    def text(self, text: str, *, warning: bool = False) -> None:
+        """Add a paragraph."""
+        self.parts.append({"kind": "text", "text": text, "warning": warning})
+
+    def figure(self, figure: Figure, caption: str) -> None:
+        """Add a figure as a picture."""
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=150)
+        data = base64.b64encode(buffer.getvalue()).decode("ascii")
+        self.parts.append({"kind": "figure", "caption": caption, "data": data})
+
+    def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+        """Add a table; numbers are shown to five digits."""
+        cells = [[shown(entry) for entry in row] for row in rows]
+        self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
+
+    def listing(self, title: str, text: str) -> None:
+        """Add the text of a file."""
+        self.parts.append({"kind": "listing", "title": title, "text": text})
+
+    def html(self) -> str:
+        """Return the page."""
+        environment = jinja2.Environment(
+            loader=jinja2.PackageLoader("stiction"),
+            autoescape=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            undefined=jinja2.StrictUndefined,
+        )
+        return environment.get_template("report.html.j2").render(page=self)
+
+
+def shown(entry: Any) -> str:
+    """Return a table entry as text: numbers to five digits, a dash for what is missing."""
+    if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
+        return "\N{EN DASH}"
+    if isinstance(entry, int | np.integer):
+        return f"{entry:,}"
+    if isinstance(entry, float | np.floating):
+        return f"{entry:.5g}".replace("-", "\N{MINUS SIGN}")
+    return str(entry)
+
+
+def write_report(run: StoredRun, path: Path) -> None:
+    """Write a page about a run: figures, tables, failed samples, the study and versions.
+
+    Raises
+    ------
+    InputError
+        If nothing is stored yet.
+    StoreError
+        If the page cannot be written.
+    """
+    state = run.status()
+    if not state.done:
+        raise InputError(f"{run.path}: no sample is stored yet")
+    names = ["critical_stress", "first_instability", "friction_coefficient", "critical_position"]
+    result = run.dataset(only=[*names, "arrested_events"])
+    dims = [axis.dim for axis in run.study.axes]
+    page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
+    methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.plans))
+    page.text(f"{state.done:,} of {state.samples:,} samples by {methods}.")
+    if not state.complete:
+        page.text("The run is not complete.", warning=True)
+    with paper_style():
+        add_figures(page, result, dims)
+    add_tables(page, result, dims, [name for axis in run.study.axes for name in axis.coordinates])
+    if state.failures:
+        rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
+        page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
+    page.listing("The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict()))
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
+    page.text(
+        f"Computed with stiction {', '.join(run.versions)}; page written with stiction"
+        f" {__version__}, Python {platform.python_version()}, {packages}."
+    )
+    write_whole(path, page.html().encode())
+
+
+def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
+    """Add densities of the onset and, for a sweep, its quantiles.
+
+    The longest axis of a sweep runs along the figure, the next one over curves, others over
+    figures.
+    """
+    what = scaled(result[shown_quantity(result)])[2].partition(" (")[0]
+    if not dims:
+        figure = densities(result, None)
+        page.figure(figure, f"{what.capitalize()} and critical position.")
+        return
+    along, *others = sorted(dims, key=lambda dim: -result.sizes[dim])
+    within, over = others[:1], others[1:]
+    steps = itertools.product(*(range(result.sizes[dim]) for dim in over))
+    for chosen in itertools.islice(steps, MOST_FIGURES):
+        part = result.isel(dict(zip(over, chosen, strict=True)))
+        fixed = _where(part, over)
+        first = part if not within else part.isel({within[0]: 0})
+        page.figure(
+            densities(first, along),
+            f"Densities of the {what} and of the critical position{_where(first, others)}.",
+        )
+        figure = new_figure(0.75 * PAGE, 3.2)
+        plot.quantiles(part, along=along, ax=figure.subplots())
+        page.figure(
+            figure,
+            f"Median of the {what} with its 95 % confidence interval{fixed}; band: between"
+            " quartiles" + ("." if within else ", pale band: between the 5 % and 95 % quantiles."),
+        )
+
+
+def _where(part: xr.Dataset, dims: list[str]) -> str:
+    """Return ' at NAME = VALUE' of what is held fixed."""
+    values = []
+    for dim in dims:
+        factor, unit, _ = scaled(part[dim])
+        value = part[dim].item()
+        number = f"{value * factor:.4g} {unit}".strip() if isinstance(value, float) else value
+        values.append(f"{dim.replace('_', ' ')} = {number}")
+    return f" at {', '.join(values)}" if values else ""
+
+
+def densities(result: xr.Dataset, along: str | None) -> Figure:
+    """Return a figure of the densities of the onset and of its position, along a sweep."""
+    parts = [result[[shown_quantity(result)]]]
+    if DIRECTION in result["critical_position"].dims:
+        place = result[["critical_position"]]
+        parts += [place.sel({DIRECTION: direction}) for direction in result[DIRECTION].values]
+    else:
+        parts.append(result[["critical_position"]])
+    figure = new_figure(PAGE, 2.6 if along is None else 3.0)
+    panels = figure.subplots(1, len(parts))
+    for letter, axes, part in zip("abc", panels, parts, strict=False):
+        (name,) = part.data_vars
+        plot.monte_carlo(part, quantity=str(name), ax=axes)
+        if DIRECTION in part.coords:
+            axes.set_xlabel(f"{axes.get_xlabel()}, {part[DIRECTION].item()}")
+        if legend := axes.get_legend():
+            legend.remove()
+        panel(axes, letter)
+    if along is not None:
+        handles, labels = panels[0].get_legend_handles_labels()
+        title = scaled(result[along])[2]
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, title=title)
+    return figure
+
+
+def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str]) -> None:
+    """Add mean, spread and quantiles of the onset at every point, with errors."""
+    flat = result.stack(point=dims) if dims else result.expand_dims("point")
+    points = range(min(flat.sizes["point"], MOST_ROWS))
+    error = "\N{PLUS-MINUS SIGN}"
+    levels = [f"{100 * level:g} %" for level in LEVELS]
+    columns = [*keys, "samples", "mean", error, "standard deviation", error, *levels]
+    for name in ("critical_stress", "first_instability", "friction_coefficient"):
+        if name not in flat:
+            continue
+        factor, unit, _ = scaled(flat[name])
+        rows = []
+        for point in points:
+            values = flat[name].isel(point=point).values.astype(np.float64) * factor
+            values = values[np.isfinite(values)]
+            row: list[Any] = [*(flat[key].values[point] for key in keys), values.size]
+            if values.size >= 4:
+                for estimate in (mean(values), standard_deviation(values)):
+                    row += [estimate.value, estimate.error]
+                row += list(quantiles(values, LEVELS).value)
+            else:
+                row += [None] * (4 + len(LEVELS))
+            rows.append(row)
+        title = flat[name].attrs["long_name"].capitalize()
+        page.table(f"{title} ({unit})" if unit else title, columns, rows)
+    if "arrested_events" in flat:
+        rows = []
+        for point in points:
+            events = flat["arrested_events"].isel(point=point).values
+            events = events[np.isfinite(events)]
+            share = float(np.mean(events > 0)) if events.size else None
+            rows.append([*(flat[key].values[point] for key in keys), events.size, share])
+        columns = [*keys, "samples", "share of samples with an arrested event"]
+        page.table("Arrested events", columns, rows)

@@ -1,1 +1,0 @@
-"""Figure style, tables and the HTML report."""
