@@ -60,7 +60,7 @@ def step_time(nodes: int, before: int = 100, count: int = 1000) -> float:
 
 def fft_time(nodes: int) -> float:
     """Four real transforms, us: the floor together with one pass over the memory."""
-    from stiction._jit import jit
+    from stiction.jit import jit
 
     @jit
     def transforms(values, count):

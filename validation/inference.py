@@ -16,7 +16,7 @@ import numpy as np
 import scipy.stats
 
 import stiction as st
-from stiction._progress import SILENT
+from stiction.progress import SILENT
 from stiction.inference.grid import on_grid
 from stiction.inference.likelihood import make_likelihood, make_model
 from stiction.inference.onset_table import simulate

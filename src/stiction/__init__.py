@@ -42,7 +42,7 @@ _HOMES = {
     "misfit": "dynamics.misfit",
     "RuptureMisfit": "dynamics.compared",
     "read_profile": "profiles",
-    "onset": "evaluation",
+    "onset": "methods",
     "monte_carlo": "ensemble.monte_carlo",
     "nucleation_statistics": "statistics.moments",
     "nucleation_limits": "statistics.moments",

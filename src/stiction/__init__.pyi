@@ -32,7 +32,6 @@ from stiction.errors import (
 from stiction.errors import (
     UnitWarning as UnitWarning,
 )
-from stiction.evaluation import onset as onset
 from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
 from stiction.friction.linear import LinearWeakening as LinearWeakening
 from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
@@ -50,6 +49,7 @@ from stiction.load import Load as Load
 from stiction.merge import (
     merge_parts as merge_parts,
 )
+from stiction.methods import onset as onset
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
 from stiction.random.custom_spectrum import CustomSpectrum as CustomSpectrum

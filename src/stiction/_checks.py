@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction._model import describe, real_array, whole
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import describe, real_array, whole
 
 MOST_SAMPLES = 10**10
 LAST_SAMPLE = 2**62

@@ -1,10 +1,5 @@
-"""Types of arrays: numpy's element types change their names between releases, so Array has none."""
+import sys
 
-from __future__ import annotations
+import stiction.arrays
 
-from typing import Any, TypeAlias
-
-from numpy.typing import NDArray
-
-Array: TypeAlias = NDArray[Any]
-"""Array of floats, double precision unless said otherwise."""
+sys.modules[__name__] = stiction.arrays

@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from stiction._model import describe
 from stiction.errors import InputError, unknown_name
+from stiction.model import describe
 from stiction.random.marginals import ScipyMarginal
 from stiction.random.random_interface import RandomInterface
 

@@ -17,10 +17,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._netcdf import write_dataset
-from stiction._progress import Meter
 from stiction.ensemble.files import cannot_write
 from stiction.errors import InputError, warn_accuracy
+from stiction.files import write_dataset
+from stiction.progress import Meter
 from stiction.results import DIRECTION
 
 ROWS = 2**14

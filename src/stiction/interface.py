@@ -8,10 +8,9 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 
-from stiction._fft import inverse_transform, transform
-from stiction._model import _count, _number, model
-from stiction._typing import Array
+from stiction.arrays import Array, inverse_transform, transform
 from stiction.errors import InputError
+from stiction.model import _count, _number, model
 
 FEWEST = 8
 MOST = 2**24

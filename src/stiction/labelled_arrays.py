@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from stiction._model import real_array
 from stiction.errors import InputError, unknown_name
+from stiction.model import real_array
 from stiction.profile_nodes import Points
 from stiction.quantities import (
     OF_A_PLANE,

@@ -9,7 +9,10 @@ import numpy as np
 import pydantic
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
-from stiction._model import (
+from stiction.arrays import Array
+from stiction.errors import InputError, unknown_name
+from stiction.interface import Interface
+from stiction.model import (
     _PROFILE_SCHEMA,
     OptionalProfile,
     Positive,
@@ -20,9 +23,6 @@ from stiction._model import (
     is_unplaced,
     model,
 )
-from stiction._typing import Array
-from stiction.errors import InputError, unknown_name
-from stiction.interface import Interface
 
 Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
 NotNegative = Annotated[Real, Field(ge=0.0)]

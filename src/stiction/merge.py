@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from stiction._checks import as_path, check_progress
-from stiction._progress import Meter, Show
 from stiction.ensemble.manifest import refuse_another
 from stiction.ensemble.part import Part, part_of_name
 from stiction.ensemble.store import Store
 from stiction.ensemble.store_writer import writing
 from stiction.errors import StoreError, warn_user
+from stiction.progress import Meter, Show
 from stiction.stored_run import StoredRun, folder_beside
 from stiction.study.study import Study
 from stiction.study_run import check_target, parts_folder, write_result

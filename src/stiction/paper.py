@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from stiction._checks import check_instance, is_finite
-from stiction._model import describe
 from stiction.errors import InputError
 from stiction.friction.linear import LinearWeakening
 from stiction.interface import Interface
+from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import FEWEST, Interface
 from stiction.labelled_arrays import labelled

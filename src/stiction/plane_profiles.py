@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction._model import describe, real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.model import describe, real_array
 from stiction.profile_files import NETCDF, TEXT, decoded, read_netcdf, read_npy
 from stiction.profile_text import Table, read_table
 from stiction.quantities import Map, check_only, choose, converted, factor_of

@@ -10,12 +10,12 @@ import numpy as np
 from pydantic import model_validator
 
 from stiction._checks import as_names, is_real
-from stiction._model import Mode, describe, is_unplaced, model
 from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
 from stiction.friction import Friction
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.load import Load
+from stiction.model import Mode, describe, is_unplaced, model
 from stiction.placed import on_nodes
 from stiction.sample import (
     PROFILES,

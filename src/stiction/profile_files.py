@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.units import parse
 
 _EMPTY = {"", "nan", "na", "n/a", "null", "none", "-", "--"}

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stiction._model import describe, real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
+from stiction.model import describe, real_array
 from stiction.plane_gaps import close_gaps
 from stiction.plane_profiles import on_plane, read_plane
 from stiction.profile_files import ENDINGS, NETCDF, TEXT, decoded, read_netcdf, read_npy

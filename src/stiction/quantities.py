@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stiction._model import describe, real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, warn_user
+from stiction.model import describe, real_array
 from stiction.plausible import is_strength, warn_of_mapped
 from stiction.units import factor_to, parse
 

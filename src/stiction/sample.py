@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction._model import real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.model import real_array
 from stiction.profile_nodes import describe_gaps
 from stiction.profiles import at_nodes
 from stiction.results import Variable

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from stiction._checks import check_choice, is_finite
-from stiction._model import Mode, Positive, _number, describe, model
 from stiction.errors import InputError, UnitWarning, warn_user
+from stiction.model import Mode, Positive, _number, describe, model
 
 SLOWEST, FASTEST = 0.3, 2e4
 """m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""

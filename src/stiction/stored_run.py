@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._brief import brief, brief_html
 from stiction._checks import as_path
-from stiction._model import describe
-from stiction._netcdf import DamagedError, read_dataset
 from stiction.ensemble.assemble import Gathered
 from stiction.ensemble.chunk import ROWS, stored_samples
 from stiction.ensemble.manifest import MANIFEST
@@ -25,6 +21,8 @@ from stiction.ensemble.store import Store, is_active
 from stiction.ensemble.work import Failure
 from stiction.errors import InputError, StoreError
 from stiction.export import check_suffix, export
+from stiction.files import DamagedError, read_dataset
+from stiction.model import brief, describe
 from stiction.study.study import Study
 
 FAILED = "failed_samples"
@@ -63,7 +61,6 @@ class Status:
     active: bool
 
     __repr__ = brief
-    _repr_html_ = brief_html
 
     @property
     def complete(self) -> bool:
@@ -106,9 +103,6 @@ class StoredRun:
         points = len(self.study.plans)
         each = f"{points} points of " if points > 1 else ""
         return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{html.escape(repr(self))}</p>{brief_html(self.status(verify=False))}"
 
     def status(self, *, verify: bool = True) -> Status:
         """How far it is.

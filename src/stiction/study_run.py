@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from stiction._checks import as_path
-from stiction._progress import Show
 from stiction.ensemble.files import cannot_write
 from stiction.ensemble.manifest import MANIFEST, refuse_another
 from stiction.ensemble.monte_carlo import check_run
@@ -23,6 +22,7 @@ from stiction.ensemble.store_writer import empty, prepare_folder, writing
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome
 from stiction.errors import StoreError
+from stiction.progress import Show
 from stiction.results import DIRECTION
 from stiction.stored_run import FAILED, StoredRun, folder_beside, read_result
 from stiction.study.study import Study

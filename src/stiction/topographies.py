@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.quantities import mapped_by
 from stiction.units import factor_to

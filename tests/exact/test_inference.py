@@ -7,13 +7,13 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction._progress import SILENT
 from stiction.inference.affine import find_affine
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import on_grid
 from stiction.inference.likelihood import make_likelihood, make_model
 from stiction.inference.onset_table import simulate
 from stiction.inference.prior import make_prior
+from stiction.progress import SILENT
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 

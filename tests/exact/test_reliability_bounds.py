@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import binom, nbinom
 
 import stiction as st
-from stiction._progress import SILENT
+from stiction.progress import SILENT
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
 from stiction.reliability.plain_monte_carlo import Count, count_failures, tally

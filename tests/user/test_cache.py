@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stiction._jit import jit
+from stiction.jit import jit
 
 SOURCES = Path(__file__).parents[2] / "src"
 
@@ -30,7 +30,7 @@ def run(code, source, cache):
 
 def test_an_edit_of_any_file_is_another_folder(tmp_path):
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
-    code = "import stiction._jit as j; print(j._FOLDER)"
+    code = "import stiction.jit as j; print(j._FOLDER)"
     copy = tmp_path / "src"
     shutil.copytree(SOURCES / "stiction", copy / "stiction")
     before = Path(run(code, copy, tmp_path / "cache"))
@@ -58,7 +58,7 @@ def test_kernels_are_kept_where_that_is_possible(tmp_path, writable):
 OWN_LAW = """
 from typing import NamedTuple
 import numpy as np
-from stiction._jit import jit
+from stiction.jit import jit
 from stiction.friction import kernels
 
 class OwnParameters(NamedTuple):

@@ -11,9 +11,8 @@ import xarray as xr
 from small_study import small_study
 
 import stiction as st
-from stiction._cache import private_folder
-from stiction._netcdf import write_dataset
 from stiction.ensemble import files
+from stiction.files import private_folder, write_dataset
 
 STUDY = small_study(
     nodes=64, weakening_rate=0.1e12, correlation_length=0.02, ensemble={"samples": 40, "seed": 3}

@@ -7,11 +7,11 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
-from stiction._archive import UNREADABLE, read_arrays
 from stiction.dynamics import monitor
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.stream import open_rupture
 from stiction.elasticity.kernel_cache import KernelCache
+from stiction.files import UNREADABLE, read_arrays
 
 NODES = 128
 PROBLEM = st.Problem(

@@ -10,9 +10,9 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import stiction as st
-from stiction._progress import Meter
 from stiction.cli.app import app
 from stiction.inference import bootstrap
+from stiction.progress import Meter
 
 ROOT = Path(__file__).parents[2]
 FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True)

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction._jit import jit
-from stiction._model import model
 from stiction.friction.kernels import register
 from stiction.friction.law import FrictionLaw
+from stiction.jit import jit
+from stiction.model import model
 
 EXPONENTIAL = st.ExponentialWeakening(weakening_rate=0.5e12)
 DUAL = st.PiecewiseWeakening(slip=[0.05, 1.0], strength=[0.8, 0.0], weakening_rate=0.5e12)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction import _progress
-from stiction._progress import Meter, Portions, TimeUp
+from stiction import progress
+from stiction.progress import Meter, Portions, TimeUp
 
 
 class Terminal(io.StringIO):
@@ -25,9 +25,9 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def hasty(monkeypatch):
     """The same waits, a hundred times shorter."""
-    monkeypatch.setattr(_progress, "AFTER", 0.02)
-    monkeypatch.setattr(_progress, "LONG", 0.1)
-    monkeypatch.setattr(_progress, "TICK", 0.005)
+    monkeypatch.setattr(progress, "AFTER", 0.02)
+    monkeypatch.setattr(progress, "LONG", 0.1)
+    monkeypatch.setattr(progress, "TICK", 0.005)
 
 
 def work(meter, seconds, pieces):
@@ -55,7 +55,7 @@ def test_a_pipe_gets_few_lines_with_an_estimate_first(hasty, capsys):
 
 
 def test_work_foreseen_to_be_short_does_not_reach_a_pipe(hasty, monkeypatch, capsys):
-    monkeypatch.setattr(_progress, "LONG", 5.0)
+    monkeypatch.setattr(progress, "LONG", 5.0)
     work(Meter("brief", 10), 0.1, 10)
     assert capsys.readouterr().err == ""
 
@@ -103,7 +103,7 @@ def test_only_one_speaks(hasty, capsys):
         work(Meter("inner", 100), 0.4, 100)
     lines = capsys.readouterr().err.splitlines()
     assert any(line.startswith("inner: ") for line in lines)
-    assert not _progress._speakers
+    assert not progress._speakers
 
 
 def test_it_ends_with_an_error_too(hasty):
@@ -116,7 +116,7 @@ def test_it_ends_with_an_error_too(hasty):
     with pytest.raises(ValueError, match="as it may"):
         failing()
     assert threading.active_count() == before
-    assert not _progress._speakers
+    assert not progress._speakers
 
 
 def test_portions_cover_all_rows_and_follow_their_pace(monkeypatch):
@@ -205,7 +205,7 @@ def test_failure_probability_at_any_moment_when_time_is_up(system, algorithm, mo
     """Wherever the time ends, the answer is one, with an interval that holds the truth."""
     from stiction.reliability import estimate
 
-    monkeypatch.setattr(_progress, "PORTION", 0.01)
+    monkeypatch.setattr(progress, "PORTION", 0.01)
     known = 0
     for looks in (0, 1, 2, 3, 5, 8, 12, 20, 30, 50):
         monkeypatch.setattr(estimate, "Meter", lambda *a, looks=looks, **b: Watched(looks))
@@ -224,7 +224,7 @@ def test_failure_probability_at_any_moment_when_time_is_up(system, algorithm, mo
 def test_design_stress_and_curve_when_time_is_up(system, monkeypatch):
     from stiction.reliability import design
 
-    monkeypatch.setattr(_progress, "PORTION", 0.01)
+    monkeypatch.setattr(progress, "PORTION", 0.01)
     for looks in (0, 1, 3, 8, 20):
         monkeypatch.setattr(design, "Meter", lambda *a, looks=looks, **b: Watched(looks))
         with pytest.warns(st.AccuracyWarning, match="raise time_limit"):
@@ -246,8 +246,8 @@ def test_design_stress_and_curve_when_time_is_up(system, monkeypatch):
 
 
 def test_simulations_and_onsets_speak_too(hasty, system, capsys, monkeypatch):
-    monkeypatch.setattr(_progress, "AFTER", 0.0)  # with its kernels compiled it is a matter of .1 s
-    monkeypatch.setattr(_progress, "LONG", 0.01)
+    monkeypatch.setattr(progress, "AFTER", 0.0)  # with its kernels compiled it is a matter of .1 s
+    monkeypatch.setattr(progress, "LONG", 0.01)
     problem, field = system
     profiles = field.profiles(problem.interface, field.draws(problem.interface, 200, 0))
     told = []
@@ -276,7 +276,7 @@ def test_time_up_says_how_much_was_spent():
 def test_forks_and_exits_cleanly():
     """A thread that shows progress must not keep a process alive."""
     code = (
-        "import time; from stiction._progress import Meter\n"
+        "import time; from stiction.progress import Meter\n"
         "Meter('left open').start(); time.sleep(0.1)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._progress import Meter, duration
 from stiction.cli.common import StudyFile, echo, writable
 from stiction.cli.profile import (
     FillGaps,
@@ -21,6 +20,7 @@ from stiction.cli.profile import (
     profile_of,
 )
 from stiction.errors import InputError
+from stiction.progress import Meter, duration
 
 COLUMNS = ("method", "critical stress", "critical load", "first instability", "position", "time")
 
@@ -110,7 +110,7 @@ def onset(
 def _methods(own: Any, names: list[str] | None, loading_rate: float) -> list[Any]:
     """The methods to ask: the study's own as it is, the others with their defaults."""
     from stiction.errors import unknown_name
-    from stiction.evaluation import methods
+    from stiction.methods import methods
 
     classes = methods()
     unknown = [
@@ -143,7 +143,7 @@ def _with_maps(method: Any) -> Any:
 
 
 def _ask(problem: Any, profile: Any, method: Any) -> tuple[Any, float]:
-    from stiction.evaluation import onset as ask
+    from stiction.methods import onset as ask
 
     begin = time.perf_counter()
     result = ask(problem, profile, method=method)

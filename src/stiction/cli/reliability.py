@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from stiction._progress import Meter
 from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, writable_folder
 from stiction.errors import InputError
+from stiction.progress import Meter
 
 Event = Literal["critical_stress", "first_instability"]
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from stiction._progress import Meter, duration
 from stiction.cli.common import RunPath, echo, size, writable
+from stiction.progress import Meter, duration
 
 SHOWN = 20
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from stiction._progress import Meter
 from stiction.cli.common import StudyFile, echo, writable_folder
 from stiction.cli.profile import (
     FillGaps,
@@ -19,6 +18,7 @@ from stiction.cli.profile import (
     XUnit,
     profile_of,
 )
+from stiction.progress import Meter
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction._progress import Meter, duration
 from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, size, summary
 from stiction.errors import InputError
+from stiction.progress import Meter, duration
 
 SHOWN = 12
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.sample import Sample

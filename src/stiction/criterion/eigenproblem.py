@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 from scipy.special import jv
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 TERMS = 40
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
 from stiction.elasticity.transform_operator import make_operator
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.eigenproblem import Weight
 
 EDGE = 16  # nodes at either end whose weights are fitted; samples of g are exact further in

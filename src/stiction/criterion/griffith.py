@@ -7,9 +7,9 @@ from typing import Any, overload
 import numpy as np
 
 from stiction._checks import check_instance, is_finite
-from stiction._model import describe, real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import describe, real_array
 from stiction.problem import Problem
 
 POINTS = 512

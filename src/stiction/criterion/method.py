@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from stiction._model import model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.assumptions import excess_of, refused_laws, uniform_rates, warn_if_coarse
 from stiction.criterion.moving_average import minimum_rows
 from stiction.criterion.nucleation import Weights, multiplier_of
 from stiction.criterion.plane import PlaneSolver, own_variables
+from stiction.model import model
 from stiction.problem import Problem
 from stiction.results import Variable, onset_variables
 from stiction.sample import Sample

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 
 @jit

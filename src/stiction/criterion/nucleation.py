@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stiction._checks import check_choice, check_instance, is_real
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.assumptions import (
     check_law,
     excess_of,
@@ -20,6 +19,7 @@ from stiction.criterion.grid_weights import grid_weights, transform
 from stiction.criterion.moving_average import average_rows
 from stiction.criterion.plane import plane_nucleation_stress
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.problem import Problem
 
 Weights = Literal["exact", "rounded"]

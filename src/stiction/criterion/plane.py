@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.assumptions import check_law, excess_of, uniform_rates, warn_if_coarse
 from stiction.criterion.ellipse_windows import (
     EllipseWindow,

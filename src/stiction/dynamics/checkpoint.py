@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._archive import UNREADABLE, read_arrays, write_atomically
 from stiction.dynamics import monitor
 from stiction.dynamics.integrator import Run, State
 from stiction.errors import InputError
+from stiction.files import UNREADABLE, read_arrays, write_arrays
 
 FORMAT = 6
 
@@ -85,7 +85,7 @@ def write_checkpoint(path: str | Path, run: Run, state: State) -> None:
     arrays |= {f"run_{name}": value for name, value in identity(run).items()}
     arrays |= {f"state_{f.name}": getattr(state, f.name) for f in dataclasses.fields(State)}
     try:
-        write_atomically(Path(path), arrays)
+        write_arrays(Path(path), arrays)
     except OSError as error:
         raise OSError(f"checkpoint: cannot write {str(path)!r} ({error})") from error
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction._checks import as_path
-from stiction._model import Count, model
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.misfit import misfit, read_record
 from stiction.dynamics.simulate import simulate_rupture
+from stiction.model import Count, model
 from stiction.problem import Problem
 from stiction.results import Variable
 from stiction.sample import Sample

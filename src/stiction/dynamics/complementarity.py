@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics.arrays import ImplicitTables, Setting
 from stiction.elasticity.compiled_transform import Transform, backward, forward
 from stiction.friction.kernels import line_at, strength_at
+from stiction.jit import jit
 
 
 @jit

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import ExplicitTables, Fields, Grid, Setting
 from stiction.dynamics.finish import Taken, arrived, finish_step
@@ -15,6 +14,7 @@ from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory_layout import advance_memory, pack
 from stiction.elasticity.compiled_transform import backward, forward
 from stiction.friction.kernels import strength_at
+from stiction.jit import jit
 
 
 @jit

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import Fields, Setting
 from stiction.dynamics.scale import follow_scale
+from stiction.jit import jit
 
 
 class Taken(NamedTuple):

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import Fields, Grid, ImplicitTables, Setting
 from stiction.dynamics.complementarity import solve_increment
@@ -16,6 +15,7 @@ from stiction.dynamics.implicit_tables import carry, remember, tabulate
 from stiction.dynamics.loading import load_at
 from stiction.elasticity.compiled_transform import backward, forward
 from stiction.friction.kernels import strength_at
+from stiction.jit import jit
 
 _ROUND_OFF = 1e-14  # of the largest stress: what a few transforms leave, ten times over
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics.arrays import Grid, ImplicitTables
 from stiction.dynamics.memory_layout import LANES, blocks, pack, rooms, zeros
+from stiction.jit import jit
 
 
 @jit

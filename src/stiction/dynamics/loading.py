@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import jit
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.jit import jit
+from stiction.model import describe
 
 Floats = NDArray[np.float64]
 History = tuple[Floats, Floats]

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics.arrays import ExplicitTables, Grid, Ints, Spectrum
 from stiction.dynamics.courant_limit import phi
+from stiction.jit import jit
 
 LANES = 64
 LINE = 64  # bytes of a cache line

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
-from stiction._model import Count, Positive, _number, model
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import Nodes, Setting
 from stiction.dynamics.checks import (
@@ -29,6 +28,7 @@ from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.law import FrictionLaw
+from stiction.model import Count, Positive, _number, model
 from stiction.problem import SMALLEST_EIGENVALUE, Problem
 from stiction.results import Variable, onset_variables
 from stiction.sample import Sample, steepest_rate

@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from stiction._checks import as_path, check_flag, check_instance
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.profile_files import decoded
 from stiction.profile_text import read_table
 from stiction.units import factor_to

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 # Fields of the `watch` array: plain float64, so that compiled steps and checkpoints share it.
 TIME, LOAD, WORK, MEAN_STRESS = 0, 1, 2, 3  # s, Pa, J/m, Pa

@@ -9,9 +9,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from stiction._checks import as_path, is_finite, is_whole
-from stiction._model import describe
 from stiction.dynamics.method import Rupture
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.problem import Problem
 
 Stop = Literal["sliding", "onset", "rest", "runaway", "time"]

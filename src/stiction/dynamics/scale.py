@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import Nodes
 from stiction.dynamics.loading import History, load_at
+from stiction.jit import jit
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
 

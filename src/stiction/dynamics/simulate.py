@@ -12,8 +12,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._checks import refusals
-from stiction._model import describe, real_array, to_plain
-from stiction._progress import Meter
 from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.checks import (
@@ -40,8 +38,10 @@ from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
+from stiction.model import describe, real_array, to_plain
 from stiction.problem import Problem
 from stiction.profiles import at_nodes
+from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
 from stiction.sample import named_profiles
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import is_finite
-from stiction._model import describe
 from stiction.dynamics import monitor
 from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.model import describe
 from stiction.results import Variable
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rocket_fft import c2c, c2r, r2c
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 
 class Transform(NamedTuple):

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
 from stiction.elasticity.transform_operator import Operator, filtered, product
+from stiction.jit import jit
 
 SOLVED = 0
 NEGATIVE = 1

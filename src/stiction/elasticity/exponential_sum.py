@@ -16,7 +16,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._blas import one_blas_thread
+from stiction.arrays import one_blas_thread
 from stiction.elasticity.memory_kernels import arc_quadrature, exponential_sum
 from stiction.errors import InputError
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stiction._jit import jit
-from stiction._lanes import LANES, add, load, multiply_add, total, zeros
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
+from stiction.lanes import LANES, add, load, multiply_add, total, zeros
 
 
 @jit

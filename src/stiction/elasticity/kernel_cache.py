@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction._archive import UNREADABLE, read_arrays, write_atomically
-from stiction._cache import cache_folder
 from stiction.elasticity.exponential_sum import ExponentialSum, fit_exponentials
+from stiction.files import UNREADABLE, cache_folder, read_arrays, write_arrays
 
 logger = logging.getLogger("stiction")
 
@@ -66,7 +65,7 @@ class KernelCache:
 
     def _write(self, path: Path, kernel: ExponentialSum) -> None:
         try:
-            write_atomically(path, vars(kernel))
+            write_arrays(path, vars(kernel))
         except OSError as error:
             if not self._said:
                 self._said = True

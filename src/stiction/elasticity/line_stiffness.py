@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import ZERO, jit
-from stiction._lanes import multiply_add
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import ZERO, jit
+from stiction.lanes import multiply_add
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:

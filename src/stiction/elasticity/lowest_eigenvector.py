@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import Mask, add_scaled, cut, inner
 from stiction.elasticity.transform_operator import Operator, filtered, product
+from stiction.jit import jit
 
 
 @jit

@@ -16,10 +16,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, PlainSerializer
 
-from stiction._model import Count, Flag, Positive, model
-from stiction._progress import Meter
 from stiction.ensemble.versions import versions
 from stiction.errors import InputError, WorkerError
+from stiction.model import Count, Flag, Positive, model
+from stiction.progress import Meter
 
 INSTALL = 'python -m pip install "stiction[distributed]"'
 SCHEDULER_SECONDS = 60.0

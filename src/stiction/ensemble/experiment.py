@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import refusals
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.evaluation import Values, accepted, check_method, solve, variables_of
+from stiction.methods import Values, accepted, check_method, solve, variables_of
+from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.coefficients import (
     in_stress,

@@ -18,9 +18,8 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._files import write_atomically
-from stiction._netcdf import ONE_AT_A_TIME
 from stiction.errors import StoreError
+from stiction.files import ONE_AT_A_TIME, write_atomically
 from stiction.results import Variable
 
 Arrays = dict[str, NDArray[Any]]

@@ -20,8 +20,6 @@ from stiction._checks import (
     refusals,
     too_many_samples,
 )
-from stiction._model import describe, names_to_keep, to_plain, whole
-from stiction._progress import Meter, Show, check_time_limit
 from stiction.ensemble.assemble import Gathered, GridAxis
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import differing_in
@@ -34,8 +32,10 @@ from stiction.errors import (
     warn_accuracy,
     warn_user,
 )
-from stiction.evaluation import Method, check_method
+from stiction.methods import Method, check_method
+from stiction.model import describe, names_to_keep, to_plain, whole
 from stiction.problem import Problem
+from stiction.progress import Meter, Show, check_time_limit
 from stiction.random.coefficients import in_stress, mean_in_stress
 from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField

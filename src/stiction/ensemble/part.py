@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import is_whole
-from stiction._model import describe
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.random.draws import BLOCK
 
 FEWEST_BLOCKS = 8

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
-from stiction.evaluation import Method, Values, accepted, solve, variables_of
+from stiction.arrays import Array
+from stiction.methods import Method, Values, accepted, solve, variables_of
 from stiction.problem import Problem
 from stiction.random.coefficients import profiles_in_stress
 from stiction.random.draws import block_of

@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
 
-from stiction._progress import Meter, Show
 from stiction.ensemble.monte_carlo import method_name, warn_of_fields
 from stiction.ensemble.part import Part
 from stiction.ensemble.plan import Plan
@@ -15,6 +14,7 @@ from stiction.ensemble.scheduler import share_out, usable_cores
 from stiction.ensemble.store_writer import StoreWriter
 from stiction.ensemble.work import Failure, Outcome
 from stiction.errors import InputError
+from stiction.progress import Meter, Show
 
 FLUSH_SECONDS = 1.0
 FLUSH_BYTES = 32 * 2**20

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from contextlib import ExitStack, suppress
 from typing import Any, NamedTuple
 
-from stiction._blas import one_blas_thread
+from stiction.arrays import one_blas_thread
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.versions import versions
 from stiction.ensemble.work import Outcome, do_work, process_mark

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._files import PART
 from stiction.ensemble.chunk import Chunk, DamagedChunk, Table, joined, mark_of, tables_of
 from stiction.ensemble.files import Lock, NoLock, cannot_write, printable, read_whole, write_whole
 from stiction.ensemble.manifest import (
@@ -26,6 +25,7 @@ from stiction.ensemble.manifest import (
 from stiction.ensemble.store import CHUNKS, LIST, LOCK, OWN, Store, sealed, warn_of_damage
 from stiction.ensemble.work import Outcome
 from stiction.errors import StoreError
+from stiction.files import PART, final_name
 from stiction.results import Variable
 
 MANY = 64
@@ -68,7 +68,7 @@ class StoreWriter(Store):
         except OSError as error:
             raise StoreError(f"{folder}: cannot be read: {error}") from error
         for name in names:
-            if name.endswith(PART) and OWN.fullmatch(name.removesuffix(PART)):
+            if name.endswith(PART) and OWN.fullmatch(final_name(name)):
                 (folder / name).unlink(missing_ok=True)
         bad: dict[Chunk, DamagedChunk] = {}
         for chunk in self.chunks:
@@ -303,7 +303,10 @@ def prepare_folder(path: Path) -> None:
         raise StoreError(f"{path}: the folder {path.absolute().parent} does not exist")
     try:
         path.mkdir(exist_ok=True)
-        others = {entry.name for entry in path.iterdir()} - {LOCK, f"{MANIFEST}{PART}"}
+        names = {entry.name for entry in path.iterdir()} - {LOCK}
+        others = {
+            name for name in names if final_name(name) == name or final_name(name) != MANIFEST
+        }
     except OSError as error:
         raise cannot_write(path, error) from error
     if others and MANIFEST not in others and not (LIST in others or _marks_of_chunks(path)):
@@ -319,7 +322,7 @@ def empty(path: Path) -> None:
     folder = path / CHUNKS
     (path / LIST).unlink(missing_ok=True)
     for file in folder.iterdir():
-        if OWN.fullmatch(file.name.removesuffix(PART)):
+        if OWN.fullmatch(final_name(file.name)):
             file.unlink()
     with suppress(OSError):  # somebody else's files are in it
         folder.rmdir()

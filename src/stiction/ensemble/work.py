@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from stiction.ensemble.plan import Plan, chunks, compute
 from stiction.ensemble.versions import refuse_other_versions
 from stiction.errors import InputError
-from stiction.evaluation import Values
+from stiction.methods import Values
 
 
 class Failure(NamedTuple):

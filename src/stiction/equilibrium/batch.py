@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import ZERO, jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.instability_jump import UNDECIDED, griffith_length
 from stiction.equilibrium.linear_program import solve_program
@@ -14,6 +13,7 @@ from stiction.equilibrium.pieces import AT_CORNER, Pieces
 from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.window_bound import Windows, window_bound
 from stiction.equilibrium.workspace import Grid, Sample, Workspace, make_sample, make_workspace
+from stiction.jit import ZERO, jit
 
 LOAD, GAP, PATCHES, POSITION, LENGTH, OUTCOME = range(6)
 COLUMNS = 6

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._lanes import LANES, load, multiply_add, totals, zeros
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
+from stiction.jit import jit
+from stiction.lanes import LANES, load, multiply_add, totals, zeros
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.instability_jump import (
     ARRESTED,
     SLIDING,

@@ -9,8 +9,7 @@ both sides of the turning point, and mu tells which load they belong to.
 
 from __future__ import annotations
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import (
     EXHAUSTED,
     NEGATIVE,
@@ -21,6 +20,7 @@ from stiction.elasticity.conjugate_gradients import (
     solve_inside,
 )
 from stiction.elasticity.transform_operator import Operator
+from stiction.jit import jit
 
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""

@@ -9,10 +9,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._checks import check_instance
-from stiction._model import to_plain
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.plane_path import plane_jumps
 from stiction.equilibrium.solver import Solver
+from stiction.model import to_plain
 from stiction.problem import Problem
 from stiction.results import Variable, coordinate, position, to_dataset
 from stiction.sample import Sample

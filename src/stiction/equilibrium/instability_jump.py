@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import ZERO, jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward
 from stiction.equilibrium.linear_program import (
@@ -23,6 +22,7 @@ from stiction.equilibrium.linear_program import (
 )
 from stiction.equilibrium.pieces import AT_CORNER, piece_at, start_of
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Sample, Workspace, make_workspace
+from stiction.jit import ZERO, jit
 
 SLIDING = 0
 ARRESTED = 1

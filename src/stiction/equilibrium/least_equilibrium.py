@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import (
     EXHAUSTED,
     NEGATIVE,

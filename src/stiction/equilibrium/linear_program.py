@@ -9,11 +9,11 @@ there. A load that is an upper bound and has an equilibrium is the critical one.
 
 from __future__ import annotations
 
-from stiction._jit import ZERO, jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Workspace
+from stiction.jit import ZERO, jit
 
 SOLVED = 0
 STALLED = 1

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
 from stiction.equilibrium.linear_program import OVERSTRESS, PIVOT, SOLVED, STALLED, solve_program
 from stiction.equilibrium.segments import Segments

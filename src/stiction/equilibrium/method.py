@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
-from stiction._model import Real, _count, model
 from stiction.equilibrium.pieces import pieces_of, refused
 from stiction.equilibrium.plane_solver import PlaneSolver
 from stiction.equilibrium.solver import Solver
+from stiction.model import Real, _count, model
 from stiction.problem import Problem
 from stiction.results import Variable, along, onset_variables, position
 from stiction.sample import Sample as Samples

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import SOLVED, Mask, residual_of, solve_inside
 from stiction.elasticity.transform_operator import Operator, product
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import NEGATIVE, SOLVED
 from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
 from stiction.elasticity.transform_operator import Operator, make_operator

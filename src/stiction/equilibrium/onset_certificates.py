@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.transform_operator import Operator, filtered, product
+from stiction.jit import jit
 
 
 @jit

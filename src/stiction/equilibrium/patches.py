@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 
 @jit

@@ -9,14 +9,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction._checks import check_instance, check_memory
-from stiction._model import real_array, to_plain
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.continuation import State, at_rest, exceeds, follow
 from stiction.equilibrium.plane_path import plane_equilibria
 from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample
 from stiction.errors import InputError
+from stiction.model import real_array, to_plain
 from stiction.problem import Problem
 from stiction.results import Variable, along, coordinate, to_dataset
 from stiction.sample import Sample as Samples

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.friction.kernels import registered
 from stiction.friction.law import FrictionLaw
 from stiction.friction.linear import Linear
 from stiction.friction.piecewise import Polygon
+from stiction.jit import jit
 
 AT_CORNER = 1.0 - 1e-12
 """Share of the slip at a corner from which a node counts as beyond it."""

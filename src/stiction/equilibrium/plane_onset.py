@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.transform_operator import stiffness_symbol
 from stiction.equilibrium.onset_bracket import Bracket, bisect, make_bracket
 from stiction.equilibrium.turning_point import close

@@ -13,7 +13,7 @@ from scipy.ndimage import label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 Mask = NDArray[np.bool_]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.follow_plane import PlaneEvent, follow_plane, plane_slip_at
 from stiction.equilibrium.least_equilibrium import SLIDING, UNDECIDED
 from stiction.equilibrium.plane_onset import symbol_of

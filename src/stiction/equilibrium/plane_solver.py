@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium import discretization
 from stiction.equilibrium.follow_plane import PlanePath, first_instability, follow_plane
 from stiction.equilibrium.least_equilibrium import AT_RESIDUAL, SLIDING, PlaneSample

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
 from stiction.equilibrium.batch import certificate, start_from_bound
 from stiction.equilibrium.instability_jump import griffith_length

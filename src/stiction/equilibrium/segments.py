@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.cholesky import append, back_substitute, row_start, substitute
 from stiction.equilibrium.linear_program import PIVOT
+from stiction.jit import jit
 
 
 @jit

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._lanes import multiply_add
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.instability_jump import (
     SLIDING,
@@ -24,6 +22,8 @@ from stiction.equilibrium.instability_jump import (
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.pieces import AT_CORNER
 from stiction.equilibrium.workspace import Sample
+from stiction.jit import jit
+from stiction.lanes import multiply_add
 
 STEPS = 30
 """Elastic steps; most samples need five to eight."""

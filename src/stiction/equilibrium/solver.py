@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
 from stiction.equilibrium import batch, discretization
 from stiction.equilibrium.batch import solve_batch

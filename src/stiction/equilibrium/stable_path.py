@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import ZERO, jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import apply_stiffness
 from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
 from stiction.equilibrium.linear_program import PIVOT, singular_direction, solve_forward
 from stiction.equilibrium.pieces import piece_at, start_of
 from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Sample, Workspace
+from stiction.jit import ZERO, jit
 
 REACHED = 0
 UNSTABLE = 1

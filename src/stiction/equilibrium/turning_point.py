@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
 from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
 from stiction.equilibrium.controlled_equilibrium import equilibrate

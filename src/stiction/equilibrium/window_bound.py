@@ -15,10 +15,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
 from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.jit import jit
 from stiction.problem import SMALLEST_EIGENVALUE
 
 GROWTH = 1.04

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.fft
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.elasticity.line_stiffness import coupling_strip
 from stiction.equilibrium.instability_jump import SLIDING, jump
 from stiction.equilibrium.patches import main_patch

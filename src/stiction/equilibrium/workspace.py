@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.equilibrium.cholesky import row_start
 from stiction.equilibrium.pieces import Pieces
+from stiction.jit import jit
 
 FLAT = 1e-11
 """Share of the mean strength by which it must fall to count as weakening. Less cannot be told from

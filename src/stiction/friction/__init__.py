@@ -12,11 +12,11 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Discriminator, GetJsonSchemaHandler, Tag
 from pydantic_core import CoreSchema
 
-from stiction._model import describe
 from stiction.friction.exponential import ExponentialWeakening
 from stiction.friction.law import FrictionLaw
 from stiction.friction.linear import LinearWeakening
 from stiction.friction.piecewise import PiecewiseWeakening
+from stiction.model import describe
 
 
 def _tag(value: Any) -> str:

@@ -7,11 +7,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._model import model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.friction.kernels import register
 from stiction.friction.law import FrictionLaw
+from stiction.jit import jit
+from stiction.model import model
 
 
 class Exponential(NamedTuple):

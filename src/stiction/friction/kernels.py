@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 _FUNCTIONS: dict[type, tuple[Callable[..., Any], ...]] = {}
 

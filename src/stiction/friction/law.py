@@ -7,9 +7,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from stiction._model import OptionalProfile, Profile, is_unplaced, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import OptionalProfile, Profile, is_unplaced, model
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""

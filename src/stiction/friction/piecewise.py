@@ -8,13 +8,13 @@ import numpy as np
 from pydantic import BeforeValidator, model_validator
 
 from stiction._checks import check_count, check_instance
-from stiction._jit import jit
-from stiction._model import _number, is_unplaced, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.friction.kernels import register
 from stiction.friction.law import FrictionLaw
 from stiction.friction.linear import Linear, dissipated
+from stiction.jit import jit
+from stiction.model import _number, is_unplaced, model
 
 
 class Polygon(NamedTuple):

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.prior import Prior, full_key
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.likelihood import Likelihood, Model
 from stiction.inference.peaks import Peaks

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiction._progress import Meter
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.estimate import Estimate, Setting, estimate, simulate
 from stiction.inference.spectrum_fit import ANISOTROPIES, EXPONENTS
+from stiction.progress import Meter
 
 PLACES = ("mean", "marginal.mean", "marginal.loc")
 """Parameters that say where something is; all others live on a logarithm."""

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 
 GROUPS = 256
 """Most groups of neighbouring sorted samples that stand for the sample, by their means."""

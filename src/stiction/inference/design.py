@@ -10,16 +10,16 @@ import numpy as np
 import xarray as xr
 
 from stiction._checks import check_count, check_progress, is_finite, is_whole
-from stiction._model import describe
-from stiction._progress import SILENT, Meter, Show
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.evaluation import Method, check_method
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, Model, make_likelihood, make_model, varies
 from stiction.inference.posterior import predicted
 from stiction.inference.prior import Prior, make_prior
+from stiction.methods import Method, check_method
+from stiction.model import describe
 from stiction.problem import Problem
+from stiction.progress import SILENT, Meter, Show
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, to_dataset

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction._progress import Meter
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.likelihood import Likelihood
+from stiction.progress import Meter
 
 WALKERS = 32
 STEPS = 3000

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.inference.marginal_fit import Family, distance
 from stiction.inference.records import Record
 from stiction.inference.spectral_model import Grid

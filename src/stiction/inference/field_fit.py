@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from stiction._brief import brief_html
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.inference.bootstrap import RANGES
 from stiction.inference.estimate import Estimate, Setting
 from stiction.inference.records import Record
@@ -87,8 +86,6 @@ class FieldFit:
     _details: Details = dataclasses.field(repr=False)
     warnings: tuple[str, ...] = ()
     cut_short: bool = False
-
-    _repr_html_ = brief_html
 
     def __str__(self) -> str:
         unit = UNITS[self.quantity]

@@ -17,9 +17,7 @@ from stiction._checks import (
     is_real,
     is_whole,
 )
-from stiction._model import describe
-from stiction._progress import Meter, Show, check_time_limit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.bootstrap import Repetitions, at_ends, intervals, parameters_of, repeat
@@ -38,6 +36,8 @@ from stiction.inference.records import Record, check_quantity, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
+from stiction.model import describe
+from stiction.progress import Meter, Show, check_time_limit
 from stiction.random.resolution import warn_if_inaccurate
 
 if TYPE_CHECKING:

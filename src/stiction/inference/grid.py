@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction._progress import Meter
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.likelihood import Likelihood
+from stiction.progress import Meter
 
 Function = Callable[[Array, float], Array]
 """Logarithms at points (points, parameters); those below a floor may be -inf."""

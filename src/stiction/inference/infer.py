@@ -8,12 +8,9 @@ from typing import Any, Literal
 import numpy as np
 
 from stiction._checks import check_choice, check_count, check_progress, is_finite
-from stiction._model import describe
-from stiction._progress import Meter, Show
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.method import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
-from stiction.evaluation import Method, check_method
 from stiction.inference.agreement import check_agreement, check_reach, piled_up
 from stiction.inference.ensemble_sampler import by_walkers
 from stiction.inference.grid import Grid, on_grid
@@ -28,7 +25,10 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.posterior import BINS, Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
+from stiction.methods import Method, check_method
+from stiction.model import describe
 from stiction.problem import Problem
+from stiction.progress import Meter, Show
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.units import factor_to

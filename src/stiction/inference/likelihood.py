@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._progress import Meter
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.method import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.affine import Affine, find_affine, not_affine
@@ -18,6 +17,7 @@ from stiction.inference.onset_table import OnsetTable, make_axes, simulate, thet
 from stiction.inference.positions import position_table
 from stiction.inference.prior import Prior
 from stiction.problem import Problem
+from stiction.progress import Meter
 from stiction.reliability.limit_state import LimitState
 
 BATCHES = 8

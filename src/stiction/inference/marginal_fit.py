@@ -18,10 +18,10 @@ from scipy.optimize import brentq, minimize
 from scipy.special import betaln, digamma, polygamma
 
 from stiction._checks import is_finite
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.noisy_marginal import without_noise
+from stiction.model import describe
 from stiction.random.families import Gamma, Lognormal, TruncatedNormal, Weibull
 from stiction.random.marginals import Beta, ScipyMarginal, _marginal
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.stats
 from scipy.special import betainc, gammainc, ndtr
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.random.families import Gamma, Lognormal, TruncatedNormal, Weibull
 from stiction.random.marginals import Beta, ScipyMarginal
 

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import refusals
-from stiction._progress import Meter
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.ensemble.monte_carlo import warn_of_fields
 from stiction.ensemble.plan import Plan, chunks, compute
 from stiction.ensemble.scheduler import usable_cores
@@ -21,6 +20,7 @@ from stiction.errors import InputError
 from stiction.inference.affine import Affine
 from stiction.inference.prior import Prior
 from stiction.interface import Interface
+from stiction.progress import Meter
 from stiction.random.draws import BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from stiction._checks import as_path, is_finite, numbers
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.profile_files import decoded
 from stiction.profile_text import read_table
 from stiction.units import factor_to, parse

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.inference.density import silverman
 from stiction.inference.onset_table import OnsetTable
 

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stiction._brief import brief_html
 from stiction._checks import is_finite, numbers
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.peaks import Peaks
+from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
@@ -71,8 +70,6 @@ class Posterior:
     u: Array = field(repr=False)
     seed: int = 0
     diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
-
-    _repr_html_ = brief_html
 
     def _flat(self, name: str) -> Array:
         if name not in self.draws:

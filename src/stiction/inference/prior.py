@@ -12,10 +12,10 @@ import numpy as np
 import scipy.stats
 
 from stiction._checks import is_finite
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.dotted_keys import with_values
 from stiction.errors import InputError
+from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.marginals import scipy_marginal
 from stiction.random.random_field import RandomField

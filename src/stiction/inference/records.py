@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._model import describe, real_array
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
+from stiction.model import describe, real_array
 from stiction.quantities import UNITS
 from stiction.units import factor_to
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from stiction._checks import is_real
-from stiction._model import Count, _number, describe, model
 from stiction.errors import InputError
 from stiction.inference.prior import distribution_of
+from stiction.model import Count, _number, describe, model
 
 
 def _is_distribution(value: Any) -> bool:

@@ -16,12 +16,12 @@ from stiction._checks import (
     numbers,
     refusals,
 )
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.ensemble.plan import Plan, chunks, compute
 from stiction.errors import InputError
-from stiction.evaluation import Method, check_method
 from stiction.inference.prior import full_key, with_parameters
+from stiction.methods import Method, check_method
+from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import fft
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 EDGE = 0.2
 """Share of the truncation over which a spectrum is faded out: a sharper end would be taken for a

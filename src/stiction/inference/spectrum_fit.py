@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from stiction._checks import is_finite
-from stiction._model import describe
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.whittle import Model, Observed, loss
+from stiction.model import describe
 from stiction.random.spectra import (
     ExponentialSpectrum,
     PowerLawSpectrum,

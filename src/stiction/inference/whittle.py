@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.inference.spectral_model import Grid
 from stiction.inference.window import Window
 from stiction.random.marginals import quantile_of_normal

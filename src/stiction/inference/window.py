@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 TAPERED = 0.5
 """Share of a record over which the cosine taper rises and falls."""

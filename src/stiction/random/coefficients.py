@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.problem import Problem
 from stiction.random.marginals import PythonMarginal, ScipyMarginal

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import PlainSerializer, WithJsonSchema, model_validator
 
-from stiction._model import Positive, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import Positive, model
 from stiction.random.pieces import Pieces, in_pieces
 from stiction.random.spectral_density import Share, SpectralDensity, quantile
 

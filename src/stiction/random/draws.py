@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 BLOCK = 256
 

@@ -17,8 +17,8 @@ from pydantic import model_validator
 from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
-from stiction._model import Positive, Real, model
 from stiction.errors import InputError
+from stiction.model import Positive, Real, model
 
 
 @model(kw_only=True)

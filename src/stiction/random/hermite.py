@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.random.marginals import quantile_of_normal
 

@@ -11,9 +11,9 @@ import scipy.stats
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 from scipy.special import ndtr
 
-from stiction._model import Positive, Real, _number, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
+from stiction.model import Positive, Real, _number, model
 from stiction.random.families import FAMILIES
 
 

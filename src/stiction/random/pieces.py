@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import spherical_jn
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 
 DEGREE = 15

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.jit import jit
 from stiction.random.marginals import quantile_of_normal
 
 REACH = 8.0

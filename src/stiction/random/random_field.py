@@ -12,10 +12,10 @@ import pydantic
 from pydantic import model_validator
 
 from stiction._checks import check_choice, check_memory, too_many_samples
-from stiction._model import Flag, Positive, describe, model, real_array, whole
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
+from stiction.model import Flag, Positive, describe, model, real_array, whole
 from stiction.random.custom_spectrum import CustomSpectrum
 from stiction.random.draws import block_of, standard_normal
 from stiction.random.hermite import correlation_of_mapped, hermite_coefficients, share_unaccounted

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, model_validator
 
 from stiction._checks import check_memory
-from stiction._model import describe, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
+from stiction.model import describe, model
 from stiction.random.draws import block_of, standard_normal
 from stiction.random.modes import Modes
 from stiction.random.random_field import RandomField, check_counts

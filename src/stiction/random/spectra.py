@@ -15,9 +15,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from scipy.special import betainc, betaincinv, erf, erfinv, gammaln, kve
 
-from stiction._model import Positive, _number, model
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import Positive, _number, model
 from stiction.random.custom_spectrum import CustomSpectrum
 from stiction.random.spectral_density import ScaledSpectrum, Share, SpectralDensity, one_truncation
 

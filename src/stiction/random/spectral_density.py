@@ -18,9 +18,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from scipy.optimize import brentq
 
-from stiction._model import _number
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import _number
 from stiction.random.pieces import Pieces, in_pieces
 
 Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]

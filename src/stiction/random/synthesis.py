@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction._fft import inverse_transform
-from stiction._jit import jit
-from stiction._typing import Array
+from stiction.arrays import Array, inverse_transform
+from stiction.jit import jit
 
 
 @jit

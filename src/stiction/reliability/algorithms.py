@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiction._progress import TimeUp
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.progress import TimeUp
 from stiction.reliability.importance import Mixture, design_point
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.plain_monte_carlo import Count, count_failures, tally

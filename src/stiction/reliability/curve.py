@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 
 from stiction._checks import is_whole
-from stiction._model import describe, to_plain
-from stiction._progress import Meter, Show, TimeUp, check_time_limit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.evaluation import Method
+from stiction.methods import Method
+from stiction.model import describe, to_plain
 from stiction.problem import Problem
+from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.design import check_probability

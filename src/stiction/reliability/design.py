@@ -9,12 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stiction._brief import brief_html
 from stiction._checks import is_real
-from stiction._model import describe
-from stiction._progress import Meter, Show, TimeUp, check_time_limit
-from stiction.evaluation import Method
+from stiction.methods import Method
+from stiction.model import describe
 from stiction.problem import Problem
+from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.effort import budget_of, first_stage, no_first_stage, refused_chains
@@ -99,8 +98,6 @@ class DesignStress:
     def friction_coefficient(self) -> float:
         """`stress` over the mean normal pressure; NaN without one."""
         return self.stress / self.normal_pressure
-
-    _repr_html_ = brief_html
 
     @property
     def stress_above_bound(self) -> float:

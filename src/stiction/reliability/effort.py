@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stiction.evaluation import methods
+from stiction.methods import methods
 from stiction.reliability.limit_state import LimitState
 
 SECONDS = 100.0

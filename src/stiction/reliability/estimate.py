@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 
 from stiction._checks import is_finite, is_real, is_whole
-from stiction._model import describe
-from stiction._progress import Meter, Show, TimeUp, check_time_limit
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import unknown_name
-from stiction.evaluation import Method
+from stiction.methods import Method
+from stiction.model import describe
 from stiction.problem import Problem
+from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.algorithms import (

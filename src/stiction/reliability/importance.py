@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.nucleation import multiplier_of
 from stiction.criterion.plane import windows_of
 from stiction.problem import Problem

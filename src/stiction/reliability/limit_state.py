@@ -13,16 +13,16 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from stiction._checks import is_whole, numbers
-from stiction._model import describe
-from stiction._progress import SILENT, Meter, Portions, TimeUp
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.criterion.plane import windows_of
 from stiction.ensemble.monte_carlo import make_plan
 from stiction.ensemble.plan import sample_of
 from stiction.ensemble.scheduler import usable_cores
 from stiction.errors import InputError
 from stiction.friction.law import SCALES
+from stiction.model import describe
 from stiction.problem import Problem
+from stiction.progress import SILENT, Meter, Portions, TimeUp
 from stiction.random.coefficients import (
     coefficients_of,
     mean_in_stress,

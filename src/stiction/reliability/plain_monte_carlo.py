@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._progress import TimeUp
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.progress import TimeUp
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.uncertainty import binomial_interval
 

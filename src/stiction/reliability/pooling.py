@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from stiction._progress import SILENT, Meter, TimeUp
+from stiction.progress import SILENT, Meter, TimeUp
 
 MARGIN = 1.1
 """The variance known so far is itself an estimate; aim a little further."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from stiction._progress import duration
+from stiction.progress import duration
 from stiction.reliability.limit_state import LimitState
 
 

@@ -10,10 +10,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._brief import brief_html
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import warn_accuracy
-from stiction.evaluation import label, study_attributes
+from stiction.methods import label, study_attributes
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, along
@@ -84,8 +83,6 @@ class FailureProbability:
     def friction_coefficient(self) -> float:
         """`stress` over the mean normal pressure; NaN without one."""
         return self.stress / self.normal_pressure
-
-    _repr_html_ = brief_html
 
     @property
     def stress_above_bound(self) -> float:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import check_memory
-from stiction._progress import TimeUp
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.progress import TimeUp
 from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
 
 Integers = NDArray[np.int64]

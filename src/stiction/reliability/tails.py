@@ -12,12 +12,12 @@ import numpy as np
 import scipy.stats
 import xarray as xr
 
-from stiction._progress import Meter, Show
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.evaluation import Method
 from stiction.interface import Interface
+from stiction.methods import Method
 from stiction.problem import Problem
+from stiction.progress import Meter, Show
 from stiction.random.coefficients import in_stress
 from stiction.random.custom_spectrum import CustomSpectrum
 from stiction.random.marginals import Beta

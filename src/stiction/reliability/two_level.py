@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._progress import TimeUp
-from stiction._typing import Array
+from stiction.arrays import Array
+from stiction.progress import TimeUp
 from stiction.reliability.subset import (
     Descent,
     Function,

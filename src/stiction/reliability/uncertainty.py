@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtrit
 
-from stiction._typing import Array
+from stiction.arrays import Array
 
 Integers = NDArray[np.int64]
 

@@ -12,11 +12,10 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from stiction._brief import brief, brief_html
 from stiction._checks import is_real
-from stiction._jit import jit
-from stiction._model import describe
 from stiction.errors import InputError
+from stiction.jit import jit
+from stiction.model import brief, describe
 from stiction.statistics.estimates import as_sample
 
 Array = NDArray[np.float64]
@@ -47,7 +46,6 @@ class Density:
     bandwidth: float
 
     __repr__ = brief
-    _repr_html_ = brief_html
 
 
 @jit

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._brief import brief_html
 from stiction._checks import numbers
 from stiction.errors import InputError
 
@@ -29,8 +28,6 @@ class Estimate:
 
     value: float
     error: float = 0.0
-
-    _repr_html_ = brief_html
 
     def __sub__(self, other: Estimate | float) -> Estimate:
         other = other if isinstance(other, Estimate) else Estimate(other)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import simpson
 
-from stiction._brief import brief_html
 from stiction._checks import check_flag, check_instance
 from stiction.criterion.assumptions import check_law
 from stiction.criterion.eigenproblem import Weight
@@ -51,8 +50,6 @@ class NucleationStatistics:
     strength_mean: float
     strength_variance: float
 
-    _repr_html_ = brief_html
-
     @property
     def standard_deviation(self) -> float:
         """Square root of the variance, Pa."""
@@ -87,8 +84,6 @@ class NucleationLimits:
     long_stress_fixed_length : str
         The same for L fixed.
     """
-
-    _repr_html_ = brief_html
 
     short_slope: float
     short_stress: float

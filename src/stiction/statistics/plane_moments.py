@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from stiction._typing import Array
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.problem import Problem

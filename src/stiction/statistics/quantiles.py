@@ -9,10 +9,9 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from stiction._brief import brief, brief_html
 from stiction._checks import is_real, numbers
-from stiction._model import describe
 from stiction.errors import InputError
+from stiction.model import brief, describe
 from stiction.statistics.estimates import Estimate, as_sample
 
 Array = NDArray[np.float64]
@@ -41,7 +40,6 @@ class Quantiles:
     confidence: float
 
     __repr__ = brief
-    _repr_html_ = brief_html
 
 
 def quantiles(values: Any, probability: Any, *, confidence: float = 0.95) -> Quantiles:

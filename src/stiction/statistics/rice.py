@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._brief import brief, brief_html
 from stiction._checks import check_count, numbers, too_many_samples
-from stiction._jit import jit
 from stiction.criterion.nucleation import nucleation_stress
 from stiction.errors import InputError
+from stiction.jit import jit
+from stiction.model import brief
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.statistics.moments import _uniform_load
@@ -77,7 +77,6 @@ class RiceDistribution:
     profiles: int
 
     __repr__ = brief
-    _repr_html_ = brief_html
 
     def failure_probability(self, stress: Any) -> Any:
         """P(tau_cr <= stress) by interpolation, for a number or an array, Pa.

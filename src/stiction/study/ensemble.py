@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from stiction._model import Count, Positive, _count, describe, model, names_to_keep, whole
 from stiction.errors import InputError
+from stiction.model import Count, Positive, _count, describe, model, names_to_keep, whole
 
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 

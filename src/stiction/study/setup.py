@@ -7,8 +7,8 @@ from typing import Any
 
 import pydantic
 
-from stiction._model import explain
 from stiction.errors import InputError, unknown_name
+from stiction.model import explain
 from stiction.problem import Problem
 from stiction.study.study import AnyMethod, Study
 from stiction.study.study_file import completed, read_sweep, read_toml, reading

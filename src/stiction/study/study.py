@@ -23,12 +23,6 @@ from stiction._checks import (
     check_progress,
     too_many_samples,
 )
-from stiction._model import (
-    explain,
-    model,
-    to_plain,
-)
-from stiction._progress import Meter, Show
 from stiction.dotted_keys import part_with_values
 from stiction.ensemble.assemble import GridAxis
 from stiction.ensemble.distributed import Cluster
@@ -37,9 +31,15 @@ from stiction.ensemble.part import as_part
 from stiction.ensemble.plan import Plan
 from stiction.ensemble.points import Plans, differing_in, variables_in
 from stiction.errors import InputError
-from stiction.evaluation import methods
 from stiction.inference.settings import Inference
+from stiction.methods import methods
+from stiction.model import (
+    explain,
+    model,
+    to_plain,
+)
 from stiction.problem import Problem
+from stiction.progress import Meter, Show
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.ensemble import Ensemble

@@ -17,10 +17,10 @@ import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction._checks import is_whole
-from stiction._model import _models_in, describe, to_plain
 from stiction.dotted_keys import CORRELATION
 from stiction.ensemble.assemble import GridAxis
 from stiction.errors import InputError, unknown_name
+from stiction.model import _models_in, describe, to_plain
 from stiction.placed import Placed, is_profile, placed_profile
 from stiction.results import Variable
 

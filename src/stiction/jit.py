@@ -1,0 +1,149 @@
+"""The decorators for compiled kernels, and where compiled kernels are kept."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba.core import event
+
+from stiction.files import cache_folder, private_folder
+
+logger = logging.getLogger("stiction")
+
+ZERO: Any = np.int64(0)
+"""A zero that is not a literal: numba compiles a kernel again for each literal it is given."""
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+
+class _FirstCompilation(event.Listener):
+    """Says once that kernels are being compiled, so that a first run does not look hung."""
+
+    def __init__(self) -> None:
+        self.said = False
+
+    def on_start(self, event: event.Event) -> None:
+        dispatcher = (event.data or {}).get("dispatcher")
+        function = getattr(dispatcher, "py_func", None)
+        # A function made by exec has no module, its __module__ is None.
+        ours = str(getattr(function, "__module__", "")).startswith("stiction.")
+        if ours and not self.said:
+            self.said = True
+            logger.warning("compiling kernels on first use (up to 20 s, then cached)")
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _FirstCompilation())
+
+
+def _digest_of_sources() -> str:
+    """Digest of every file with a kernel and of what such files import, directly or not.
+
+    Files that refuse input hold no part of a kernel: an edited message recompiles nothing.
+    """
+    package = Path(__file__).parent
+    texts = {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes()
+        for path in sorted(package.rglob("*.py"))
+    }
+    texts = {name.removesuffix(".__init__"): text for name, text in texts.items()}
+    imported = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
+    reached = {
+        name
+        for name, text in texts.items()
+        if b"stiction.jit import" in text or b"stiction.jit import" in text
+    }
+    waiting = list(reached)
+    while waiting:
+        for module, member in imported.findall(texts[waiting.pop()]):
+            names = {module.decode(), f"{module.decode()}.{member.decode()}"}
+            new = {
+                name for name in names & texts.keys() - reached if b"InputError" not in texts[name]
+            }
+            waiting += new
+            reached |= new
+    digest = hashlib.sha256()
+    for name in sorted(reached):
+        digest.update(texts[name])
+    return digest.hexdigest()[:16]
+
+
+# numba takes a compiled kernel for current as long as the kernel's own file is: it does not notice
+# that a function or a constant of another file has changed. So every state of the files that hold
+# kernels has a folder of its own.
+_FOLDER = (
+    private_folder(Path(numba.config.CACHE_DIR), _digest_of_sources())
+    if numba.config.CACHE_DIR
+    else private_folder(cache_folder(), "compiled", _digest_of_sources())
+)
+
+
+def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
+    """Compile on first call, cached on disk where that is possible."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_FOLDER)  # read by numba when it decorates, and only then
+    try:
+        compiled: Any = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # numba finds no folder in which it may write
+        compiled = numba.njit(**options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    if hasattr(compiled, "_cache") and hasattr(compiled._cache, "flush"):
+        _keep_own(compiled._cache)
+    result: Kernel = compiled
+    return result
+
+
+def _keep_own(cache: Any) -> None:
+    """Keep on disk only what is compiled for types of this package.
+
+    A friction law from elsewhere is part of the kernels that are compiled for it. numba would not
+    notice that the law was edited, and could not read its index where the law's module is missing.
+    """
+    load, save = cache.load_overload, cache.save_overload
+    unreadable = (ImportError, AttributeError)
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target) if _is_own(signature) else None
+        except unreadable:
+            return None
+
+    def save_overload(signature: Any, data: Any) -> None:
+        if not _is_own(signature):
+            return
+        try:
+            save(signature, data)
+        except unreadable:
+            cache.flush()
+            save(signature, data)
+
+    cache.load_overload, cache.save_overload = load_overload, save_overload
+
+
+def _is_own(kind: Any) -> bool:
+    """Whether a numba type, or a tuple of them, names no class from outside the package."""
+    if isinstance(kind, tuple | list):
+        return all(map(_is_own, kind))
+    named = getattr(kind, "instance_class", None)
+    if named is not None and not named.__module__.startswith("stiction."):
+        return False
+    return _is_own(getattr(kind, "types", ()))
+
+
+def jit(function: Kernel) -> Kernel:
+    """Compile for one thread, without the interpreter lock.
+
+    No ``parallel=True`` (forking after an OpenMP region aborts) and no fast-math: the same
+    numbers must come out whatever the batch.
+    """
+    return _compile(function, {"nogil": True, "error_model": "numpy"})

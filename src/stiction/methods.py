@@ -1,0 +1,264 @@
+"""One call, any method: what a method is, which there are, and the onset of given profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from types import MappingProxyType
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from stiction._checks import check_instance, refusals
+from stiction.errors import InputError
+from stiction.gaps import gather, with_gaps, without_gaps
+from stiction.model import describe, to_plain
+from stiction.problem import Problem
+from stiction.profile_nodes import Gaps, check_gaps
+from stiction.progress import Meter, Portions, Show
+from stiction.results import (
+    DIRECTION,
+    FRICTION_COEFFICIENT,
+    SAMPLE,
+    Variable,
+    coordinate,
+    to_dataset,
+)
+from stiction.sample import Sample, named_profiles
+
+FIRST = 16
+"""Samples that `onset` solves before it knows how long one takes."""
+
+Values = dict[str, NDArray[Any]]
+Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
+
+ENTRY_POINTS = "stiction.methods"
+"""Group of entry points by which other packages offer methods."""
+
+_OWN = {
+    "local_criterion": "criterion.method:LocalCriterion",
+    "equilibrium": "equilibrium.method:Equilibrium",
+    "rupture": "dynamics.method:Rupture",
+    "rupture_misfit": "dynamics.compared:RuptureMisfit",
+}
+
+
+class Method(Protocol):
+    """What makes an object a method: options, and a solver that follows from them.
+
+    Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
+    package that names it under the entry points "stiction.methods" offers it in study files too;
+    its `type` is then a ``Literal`` with a default.
+    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
+    `Problem.sample`), and `first_stage`, the type of a cheaper method whose onsets lie close to
+    its own, by which rare failures are found first.
+    """
+
+    @property
+    def type(self) -> str:
+        """Its name in study files."""
+
+    @property
+    def label(self) -> str:
+        """Its name in figures, tables and progress."""
+
+    @property
+    def chunk_size(self) -> int:
+        """Samples that make a good piece of work."""
+
+    def variables(self, problem: Problem) -> Mapping[str, Variable]:
+        """What the solver returns, each with 'sample' as first dimension.
+
+        All of `stiction.results.onset_variables` must be among them.
+        """
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """About how long a sample takes on one core, in seconds, to a factor of three."""
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Reasons why it cannot take a problem; none if it can."""
+
+    def prepare(self, problem: Problem) -> Solver:
+        """A solver of samples; what is the same for all of them is computed here, once."""
+
+
+MEMBERS = (
+    "type", "label", "chunk_size", "variables", "seconds_per_sample", "supports", "prepare",
+)  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def methods() -> Mapping[str, Any]:
+    """The classes of all methods by their `type`: the package's own, then those of others."""
+    found: dict[str, Any] = {}
+    for name, place in _OWN.items():
+        module, attribute = place.split(":")
+        found[name] = getattr(import_module(f"stiction.{module}"), attribute)
+    for point in entry_points(group=ENTRY_POINTS):
+        if point.name in found:
+            raise InputError(
+                f"{ENTRY_POINTS}: two methods are called {point.name!r}; uninstall one of them"
+            )
+        found[point.name] = point.load()
+    return MappingProxyType(found)
+
+
+def check_method(method: Any) -> None:
+    """Refuse what is not a method object, in particular the class instead of an instance."""
+    if isinstance(method, type):
+        raise InputError(
+            f"method: must be an object, got the class {method.__name__}; write"
+            f" st.{method.__name__}(...)"
+        )
+    missing = [name for name in MEMBERS if not hasattr(method, name)]
+    if "prepare" in missing:
+        raise InputError(
+            "method: must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
+            f" st.Rupture(loading_rate=...), got {describe(method)}"
+        )
+    if missing:
+        raise InputError(f"method: {describe(method)} lacks {', '.join(missing)}")
+
+
+def accepted(method: Method) -> tuple[str, ...]:
+    """What `Problem.sample` may let through for a method, besides what every method can do."""
+    return getattr(method, "accepts", ())
+
+
+def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
+    """The problem and the method in plain form, or why they have none."""
+    try:
+        return {"study": {"problem": to_plain(problem), "method": to_plain(method)}}
+    except InputError as error:
+        return {"study_incomplete": str(error)}
+
+
+def solve(solver: Solver, sample: Sample) -> Values:
+    """The solver's values, and what follows from them for every method alike."""
+    values = dict(solver(sample))
+    pressure = sample.normal_pressure.mean(axis=sample.axes)
+    if not np.isnan(pressure).all():
+        values["friction_coefficient"] = values["critical_stress"] / pressure
+    return values
+
+
+def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
+    """All samples, some at a time: the numbers of one do not depend on those beside it."""
+    solver = method.prepare(problem)
+    parts: list[Values] = []
+    with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
+        for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
+            parts.append(solve(solver, sample.part(some)))
+            meter.advance(some.stop - some.start)
+    if len(parts) == 1:
+        return parts[0]
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
+def variables_of(problem: Problem, method: Method, pressure: bool = False) -> dict[str, Variable]:
+    """All that `solve` returns; `pressure` says that the normal pressure differs by sample."""
+    variables = dict(method.variables(problem))
+    if pressure or problem.load.normal_pressure is not None:
+        variables["friction_coefficient"] = FRICTION_COEFFICIENT
+    return variables
+
+
+def label(
+    problem: Problem,
+    method: Method,
+    values: Mapping[str, NDArray[Any]],
+    samples: NDArray[np.int64],
+    attributes: Mapping[str, Any],
+    more_variables: Mapping[str, Variable] = MappingProxyType({}),
+) -> xr.Dataset:
+    """Values of many samples as a dataset over 'sample' (and the nodes where they have them)."""
+    variables = variables_of(problem, method, "friction_coefficient" in values)
+    variables |= dict(more_variables)
+    coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
+    used = {dim for name in values for dim in variables[name].dims}
+    for dim in sorted(used & {*problem.interface.dims, DIRECTION}):
+        coordinates[dim] = coordinate(problem.interface, dim)
+    return to_dataset(values, variables, coordinates, attributes)
+
+
+def onset(
+    problem: Problem,
+    profiles: Any,
+    *,
+    method: Method,
+    gaps: Gaps = "refuse",
+    progress: Show = True,
+) -> xr.Dataset:
+    """At which load, and where, do interfaces of given strength begin to slide?
+
+    Parameters
+    ----------
+    problem : Problem
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane (samples, nx,
+        ny) or (nx, ny); or several profiles by name, such as ``{"strength": ...,
+        "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`. Of a
+        DataArray or Dataset the dimension 'x' runs along the interface (on a plane 'x' and 'y'),
+        its coordinate (m) decides where a value belongs, and `units` that are stated are converted;
+        see `stiction.read_profile`.
+    method : LocalCriterion, Equilibrium or Rupture
+        How to find out; nothing is chosen silently.
+    gaps : {"refuse", "fill", "skip"}
+        Whether missing values (NaN) are an error, are filled with straight lines between their
+        ends, or make that the samples that have any are left out; the others keep their numbers.
+    progress : bool or callable
+        True shows how far it is, on standard error, once it takes more than two seconds; a
+        callable gets (done, total).
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
+        `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
+        method adds. Every variable has `units` and `long_name`. Of profiles with gaps that were
+        filled also `in_gap`: whether the onset lies in one.
+
+    Raises
+    ------
+    InputError
+        Naming all that does not fit.
+
+    Warns
+    -----
+    AccuracyWarning
+        If gaps are filled, or the onset lies in one.
+    UnitWarning
+        If a value is so far from what solids have that its unit is in doubt.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
+    >>> bool(found.critical_stress.item() > tau_p.min())
+    True
+    """
+    check_method(method)
+    check_instance("problem", problem, Problem)
+    if refused := refusals(problem, method):
+        raise InputError(refused)
+    check_gaps(gaps)
+    attributes = study_attributes(problem, method)
+    measured = None
+    if not isinstance(profiles, Sample):
+        profiles, measured = gather(problem, named_profiles(profiles), gaps)
+    numbers = None
+    if gaps == "skip" and measured is not None:
+        profiles, numbers = without_gaps(profiles, measured)
+        measured = None
+    sample = problem.sample(profiles, accept=accepted(method))
+    problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
+    values = _in_portions(problem, method, sample, progress)
+    numbers = np.arange(sample.samples) if numbers is None else numbers
+    result = label(problem, method, values, numbers, attributes)
+    return result if measured is None else with_gaps(problem, result, measured)
