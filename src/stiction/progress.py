@@ -1,8 +1,8 @@
-"""How far long work is, and when its time is over: one mechanism for all that takes long.
+"""Progress of long work, and its time limit: one mechanism for all that takes long.
 
 A terminal shows a bar, a notebook a line that is rewritten, a pipe a line now and then; all of it
-on standard error, and only once two seconds have passed. Who works knows nothing of this: it says
-what is done (`advance`), what it expects in all (`expect`), and asks whether its time is `over`.
+on standard error, and only after two seconds. Code that works only reports what is done
+(`advance`) and what is expected in all (`expect`), and asks whether its time is `over`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,11 +91,9 @@ class Meter:
         self._show = show
         self._begun = self._stage = time.monotonic()
         self._first: tuple[float, int] | None = None
-        self._ended = threading.Event()
-        self._thread: threading.Thread | None = None
 
     def advance(self, count: int = 1) -> None:
-        """`count` more are done."""
+        """Report that `count` more are done."""
         self.done += count
         if self._first is None:  # the rate is that of what follows: first come preparations
             self._first = time.monotonic(), self.done
@@ -103,11 +101,11 @@ class Meter:
             self._show(self.done, self.total or 0)
 
     def expect(self, more: float, *, at_most: bool = False) -> None:
-        """So many more are expected, or allowed at most."""
+        """Report how many more are expected, or allowed at most."""
         self.total, self.at_most = self.done + max(0, math.ceil(more)), at_most
 
     def stage(self, what: str, total: int | None = None) -> None:
-        """Another part of the work begins; the clock goes on."""
+        """Begin another part of the work; the clock goes on."""
         self.what, self.total, self.done, self.at_most, self.note = what, total, 0, False, ""
         self._first, self._stage = None, time.monotonic()
 
@@ -123,7 +121,7 @@ class Meter:
 
     @property
     def left(self) -> float | None:
-        """Seconds that are left, if that can be told."""
+        """Estimated seconds that are left; None if unknown."""
         if not self.total or self._first is None:
             return None
         begin, before = self._first
@@ -137,7 +135,7 @@ class Meter:
 
     @property
     def text(self) -> str:
-        """Where it is, for people."""
+        """How far it is, as text."""
         parts = []
         if self.total and not self.at_most:
             parts.append(f"{self.done:,} of {self.total:,} {self.unit}")
@@ -160,182 +158,157 @@ class Meter:
         self.stop()
 
     def start(self) -> Meter:
-        """The clock starts; `stop` must follow, come what may."""
+        """Start the clock; `stop` must follow, whatever happens."""
         self._begun = self._stage = time.monotonic()
         if self._show is True:
-            with _floor:
-                _live.append(self)
-            self._thread = threading.Thread(target=self._watch, daemon=True)
-            self._thread.start()
+            _watch(self)
         return self
 
     def stop(self) -> None:
-        """Nothing is shown from here on."""
-        self._ended.set()
-        if self._thread is not None:
-            self._thread.join()
-            with _floor:
-                _live.remove(self)
-
-    def _watch(self) -> None:
-        """Wait until it is worth a word, then show it until it ends; runs in a thread."""
-        if self._ended.wait(AFTER):
-            return
-        display: Display | None = None
-        try:
-            while not self._ended.is_set():
-                if display is None:
-                    display = _take_the_floor(self)
-                elif _speakers[-1] is self:
-                    display.show(self)
-                self._ended.wait(TICK)
-        finally:
-            if display is not None:
-                with _floor:
-                    display.close(self)
-                    _speakers.remove(self)
-                    _displays.pop(self, None)
+        """Show nothing from here on."""
+        _unwatch(self)
 
 
-_floor = threading.Lock()
+_lock = threading.Lock()
 _live: list[Meter] = []
-_speakers: list[Meter] = []
-_displays: dict[Meter, Display] = {}
+_watcher: _Watcher | None = None
 
 
-def _take_the_floor(meter: Meter) -> Display | None:
-    """A display, unless this is a part of work that knows its end.
-
-    Work that does not know its end falls silent while a part of it has more to tell.
-    """
-    with _floor:
-        earlier = _live[: _live.index(meter)]
-        if any(other.total and not other.at_most for other in earlier):
-            return None
-        display = _displays[meter] = _display()
-        _speakers.append(meter)
-        _speakers.sort(key=_live.index)  # the innermost last, whichever thread woke first
-        for speaker in _speakers[:-1]:
-            _displays[speaker].pause()
-        return display
+def _watch(meter: Meter) -> None:
+    global _watcher
+    with _lock:
+        _live.append(meter)
+        if _watcher is None:
+            _watcher = _Watcher(daemon=True)
+            _watcher.start()
 
 
-class Display(Protocol):
-    """A way to show a meter."""
+def _unwatch(meter: Meter) -> None:
+    global _watcher
+    last = None
+    with _lock:
+        if meter in _live:
+            _live.remove(meter)
+            if not _live:
+                last, _watcher = _watcher, None
+    if last is not None:
+        last.ended.set()
+        last.join()
 
-    def show(self, meter: Meter) -> None:
-        """Now, or when it is time."""
 
-    def pause(self) -> None:
-        """Make room for another."""
+class _Watcher(threading.Thread):
+    """Shows one of the meters that run; ends with the last of them."""
 
-    def close(self, meter: Meter) -> None:
-        """The work has ended."""
+    def __init__(self, *, daemon: bool) -> None:
+        super().__init__(daemon=daemon)
+        self.ended = threading.Event()
+
+    def run(self) -> None:
+        display: _Pipe | _Terminal | _Notebook | None = None
+        while not self.ended.wait(TICK):
+            meter = _speaker()
+            if meter is not None:
+                display = display or _display()
+                display.show(meter)
+        if display is not None:
+            display.close()
 
 
-def _display() -> Display:
-    if _in_notebook():
+def _speaker() -> Meter | None:
+    """The outermost meter that knows its end, else the innermost, of those that run for long."""
+    with _lock:
+        old = [meter for meter in _live if meter.elapsed >= AFTER]
+    known = [meter for meter in old if meter.total and not meter.at_most]
+    return known[0] if known else old[-1] if old else None
+
+
+def _display() -> _Pipe | _Terminal | _Notebook:
+    shell = sys.modules.get("IPython")
+    active = shell.get_ipython() if shell is not None else None
+    if type(active).__name__ == "ZMQInteractiveShell":
         return _Notebook()
     if sys.stderr is not None and sys.stderr.isatty():
         return _Terminal()
     return _Pipe()
 
 
-def _in_notebook() -> bool:
-    shell = sys.modules.get("IPython")
-    active = shell.get_ipython() if shell is not None else None
-    return type(active).__name__ == "ZMQInteractiveShell"
-
-
 class _Pipe:
     """A line after ten seconds more and a tenth more time: few, however long it takes."""
 
     def __init__(self) -> None:
-        self._next = 0.0
+        self._next, self._line = 0.0, ""
 
     def show(self, meter: Meter) -> None:
         elapsed = meter.elapsed
-        if elapsed < self._next:
-            return
+        self._line = f"{meter.what}: {meter.text}"
         if self._next or elapsed >= LONG or elapsed + (meter.left or 0.0) >= LONG:
-            print(f"{meter.what}: {meter.text}", file=sys.stderr, flush=True)
-            self._next = max(elapsed + LONG, 1.1 * elapsed)
+            if elapsed >= self._next:
+                self._next = max(elapsed + LONG, 1.1 * elapsed)
+                self._print()
 
-    def pause(self) -> None:
-        pass
+    def close(self) -> None:
+        if self._next:
+            self._print()
 
-    def close(self, meter: Meter) -> None:
-        pass
+    def _print(self) -> None:
+        print(self._line, file=sys.stderr, flush=True)
 
 
 class _Terminal:
     """A bar that goes away when the work is done."""
 
     def __init__(self) -> None:
-        self._bar: Any = None
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+        self._bar = Progress(
+            SpinnerColumn("line"),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(30),
+            TextColumn("{task.fields[text]}", markup=False),
+            console=Console(stderr=True),
+            transient=True,
+            redirect_stdout=False,
+        )
+        self._task = self._bar.add_task("", total=None, text="")
+        self._bar.start()
 
     def show(self, meter: Meter) -> None:
-        known = meter.total is not None and not meter.at_most
-        if self._bar is None:
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
-
-            self._bar = Progress(
-                SpinnerColumn("line"),
-                TextColumn("{task.description}", markup=False),
-                BarColumn(30),
-                TextColumn("{task.fields[text]}", markup=False),
-                console=Console(stderr=True),
-                transient=True,
-                redirect_stdout=False,
-            )
-            self._task = self._bar.add_task(meter.what, total=None, text="")
-            self._bar.start()
         self._bar.update(
             self._task,
             description=meter.what,
             completed=meter.done,
-            total=meter.total if known else None,
+            total=None if meter.at_most else meter.total,
             text=meter.text,
         )
 
-    def pause(self) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-            self._bar = None
-
-    def close(self, meter: Meter) -> None:
-        self.pause()
+    def close(self) -> None:
+        self._bar.stop()
 
 
 class _Notebook:
-    """A line below the cell, rewritten; needs nothing but IPython, which is there."""
+    """A line below the cell, rewritten; needs nothing but IPython."""
 
     WIDTH = 30
 
     def __init__(self) -> None:
-        self._line: Any = None
-
-    def show(self, meter: Meter) -> None:
-        share = min(1.0, meter.done / meter.total) if meter.total and not meter.at_most else None
-        full = 0 if share is None else round(share * self.WIDTH)
-        bar = "" if share is None else f" [{'#' * full}{'.' * (self.WIDTH - full)}]"
-        self._write(f"{meter.what}{bar} {meter.text}")
-
-    def _write(self, text: str) -> None:
         from IPython.display import display
 
-        data = {"text/plain": text}
-        if self._line is None:
-            self._line = display(data, raw=True, display_id=True)
-        else:
-            self._line.update(data, raw=True)
+        self._line = display({"text/plain": ""}, raw=True, display_id=True)
 
-    def pause(self) -> None:
-        pass
+    def show(self, meter: Meter) -> None:
+        self._meter = meter
+        bar = ""
+        if meter.total and not meter.at_most:
+            full = round(min(1.0, meter.done / meter.total) * self.WIDTH)
+            bar = f" [{'#' * full}{'.' * (self.WIDTH - full)}]"
+        self._write(f"{meter.what}{bar} {meter.text}")
 
-    def close(self, meter: Meter) -> None:
-        self._write(f"{meter.what} {meter.text}")
+    def close(self) -> None:
+        self._write(f"{self._meter.what} {self._meter.text}")
+
+    def _write(self, text: str) -> None:
+        self._line.update({"text/plain": text}, raw=True)
 
 
 SILENT = Meter("", show=False)
