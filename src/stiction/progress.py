@@ -241,10 +241,10 @@ class _Pipe:
     def show(self, meter: Meter) -> None:
         elapsed = meter.elapsed
         self._line = f"{meter.what}: {meter.text}"
-        if self._next or elapsed >= LONG or elapsed + (meter.left or 0.0) >= LONG:
-            if elapsed >= self._next:
-                self._next = max(elapsed + LONG, 1.1 * elapsed)
-                self._print()
+        foreseen = elapsed + (meter.left or 0.0)
+        if elapsed >= self._next and (self._next or foreseen >= LONG):
+            self._next = max(elapsed + LONG, 1.1 * elapsed)
+            self._print()
 
     def close(self) -> None:
         if self._next:
