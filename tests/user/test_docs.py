@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import stiction as st
-from stiction.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -49,7 +47,7 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
     """Every block and command, with fewer repetitions."""
-    page = "docs/from-a-profile-to-a-failure-probability.md"
+    page = "docs/tutorial.md"
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
     scope = {}
@@ -60,13 +58,7 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
     for name, value in truth.items():
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < scope["found"].probability < 0.5
-    assert 1.0 < scope["design"].safety_factor < 3.0
-    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", (ROOT / page).read_text("utf-8"), re.M | re.S)
-    (command,) = (text for language, text in fenced if not language)
-    arguments = command.replace("--bootstrap 200", "--bootstrap 20").split()
-    assert arguments[0] == "stiction"
-    result = CliRunner().invoke(app, arguments[1:], catch_exceptions=False)
-    assert result.exit_code == 0, result.output
+    assert 0.2e6 < scope["design"].stress < 1e6
     joint = st.Problem(**tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"])
     assert joint == scope["joint"]
 

@@ -91,7 +91,7 @@ class Equilibrium:
         solved to round-off.
     wavenumbers : {"spectral", "lattice"}
         Of planes: those of the nodes, most accurate, or of a lattice, (2/h) sin(k h/2), whose
-        bounds always meet, at a larger error; see `docs/planes-equilibrium.md`.
+        bounds always meet, at a larger error; see `docs/planes.md`.
 
     Notes
     -----
