@@ -12,7 +12,6 @@ from stiction.dynamics.method import Rupture as Rupture
 from stiction.dynamics.misfit import misfit as misfit
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
-from stiction.ensemble.distributed import Cluster as Cluster
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
 from stiction.equilibrium.events import equilibrium_events as equilibrium_events
 from stiction.equilibrium.method import Equilibrium as Equilibrium
@@ -46,9 +45,6 @@ from stiction.interface import Interface as Interface
 from stiction.load import EdgeLoad as EdgeLoad
 from stiction.load import GradientLoad as GradientLoad
 from stiction.load import Load as Load
-from stiction.merge import (
-    merge_parts as merge_parts,
-)
 from stiction.methods import onset as onset
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
@@ -99,15 +95,8 @@ from stiction.statistics.moments import (
 from stiction.statistics.quantiles import quantile_distance as quantile_distance
 from stiction.statistics.quantiles import quantiles as quantiles
 from stiction.statistics.rice import rice_distribution as rice_distribution
-from stiction.stored_run import (
-    StoredRun as StoredRun,
-)
-from stiction.stored_run import (
-    open_run as open_run,
-)
-from stiction.study.ensemble import Ensemble as Ensemble
-from stiction.study.study import (
-    Study as Study,
-)
+from stiction.study.study import Ensemble as Ensemble
+from stiction.study.study import Study as Study
+from stiction.study.study import open_run as open_run
 
 __version__: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -19,7 +20,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from stiction.errors import InputError
+from stiction.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,6 +87,41 @@ def sync_folder(folder: Path) -> None:
     with suppress(OSError):
         os.fsync(handle)
     os.close(handle)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file that is either whole or not there, whatever happens.
+
+    Raises
+    ------
+    StoreError
+        If the disk is full or the folder cannot be written; nothing is left behind.
+    """
+    try:
+        write_atomically(path, data)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: Path, error: BaseException) -> StoreError:
+    """Return the error for a file that cannot be written, with the reason in words."""
+    number = getattr(error, "errno", None)
+    reason = {
+        errno.ENOSPC: "the disk is full",
+        errno.EDQUOT: "the disk quota is used up",
+        errno.ENOENT: "the folder is gone",
+        errno.EROFS: "the file system is read-only",
+        errno.EACCES: "permission denied",
+    }.get(number or 0, str(error))
+    return StoreError(f"{path}: cannot be written: {reason}")
+
+
+def cannot_read(path: Path, error: OSError) -> StoreError:
+    """Return the error for a file that cannot be read, which does not mean that it is damaged."""
+    return StoreError(
+        f"{path}: cannot be read: {error.strerror or error}; nothing was changed, try again when"
+        " it can be"
+    )
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:

@@ -19,14 +19,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from stiction import __version__, plot
-from stiction.ensemble.files import write_whole
 from stiction.errors import InputError
+from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity
 from stiction.plot.style import PAGE, new_figure, panel, paper_style
 from stiction.results import DIRECTION
 from stiction.statistics.estimates import mean, standard_deviation
 from stiction.statistics.quantiles import quantiles
-from stiction.stored_run import StoredRun
+from stiction.study.run import StoredRun
 
 MOST_ROWS = 200
 MOST_FIGURES = 12
@@ -106,7 +106,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     result = run.dataset(only=[*names, "arrested_events"])
     dims = [axis.dim for axis in run.study.axes]
     page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
-    methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.plans))
+    methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
     page.text(f"{state.done:,} of {state.samples:,} samples by {methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
@@ -119,7 +119,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     page.listing("The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict()))
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
     page.text(
-        f"Computed with stiction {', '.join(run.versions)}; page written with stiction"
+        f"Computed with {'; '.join(state.versions)}; page written with stiction"
         f" {__version__}, Python {platform.python_version()}, {packages}."
     )
     write_whole(path, page.html().encode())

@@ -10,15 +10,15 @@ import warnings
 from collections.abc import Callable
 from typing import Annotated, Any
 
+import click
 import typer
 
 from stiction import __version__
-from stiction.cli.common import echo
-from stiction.cli.onset import onset
+from stiction.cli.check import check, schema
+from stiction.cli.common import echo, in_options
 from stiction.cli.reliability import reliability
-from stiction.cli.runs import export, report, status
-from stiction.cli.rupture import rupture
-from stiction.cli.studies import check, merge, run, schema
+from stiction.cli.runs import export, report, run, status
+from stiction.cli.single import onset, rupture
 from stiction.errors import InputError, RunError
 
 app = typer.Typer(
@@ -40,19 +40,22 @@ def _say_version(asked: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option("--version", "-V", callback=_say_version, is_eager=True, help="And exit."),
+        typer.Option("--version", "-V", callback=_say_version, is_eager=True, help="Print it."),
     ] = False,
 ) -> None:
     pass
 
 
-def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
-    """Ctrl-C ends a command with exit code 130, as shells expect."""
+def _command(function: Callable[..., None]) -> Callable[..., None]:
+    """Errors in the words of the command line; Ctrl-C ends with exit code 130, as shells expect."""
 
-    @functools.wraps(command)
+    @functools.wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         try:
-            command(*args, **kwargs)
+            function(*args, **kwargs)
+        except InputError as error:
+            command = click.get_current_context().command
+            raise InputError([in_options(text, command) for text in error.problems]) from None
         except KeyboardInterrupt:
             echo("interrupted", err=True)
             raise typer.Exit(130) from None
@@ -60,23 +63,14 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-for command in (
-    run,
-    merge,
-    onset,
-    rupture,
-    reliability,
-    check,
-    schema,
-    status,
-    export,
-    report,
-):
-    app.command()(_interruptible(command))
+for function in (run, check, status, export, report, schema, onset, rupture, reliability):
+    app.command()(_command(function))
 
 
 def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-    echo(f"warning: {message}", err=True)
+    context = click.get_current_context(silent=True)
+    command = None if context is None else context.command
+    echo(f"warning: {in_options(str(message), command)}", err=True)
 
 
 def _of_the_system(error: OSError) -> str:

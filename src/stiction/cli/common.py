@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,16 +14,14 @@ from stiction.errors import InputError
 StudyFile = Annotated[
     Path, typer.Argument(metavar="STUDY.toml", help="Study file; `stiction schema` describes it.")
 ]
-RunPath = Annotated[
-    Path, typer.Argument(metavar="RUN", help="Folder of a run, or the .nc file of a finished one.")
-]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[
     int | None, typer.Option(help="Threads; all cores by default.", show_default=False)
 ]
 TimeLimit = Annotated[
     float | None,
     typer.Option(
-        help="Seconds; what there is by then is the result, and says so.", show_default=False
+        help="Seconds; the result is what is done by then, and says so.", show_default=False
     ),
 ]
 
@@ -39,8 +38,28 @@ def echo(text: Any = "", *, err: bool = False) -> None:
     typer.echo(safe, err=err)
 
 
+def in_options(text: str, command: Any) -> str:
+    """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``.
+
+    Parameters
+    ----------
+    text : str
+        Message of a function of the package, which names its own arguments.
+    command : click.Command
+        Whose options have the names of the arguments.
+    """
+    for parameter in getattr(command, "params", ()):
+        option = next((name for name in parameter.opts if name.startswith("--")), None)
+        if option is not None:
+            name = rf"(?<![\w.-]){parameter.name}"
+            text = re.sub(rf"{name}=(True\b|\.\.\.)", option, text)
+            text = re.sub(rf"{name}=[\"']?([^\s\"',;)]*)[\"']?", rf"{option} \1", text)
+            text = re.sub(rf"^{name}(?=:| must)", option, text)
+    return text
+
+
 def writable(path: Path, what: str) -> Path:
-    """Refuse an output that cannot be written before any work is done."""
+    """Refuse an output file that cannot be written, before any work is done."""
     from stiction._checks import as_path
 
     as_path("--out", path)
@@ -55,7 +74,7 @@ def writable(path: Path, what: str) -> Path:
 
 
 def writable_folder(path: Path) -> Path:
-    """A folder for several files, made if need be, or refused before any work is done."""
+    """Make a folder for several files, or refuse it before any work is done."""
     from stiction._checks import as_path
 
     as_path("--out", path)
@@ -71,7 +90,7 @@ def writable_folder(path: Path) -> Path:
 
 
 def summary(result: Any) -> str:
-    """A few lines about the onset, for people."""
+    """Return a few lines about the onset, for people."""
     lines = []
     for name in ("critical_stress", "friction_coefficient"):
         if name in result and bool(result[name].notnull().any()):
@@ -87,7 +106,7 @@ def summary(result: Any) -> str:
 
 
 def size(count: float) -> str:
-    """Bytes for people."""
+    """Return bytes for people."""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000.0:
             return f"{count:.3g} {unit}"

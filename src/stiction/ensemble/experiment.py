@@ -25,7 +25,7 @@ from stiction.random.coefficients import (
 )
 from stiction.random.draws import block_of
 from stiction.random.overlap import check_residual
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.random_interface import as_random_interface
 from stiction.results import Variable, along
 from stiction.sample import PROFILES, Sample
 
@@ -54,6 +54,8 @@ class Experiment:
         option of the method that is needed for it is switched on.
     keep_samples : tuple of int, optional
         Samples of which it is kept; all if None.
+    seed : int
+        Of the ensemble that `results` are samples of.
 
     Raises
     ------
@@ -73,10 +75,11 @@ class Experiment:
     """
 
     problem: Problem
-    random: RandomInterface
+    random: Any  # a RandomInterface once it is made
     method: Any
     keep: tuple[str, ...] = ()
     keep_samples: tuple[int, ...] | None = None
+    seed: int = 0
 
     def __post_init__(self) -> None:
         check_method(self.method)

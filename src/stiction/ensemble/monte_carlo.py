@@ -1,12 +1,11 @@
-"""Running an ensemble in memory: the same numbers whoever computes them."""
+"""An ensemble of random interfaces: the public function, and the loop over its samples."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
@@ -14,104 +13,176 @@ from numpy.typing import NDArray
 
 from stiction._checks import (
     check_count,
+    check_flag,
     check_progress,
     is_real,
     is_whole,
-    refusals,
     too_many_samples,
 )
-from stiction.ensemble.assemble import Gathered, GridAxis
-from stiction.ensemble.plan import Plan
+from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
+from stiction.ensemble.dataset import Gathered, GridAxis, warn_of_failures
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.points import differing_in
-from stiction.ensemble.scheduler import Span, share_out, usable_cores
-from stiction.ensemble.work import raise_failure
-from stiction.errors import (
-    InputError,
-    collect_warnings,
-    unknown_name,
-    warn_accuracy,
-    warn_user,
-)
-from stiction.methods import Method, check_method
-from stiction.model import describe, names_to_keep, to_plain, whole
+from stiction.ensemble.table import Table
+from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
+from stiction.methods import Method
+from stiction.model import describe, names_to_keep, to_plain
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, check_time_limit
-from stiction.random.coefficients import in_stress, mean_in_stress
 from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.random_interface import RandomInterface
 from stiction.random.resolution import warn_if_inaccurate
-from stiction.sample import PROFILES
 
 KEEP_LIMIT = 2.0**30
 FEW = 4
+HOPELESS = 16
+"""Samples of a point that fail, with none solved, before the whole ensemble is given up."""
 
 
-def make_plan(
-    problem: Problem,
-    random: Any,
-    method: Method,
-    seed: int,
-    keep: tuple[str, ...] = (),
-    keep_samples: tuple[int, ...] | None = None,
-) -> Plan:
-    """The plan of these arguments, or one `InputError` with all that is wrong with them."""
-    check_method(method)
-    problems: list[str] = []
-    if not isinstance(problem, Problem):
-        problems.append(f"problem: must be a Problem, got {describe(problem)}")
-    interface = None
-    try:
-        interface = as_random_interface(random)
-        if isinstance(problem, Problem):
-            interface = in_stress(problem, interface)
-    except InputError as error:
-        problems += error.problems
-    number = whole(seed)
-    if number is None or number < 0:
-        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
-    if isinstance(problem, Problem):
-        problems += refusals(problem, method)
-    if isinstance(problem, Problem) and interface is not None:
-        for name, field in interface.properties.items():
-            try:
-                field.modes(problem.interface)
-            except InputError as error:
-                problems += [f"{name}: {text}" for text in error.problems]
-        method, mistakes = _keep_of_method(problem, method, keep, set(interface.names))
-        problems += mistakes
-    if problems or interface is None or number is None:
+class Rows(Protocol):
+    """Where the samples of an ensemble go: to memory, or to a folder."""
+
+    def add(self, table: Table) -> None:
+        """Take the rows of a table."""
+
+    def save(self, *, now: bool = False) -> None:
+        """Store them if it is time to, or now."""
+
+
+def compute(
+    points: Sequence[Experiment],
+    done: NDArray[np.bool_],
+    rows: Rows,
+    *,
+    first: int = 0,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Show = True,
+    time_limit: float | None = None,
+    seconds: float = 0.25,
+) -> None:
+    """Compute the samples of some points that are not done.
+
+    Parameters
+    ----------
+    points : sequence of Experiment
+    done : (points, samples) array of bool
+    rows : Rows
+        Gets them as they are solved. When the seconds of `time_limit` are over, the rest is left.
+    first : int
+        Number of the first sample.
+    workers, executor, progress, time_limit
+        See `monte_carlo`.
+    seconds : float
+        About how long a piece of work takes.
+
+    Raises
+    ------
+    InputError, RuntimeError
+        If no sample of a point can be solved.
+    StoreError, WorkerError
+    """
+    spans = missing_spans(done, first)
+    if spans:
+        check_fields(points)
+    solved = done.any(axis=1)
+    lost = np.zeros(len(points), dtype=np.int64)
+    enough = np.minimum(HOPELESS, (~done).sum(axis=1))
+    workers = usable_cores() if workers is None else workers
+    work = solve_spans(points, spans, executor=executor, workers=workers, seconds=seconds)
+    total = sum(span.samples for span in spans)
+    with (
+        Meter(_method_name(points), total, progress, time_limit=time_limit) as meter,
+        closing(work),
+    ):
+        try:
+            for table in work:
+                if table is not None:
+                    rows.add(table)
+                    meter.advance(table.count)
+                    solved[table.point] = True
+                    for failure in table.failures:
+                        lost[failure.point] += 1
+                        if (
+                            lost[failure.point] >= enough[failure.point]
+                            and not solved[failure.point]
+                        ):
+                            raise failure.exception()
+                rows.save()
+                if meter.over:
+                    break
+        finally:  # also on Ctrl-C, and when workers are lost: what is done is kept
+            rows.save(now=True)
+
+
+def _method_name(points: Sequence[Experiment]) -> str:
+    """The method of some points, for progress."""
+    names = {point.method.label for point in differing_in(points, "method")}
+    return str(names.pop()) if len(names) == 1 else "samples"
+
+
+def check_fields(points: Sequence[Experiment]) -> None:
+    """Warn of fields that do not suit the grid, the interface or their units, once each."""
+    pairs = list(
+        dict.fromkeys(
+            (field, point.problem.interface)
+            for point in differing_in(points, "random", "problem.interface")
+            for field in point.random.properties.values()
+        )
+    )
+    meter = Meter("checking the fields", len(pairs) + len(points), unit="fields")
+    with collect_warnings() as caught, meter:
+        for field, interface in pairs:
+            warn_if_inaccurate(field, interface)
+            meter.advance()
+        for point in points:
+            point.problem.warn_of_units(point.mean("strength"))
+            check_residual(point.problem, point.random.properties)
+            meter.advance()
+    found = list(dict.fromkeys(caught))
+    for text, category in found[:FEW]:
+        warn_user(text, category)
+    if len(found) > FEW:
+        more = f"{len(found) - FEW} more warnings like these, at other points of the sweep"
+        warn_accuracy(more)
+
+
+def wide_bytes(experiment: Experiment, samples: int, first: int = 0) -> float:
+    """Return the bytes of what is kept along the interface."""
+    kept = samples
+    if experiment.keep_samples is not None:
+        kept = sum(first <= sample < first + samples for sample in experiment.keep_samples)
+    return 8.0 * experiment.problem.interface.size * len(experiment.wide) * kept
+
+
+def check_size(needed: float, limit: float) -> None:
+    """Refuse to keep more than the stated size."""
+    if needed > limit:
+        raise InputError(
+            f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
+            f" keep_limit = {limit / 2**20:,.0f} MiB; keep fewer variables, choose samples with"
+            " keep_samples, or raise keep_limit (bytes)"
+        )
+
+
+def check_options(
+    *, workers: Any, executor: Any, progress: Any, time_limit: Any, pilot: Any
+) -> int | None:
+    """Return the number of workers; refuse options of a run that make no sense."""
+    check_progress(progress)
+    check_flag("pilot", pilot)
+    if workers is not None:
+        workers = check_count("workers", workers, 1)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise InputError(
+            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
+        )
+    problems = check_time_limit(time_limit)
+    if problems:
         raise InputError(problems)
-    return Plan(problem, interface, method, number, keep, keep_samples)
-
-
-def _keep_of_method(
-    problem: Problem, method: Any, keep: tuple[str, ...], random: set[str]
-) -> tuple[Any, list[str]]:
-    """The method with the options switched on that `keep` names, and what cannot be kept."""
-    switches = {
-        field.name
-        for field in dataclasses.fields(method)
-        if isinstance(getattr(method, field.name), bool)
-    }
-
-    def wide(name: str) -> bool:
-        wider = dataclasses.replace(method, **{name: True}) if name in switches else method
-        found = wider.variables(problem)
-        return name in found and found[name].wide
-
-    problems = []
-    for name in keep:
-        known = name in random or name in method.variables(problem)
-        if not known and name in switches and wide(name):
-            method = dataclasses.replace(method, **{name: True})
-        elif not known and name in PROFILES:
-            valid = ", ".join(sorted(random))
-            problems.append(f"keep: {name!r} is not random here (valid: {valid})")
-        elif not known:
-            names = {n for n in switches | set(method.variables(problem)) if wide(n)}
-            problems.append(unknown_name("keep", name, sorted(random | names)))
-    return method, problems
+    return workers
 
 
 def _check_keep(
@@ -139,126 +210,31 @@ def _check_keep(
     return names, None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
 
 
-def check_run(
-    samples: Any, first: Any, workers: Any, executor: Any, time_limit: Any = None
-) -> tuple[int, int, int | None]:
-    """Samples, first and workers as ints; refuses what makes no sense, before any work is done."""
-    samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
-    problems = too_many_samples(samples, first)
-    if problems:
-        raise InputError(problems)
-    if workers is not None:
-        workers = check_count("workers", workers, 1)
-    if executor is not None and not hasattr(executor, "submit"):
-        raise InputError(
-            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
-        )
-    problems = check_time_limit(time_limit)
-    if problems:
-        raise InputError(problems)
-    return samples, first, workers
-
-
-def wide_bytes(plan: Plan, samples: int, first: int = 0) -> float:
-    """Bytes of what is kept along the interface."""
-    kept = samples
-    if plan.keep_samples is not None:
-        kept = sum(first <= sample < first + samples for sample in plan.keep_samples)
-    return 8.0 * plan.problem.interface.size * len(plan.wide) * kept
-
-
-def check_size(needed: float, limit: float) -> None:
-    """Refuse to keep more than the stated size."""
-    if needed > limit:
-        raise InputError(
-            f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
-            f" keep_limit = {limit / 2**20:,.0f} MiB; keep fewer variables, choose samples with"
-            " keep_samples, or raise keep_limit (bytes)"
-        )
-
-
-def warn_of_fields(plans: Sequence[Plan]) -> None:
-    """Warn of fields that do not go with the grid, the interface or their units, once each."""
-    pairs = list(
-        dict.fromkeys(
-            (field, plan.problem.interface)
-            for plan in differing_in(plans, "random", "problem.interface")
-            for field in plan.random.properties.values()
-        )
-    )
-    meter = Meter("checking the fields", len(pairs) + len(plans), unit="fields")
-    with collect_warnings() as caught, meter:
-        for field, interface in pairs:
-            warn_if_inaccurate(field, interface)
-            meter.advance()
-        for plan in plans:
-            problem, fields = plan.problem, plan.random.properties
-            problem.warn_of_units(mean_in_stress(problem, fields, "strength"))
-            check_residual(problem, fields)
-            meter.advance()
-    found_warnings = list(dict.fromkeys(caught))
-    for text, category in found_warnings[:FEW]:
-        warn_user(text, category)
-    if len(found_warnings) > FEW:
-        more = f"{len(found_warnings) - FEW} more warnings like these, at other points of the sweep"
-        warn_accuracy(more)
-
-
-def plan_attributes(plan: Plan, samples: int, first: int = 0) -> dict[str, Any]:
-    """All it takes to run the plan again, as a study in plain form."""
-    ensemble: dict[str, Any] = {"samples": samples, "seed": plan.seed, "first": first}
-    ensemble["keep"] = list(plan.keep)
-    if plan.keep_samples is not None:
-        ensemble["keep_samples"] = list(plan.keep_samples)
-    try:
-        study: dict[str, Any] = {
-            "problem": to_plain(plan.problem),
-            "random": to_plain(plan.random),
-            "method": to_plain(plan.method),
-            "ensemble": ensemble,
-        }
-    except InputError as error:  # a function of the user's: the result says so and is still one
-        return {"study_incomplete": str(error), "seed": plan.seed}
-    return {"study": study, "seed": plan.seed}
-
-
-def run_plans(
-    plans: Sequence[Plan],
+def gather(
+    points: Sequence[Experiment],
     samples: int,
     *,
     first: int = 0,
     axes: Sequence[GridAxis] = (),
     attributes: Mapping[str, Any],
-    workers: int | None = None,
-    executor: Executor | None = None,
-    progress: Show = True,
+    pilot: bool = True,
     time_limit: float | None = None,
+    **options: Any,
 ) -> xr.Dataset:
-    """Compute samples first .. first + samples - 1 of every plan; see `monte_carlo`."""
-    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
-    warn_of_fields(plans)
-    workers = usable_cores() if workers is None else workers
-    gathered = Gathered(plans, samples, first)
-    total = len(plans) * samples
-    done = np.zeros((len(plans), samples), dtype=np.bool_)
-    with Meter(method_name(plans), total, progress, time_limit=time_limit) as meter:
-        spans = [Span(point, first, samples) for point in range(len(plans))]
-        with closing(share_out(plans, spans, executor=executor, workers=workers)) as work:
-            for outcome in work:
-                if outcome is not None:
-                    if outcome.failures:
-                        raise_failure(outcome.failures[0])
-                    gathered.add(outcome)
-                    done[outcome.point, outcome.samples - first] = True
-                    meter.advance(outcome.count)
-                if meter.over:
-                    break
-    result = gathered.dataset(attributes, axes)
-    return result if done.all() else _cut_short(result, done)
+    """Compute samples first .. first + samples - 1 of every point in memory; see `monte_carlo`."""
+    rows = Gathered(points, samples, first)
+    compute(points, rows.done.copy(), rows, first=first, time_limit=time_limit, **options)
+    if pilot:
+        attributes = {**attributes, **pilot_attributes(points, samples, first)}
+    result = rows.dataset(attributes, axes)
+    warn_of_failures(rows.failed, len(points) * samples)
+    for failure in rows.failed:
+        rows.done[failure.point, failure.sample - first] = True
+    return result if rows.done.all() else _cut_short(result, rows.done)
 
 
 def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
-    """What there is when the time was over: the first samples, up to one that no point has."""
+    """The first samples, up to one that no point has, when the time was over."""
     count = int(np.argmin(np.append(done.any(axis=0), False)))
     if not count:
         raise TimeoutError(
@@ -274,10 +250,22 @@ def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
     return result.assign_attrs(cut_short=text)
 
 
-def method_name(plans: Sequence[Plan]) -> str:
-    """For the progress bar."""
-    names = {plan.method.label for plan in differing_in(plans, "method")}
-    return str(names.pop()) if len(names) == 1 else "samples"
+def study_attributes(experiment: Experiment, samples: int, first: int = 0) -> dict[str, Any]:
+    """Return all it takes to run an experiment again, as a study in plain form."""
+    ensemble: dict[str, Any] = {"samples": samples, "seed": experiment.seed, "first": first}
+    ensemble["keep"] = list(experiment.keep)
+    if experiment.keep_samples is not None:
+        ensemble["keep_samples"] = list(experiment.keep_samples)
+    try:
+        study: dict[str, Any] = {
+            "problem": to_plain(experiment.problem),
+            "random": to_plain(experiment.random),
+            "method": to_plain(experiment.method),
+            "ensemble": ensemble,
+        }
+    except InputError as error:  # a function of the user's: the result says so and is still one
+        return {"study_incomplete": str(error), "seed": experiment.seed}
+    return {"study": study, "seed": experiment.seed}
 
 
 def monte_carlo(
@@ -295,6 +283,7 @@ def monte_carlo(
     executor: Executor | None = None,
     progress: Show = True,
     time_limit: float | None = None,
+    pilot: bool = True,
 ) -> xr.Dataset:
     """Onset of many random interfaces.
 
@@ -329,26 +318,33 @@ def monte_carlo(
     time_limit : float, optional
         Seconds. When they are over, the result holds the samples that are done, with the
         attribute 'cut_short'; they are the first ones, to which `first` adds the rest later.
+    pilot : bool
+        Solve the first samples by `Equilibrium` too if the method is the local criterion, 32 on a
+        line and 8 on a plane, and say how far the two are apart; the ensemble stays the same.
 
     Returns
     -------
     xarray.Dataset
         Over 'sample', as from `onset`. The attributes hold the version, the study as JSON and the
-        seed: enough to run it again.
+        seed: enough to run it again. Samples that could not be solved are NaN, and listed in the
+        attribute 'failed_samples' (point, sample, seed, message, whether the sample itself does
+        not fit). With a pilot, 'pilot_bias' and 'pilot_scatter' are the mean and the standard
+        deviation of the difference in `critical_stress`, relative to the mean by `Equilibrium`.
 
     Raises
     ------
     InputError
-        Naming all that does not fit; a sample that does not fit is named with its seed.
+        Naming all that does not fit. If no sample at all can be solved, naming one with its seed.
     RuntimeError
-        Naming the sample and the seed, if a solver fails.
+        Naming a sample and the seed, if a solver fails on all of them.
     TimeoutError
         If not one sample was done within `time_limit`.
 
     Warns
     -----
     AccuracyWarning
-        If the time limit was reached.
+        If the time limit was reached, samples could not be solved, or the pilot differs from the
+        local criterion by more than 1 %.
 
     Examples
     --------
@@ -361,17 +357,23 @@ def monte_carlo(
     (('sample',), 'Pa')
     """
     names, chosen = _check_keep(keep, keep_samples, keep_limit)
-    check_progress(progress)
-    samples, first, workers = check_run(samples, first, workers, executor, time_limit)
-    plan = make_plan(problem, random, method, seed, names, chosen)
-    check_size(wide_bytes(plan, samples, first), keep_limit)
-    return run_plans(
-        [plan],
+    samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
+    seed = check_count("seed", seed, 0)
+    if problems := too_many_samples(samples, first):
+        raise InputError(problems)
+    workers = check_options(
+        workers=workers, executor=executor, progress=progress, time_limit=time_limit, pilot=pilot
+    )
+    experiment = Experiment(problem, random, method, names, chosen, seed)
+    check_size(wide_bytes(experiment, samples, first), keep_limit)
+    return gather(
+        [experiment],
         samples,
         first=first,
-        attributes=plan_attributes(plan, samples, first),
+        attributes=study_attributes(experiment, samples, first),
         workers=workers,
         executor=executor,
         progress=progress,
         time_limit=time_limit,
+        pilot=pilot,
     )

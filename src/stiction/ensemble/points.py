@@ -1,4 +1,4 @@
-"""The plans of all points of a sweep: made when they are asked for, each part of them once."""
+"""The experiments at all points of a sweep: made on demand, each part of them once."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, overload
 
-from stiction.ensemble.plan import Plan
+from stiction.ensemble.experiment import Experiment
 from stiction.results import Variable
 
 PARTS_KEPT = 2048
 
 
-class Plans(Sequence[Plan]):
-    """One plan for each point of a sweep, none of them kept: a sweep may have 1e5 points.
+class Points(Sequence[Experiment]):
+    """One experiment for each point of a sweep, none of them kept: a sweep may have 1e5 points.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ class Plans(Sequence[Plan]):
     part : callable
         Gets the name of a part and the steps of the axes (that touch no other part at all: 0) and
         returns the part there.
-    plan : callable
-        Gets all parts by name and returns the plan.
+    make : callable
+        Gets all parts by name and returns the experiment.
     """
 
     def __init__(
@@ -37,9 +37,9 @@ class Plans(Sequence[Plan]):
         sizes: Sequence[int],
         names: Sequence[str],
         part: Callable[[str, tuple[int, ...]], Any],
-        plan: Callable[[Mapping[str, Any]], Plan],
+        make: Callable[[Mapping[str, Any]], Experiment],
     ) -> None:
-        self._keys, self._sizes, self._names, self._plan = keys, sizes, names, plan
+        self._keys, self._sizes, self._names, self._make = keys, sizes, names, make
         self._touching = {name: self._axes_of((name,)) for name in names}
         self._part = lru_cache(maxsize=PARTS_KEPT)(part)
 
@@ -59,15 +59,15 @@ class Plans(Sequence[Plan]):
         return math.prod(self._sizes)
 
     @overload
-    def __getitem__(self, number: int) -> Plan: ...
+    def __getitem__(self, number: int) -> Experiment: ...
     @overload
-    def __getitem__(self, number: slice) -> list[Plan]: ...
-    def __getitem__(self, number: int | slice) -> Plan | list[Plan]:
+    def __getitem__(self, number: slice) -> list[Experiment]: ...
+    def __getitem__(self, number: int | slice) -> Experiment | list[Experiment]:
         if isinstance(number, slice):
             return [self[i] for i in range(*number.indices(len(self)))]
         if not -len(self) <= number < len(self):
             raise IndexError(number)
-        return self._plan(self.parts(int(number) % len(self)))
+        return self._make(self.parts(int(number) % len(self)))
 
     def parts(self, number: int) -> dict[str, Any]:
         """The parts of a point."""
@@ -81,8 +81,8 @@ class Plans(Sequence[Plan]):
             for name, touching in self._touching.items()
         }
 
-    def differing_in(self, *prefixes: str) -> list[Plan]:
-        """One plan for each combination of what is swept in these parts, all else as at first."""
+    def differing_in(self, *prefixes: str) -> list[Experiment]:
+        """Return one experiment for each combination of what is swept in these parts."""
         axes = self._axes_of(prefixes)
         numbers = [0]
         for axis in axes:
@@ -91,12 +91,12 @@ class Plans(Sequence[Plan]):
         return [self[number] for number in numbers]
 
 
-def differing_in(plans: Sequence[Plan], *prefixes: str) -> Sequence[Plan]:
-    """Plans among which everything occurs that these parts of a study are at any point."""
-    return plans.differing_in(*prefixes) if isinstance(plans, Plans) else plans
+def differing_in(points: Sequence[Experiment], *prefixes: str) -> Sequence[Experiment]:
+    """Points among which everything occurs that these parts of a study are at any point."""
+    return points.differing_in(*prefixes) if isinstance(points, Points) else points
 
 
-def variables_in(plans: Sequence[Plan]) -> dict[str, Variable]:
+def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
     """All variables of any point, in the order in which the first one's method names them."""
-    some = differing_in(plans, "method", "problem.load")
-    return {name: variable for plan in some for name, variable in plan.variables.items()}
+    some = differing_in(points, "method", "problem.load")
+    return {name: variable for point in some for name, variable in point.variables.items()}

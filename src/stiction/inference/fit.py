@@ -18,7 +18,7 @@ from stiction._checks import (
     is_whole,
 )
 from stiction.arrays import Array
-from stiction.ensemble.scheduler import usable_cores
+from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.bootstrap import Repetitions, at_ends, intervals, parameters_of, repeat
 from stiction.inference.estimate import (

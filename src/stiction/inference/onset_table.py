@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from stiction._checks import refusals
 from stiction.arrays import Array
-from stiction.ensemble.monte_carlo import warn_of_fields
-from stiction.ensemble.plan import Plan, chunks, compute
-from stiction.ensemble.scheduler import usable_cores
+from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.monte_carlo import check_fields
 from stiction.errors import InputError
 from stiction.inference.affine import Affine
 from stiction.inference.prior import Prior
@@ -165,19 +165,19 @@ def simulate(
     for theta in thetas:
         problem, random = prior.at(theta)
         problem = problem if length is None else with_length(problem, length)
-        plans.append(Plan(problem, random, method, seed))
+        plans.append(Experiment(problem, random, method, seed=seed))
     check_points(prior, thetas, plans)
     peaks = np.empty((len(plans), samples))
     places = np.full((len(plans), samples), np.nan)
     jobs = [
         (point, start, count)
         for point, plan in enumerate(plans)
-        for start, count in chunks(samples, max(BLOCK, plan.piece), first)
+        for start, count in plan.batches(first, samples, max(BLOCK, plan.batch))
     ]
 
     def work(job: tuple[int, int, int]) -> None:
         point, start, count = job
-        values = compute(plans[point], start, count)
+        values = plans[point].results(seed, start, count)
         part = slice(start - first, start - first + count)
         peaks[point, part] = values[variable]
         position = np.asarray(values["critical_position"])
@@ -190,7 +190,7 @@ def simulate(
     return peaks, places
 
 
-def check_points(prior: Prior, thetas: Array, plans: Sequence[Plan]) -> None:
+def check_points(prior: Prior, thetas: Array, plans: Sequence[Experiment]) -> None:
     """Refuse points that the method cannot take, and warn of what is inaccurate at the ends."""
     for theta, plan in zip(thetas, plans, strict=True):
         try:
@@ -200,4 +200,4 @@ def check_points(prior: Prior, thetas: Array, plans: Sequence[Plan]) -> None:
             refused = list(error.problems)
         if refused:
             raise InputError([f"prior: at {prior.text(theta)}: {text}" for text in refused])
-    warn_of_fields([plans[0], plans[-1]])
+    check_fields([plans[0], plans[-1]])

@@ -17,7 +17,7 @@ from stiction._checks import (
     refusals,
 )
 from stiction.arrays import Array
-from stiction.ensemble.plan import Plan, chunks, compute
+from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import full_key, with_parameters
 from stiction.methods import Method, check_method
@@ -89,10 +89,12 @@ class Simulator:
         problem, random = self.at(theta)
         if refused := refusals(problem, self.method):
             raise InputError(refused)
-        plan = Plan(problem, random, self.method, self.seed)
+        experiment = Experiment(problem, random, self.method)
         parts = [
-            compute(plan, start, count)["critical_stress"]
-            for start, count in chunks(self.samples, max(256, plan.piece), first)
+            experiment.results(self.seed, start, count)["critical_stress"]
+            for start, count in experiment.batches(
+                first, self.samples, max(256, experiment.batch)
+            )
         ]
         peaks: Array = np.concatenate(parts)
         if self.load_cell_error > 0.0:

@@ -12,7 +12,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stiction.ensemble.files import write_whole
+from stiction.files import write_whole
 
 COLUMN = 3.375
 PAGE = 6.75

@@ -15,9 +15,8 @@ import numpy as np
 from stiction._checks import is_whole, numbers
 from stiction.arrays import Array
 from stiction.criterion.plane import windows_of
-from stiction.ensemble.monte_carlo import make_plan
-from stiction.ensemble.plan import sample_of
-from stiction.ensemble.scheduler import usable_cores
+from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.friction.law import SCALES
 from stiction.model import describe
@@ -109,7 +108,8 @@ class LimitState:
 
     def onset(self, profiles: dict[str, Array]) -> dict[str, Any]:
         """All that the method says of some profiles."""
-        return dict(self._solver(sample_of(self.problem, self.method, profiles)))
+        sample = Experiment(self.problem, self.random, self.method).sample(profiles)
+        return dict(self._solver(sample))
 
     def _stress(self, draws: Array) -> Array:
         # Rounding may leave a stress a hair below the bound.
@@ -331,7 +331,7 @@ def make_limit_state(
         found.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     state = None
     try:
-        interface = make_plan(problem, random, method, seed).random
+        interface = Experiment(problem, random, method, seed=seed).random
         first = isinstance(event, str) and event == "first_instability"
         kind: Event = "first_instability" if first else "critical_stress"
         state = LimitState(problem, interface, method, kind, per_pressure=per_pressure)

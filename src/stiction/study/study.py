@@ -20,37 +20,95 @@ from stiction._checks import (
     as_path,
     check_flag,
     check_instance,
-    check_progress,
     too_many_samples,
 )
-from stiction.dotted_keys import part_with_values
-from stiction.ensemble.assemble import GridAxis
-from stiction.ensemble.distributed import Cluster
-from stiction.ensemble.monte_carlo import KEEP_LIMIT, check_size, make_plan, run_plans, wide_bytes
-from stiction.ensemble.part import as_part
-from stiction.ensemble.plan import Plan
-from stiction.ensemble.points import Plans, differing_in, variables_in
-from stiction.errors import InputError
-from stiction.inference.settings import Inference
+from stiction.ensemble.dataset import GridAxis
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.monte_carlo import (
+    KEEP_LIMIT,
+    check_options,
+    check_size,
+    gather,
+    wide_bytes,
+)
+from stiction.ensemble.points import Points, differing_in, variables_in
+from stiction.ensemble.store import Store
+from stiction.errors import InputError, StoreError, unknown_name
 from stiction.methods import methods
 from stiction.model import (
+    Count,
+    Positive,
+    _count,
+    describe,
     explain,
     model,
+    names_to_keep,
     to_plain,
+    whole,
 )
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.ensemble import Ensemble
-from stiction.study.study_file import (
-    completed,
-    read_sweep,
-    read_toml,
-    reading,
-    refuse_first_version,
-)
+from stiction.study.dotted_keys import part_with_values
+from stiction.study.run import StoredRun, result_of, run_into
+from stiction.study.study_file import completed, read_sweep, read_toml, reading
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
+
+Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
+
+MOST_KEPT = 10**6
+
+
+def _chosen(value: Any) -> Any:
+    """A number of samples stands for the first ones."""
+    count = whole(value)
+    if count is not None and count > MOST_KEPT:
+        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
+    if count is not None and count > 0:
+        return tuple(range(count))
+    if not isinstance(value, list | tuple):
+        raise InputError(
+            "must be a list of sample numbers, or how many of the first samples to keep;"
+            f" got {describe(value)}"
+        )
+    return tuple(value)
+
+
+@model(kw_only=True)
+class Ensemble:
+    """How many samples, and which.
+
+    Parameters
+    ----------
+    samples : int
+        Number of samples.
+    seed : int
+        Not negative.
+    first : int
+        Number of the first sample.
+    keep : str or tuple of str
+        What is kept along the interface: random fields, such as ``"strength"``, and what the
+        method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
+    keep_samples : tuple of int or int, optional
+        Numbers of the samples for which it is kept, or how many of the first; all if left out.
+    keep_limit : float, optional
+        Bytes that this may take in all; 1 GiB if left out.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Ensemble(samples=1e4, seed=1).samples
+    10000
+    """
+
+    samples: Count
+    seed: Number = 0
+    first: Number = 0
+    keep: Annotated[tuple[str, ...], BeforeValidator(names_to_keep)] = ()
+    keep_samples: Annotated[tuple[Number, ...], BeforeValidator(_chosen)] | None = None
+    keep_limit: Positive | None = None
+
 
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
@@ -86,10 +144,6 @@ class Study:
         Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
         of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
         the sweep has the same samples.
-    cluster : Cluster, optional
-        What ``stiction run --slurm`` asks for; no part of what is computed.
-    inference : Inference, optional
-        What ``stiction infer`` is to find out; no part of what is computed.
     title : str
         For people.
 
@@ -121,8 +175,6 @@ class Study:
     method: AnyMethod
     ensemble: Ensemble
     sweep: Sweep = ()
-    cluster: Cluster | None = None
-    inference: Inference | None = None
     title: str = ""
 
     @model_validator(mode="after")
@@ -131,7 +183,7 @@ class Study:
             return self
         self._check_points()
         ensemble = self.ensemble
-        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.plans))
+        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.experiments))
         if problems:
             raise InputError([f"ensemble.{text}" for text in problems])
         if ensemble.keep:
@@ -140,26 +192,28 @@ class Study:
 
     def _check_kept(self) -> None:
         ensemble = self.ensemble
-        some = differing_in(self.plans, "method", "problem.load", "problem.interface", "random")
-        nodes = {plan.problem.interface.shape for plan in some}
-        if len(nodes) > 1 and any(plan.wide for plan in some):
+        some = differing_in(
+            self.experiments, "method", "problem.load", "problem.interface", "random"
+        )
+        nodes = {point.problem.interface.shape for point in some}
+        if len(nodes) > 1 and any(point.wide for point in some):
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
-        size = sum(wide_bytes(plan, ensemble.samples, ensemble.first) for plan in some)
+        size = sum(wide_bytes(point, ensemble.samples, ensemble.first) for point in some)
         try:
-            check_size(size * len(self.plans) / len(some), ensemble.keep_limit or KEEP_LIMIT)
+            check_size(size * len(self.experiments) / len(some), ensemble.keep_limit or KEEP_LIMIT)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
 
     def _check_points(self) -> None:
-        """Make every plan once; what is wrong is said once, with the points where it is."""
+        """Make every experiment once; a mistake is reported once, with the points where it is."""
         problems: dict[str, list[int]] = {}
-        with Meter("checking the sweep", len(self.plans), unit="points") as meter:
-            for number in range(len(self.plans)):
+        with Meter("checking the sweep", len(self.experiments), unit="points") as meter:
+            for number in range(len(self.experiments)):
                 try:
-                    self.plans[number]
+                    self.experiments[number]
                 except InputError as error:
                     for text in error.problems:
                         problems.setdefault(text, []).append(number)
@@ -178,8 +232,8 @@ class Study:
         return points_of(self.sweep)
 
     @cached_property
-    def plans(self) -> Sequence[Plan]:
-        """What is to be computed, one plan a point, made when it is asked for."""
+    def experiments(self) -> Sequence[Experiment]:
+        """What is to be computed: one `Experiment` a point, made on demand."""
         base = _Parts(**{name: getattr(self, name) for name in _PARTS})
         keys = [axis.keys for axis in self.sweep]
 
@@ -192,12 +246,12 @@ class Study:
             }
             return part_with_values(base, name, values) if values else getattr(base, name)
 
-        return Plans(keys, [len(axis.steps) for axis in self.sweep], _PARTS, part, _plan)
+        return Points(keys, [len(axis.steps) for axis in self.sweep], _PARTS, part, _experiment)
 
     @property
     def axes(self) -> list[GridAxis]:
         """The axes of the sweep as dimensions of the result."""
-        variables = set(variables_in(self.plans))
+        variables = set(variables_in(self.experiments))
         return grid_axes(
             self.sweep, sorted(variables | {"sample", "kept_sample", "x", "y", "position"})
         )
@@ -209,8 +263,6 @@ class Study:
             plain = self.to_dict()
         except InputError as error:  # a function of the user's: the result says so
             return {"study_incomplete": str(error), "seed": self.ensemble.seed}
-        for name in ("cluster", "inference"):
-            plain.pop(name, None)
         result: dict[str, Any] = {"study": plain, "seed": self.ensemble.seed}
         return result | ({"title": self.title} if self.title else {})
 
@@ -221,74 +273,68 @@ class Study:
         workers: int | None = None,
         executor: Executor | None = None,
         progress: Show = True,
-        retry: bool = False,
         time_limit: float | None = None,
-        lock: bool = True,
+        retry: bool = False,
         part: tuple[int, int] | str | None = None,
+        pilot: bool = True,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
         Parameters
         ----------
         out : path, optional
-            A folder in which results are stored as they are done, or a file ending in ``.nc`` with
-            such a folder beside it until it is complete. The same call goes on where a run was
-            interrupted, and computes only what is new if `samples` was raised.
-        workers, executor, progress, time_limit
+            A folder in which results are stored as they are done. The same call goes on where a
+            run was interrupted, and computes only what is new if `samples` was raised.
+        workers, executor, progress, time_limit, pilot
             See `stiction.monte_carlo`. With `out`, what is missing when the time is over is NaN,
             and the same call goes on.
         retry : bool
             Compute stored samples that failed again.
-        lock : bool
-            Keep other runs out of the folder while this one writes; False for file systems that
-            have no locks.
         part : (int, int) or str, optional
-            Compute one part of so many only, such as (3, 100) or "3/100", into a folder of its own
-            beside `out`, for jobs that know nothing of each other; `stiction.merge_parts` joins
-            them to the same numbers as one run.
+            Compute one part of so many only, such as (3, 100) or "3/100", into the same folder as
+            the other parts: for jobs that do not know of each other.
 
         Returns
         -------
         xarray.Dataset
-            Over the sweep's axes and 'sample'; NaN where a stored sample failed.
+            Over the sweep's axes and 'sample'; NaN where a sample failed or is missing.
 
         Raises
         ------
         InputError, RuntimeError
-            See `stiction.monte_carlo`; with `out`, samples that fail are listed in the attribute
-            'failed_samples' instead.
+            See `stiction.monte_carlo`.
         StoreError
             If `out` cannot be used, or what was stored is damaged before the end.
+        WorkerError
+            If a worker is lost.
         """
         check_flag("retry", retry)
-        check_progress(progress)
-        if part is not None and out is None:
-            raise InputError("part: a part is stored; say where with out=")
-        if out is not None:
-            from stiction.study_run import run_into
-
-            stored = run_into(
-                self,
-                out,
+        options: dict[str, Any] = {
+            "workers": check_options(
                 workers=workers,
                 executor=executor,
                 progress=progress,
-                retry=retry,
                 time_limit=time_limit,
-                lock=lock,
-                part=None if part is None else as_part(part),
-            )
-            return stored.dataset()
-        return run_plans(
-            self.plans,
-            self.ensemble.samples,
-            first=self.ensemble.first,
+                pilot=pilot,
+            ),
+            "executor": executor,
+            "progress": progress,
+            "time_limit": time_limit,
+            "pilot": pilot,
+        }
+        if out is not None:
+            stored = run_into(self, out, retry=retry, part=part, **options)
+            return result_of(stored, partial=time_limit is not None or part is not None)
+        if part is not None:
+            raise InputError("part: a part is stored; say where with out=")
+        ensemble = self.ensemble
+        return gather(
+            self.experiments,
+            ensemble.samples,
+            first=ensemble.first,
             axes=self.axes,
             attributes=self.attributes,
-            workers=workers,
-            executor=executor,
-            progress=progress,
-            time_limit=time_limit,
+            **options,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -330,7 +376,6 @@ class Study:
         """
         check_instance("study", given, dict)
         folder = None if folder is None else as_path("folder", folder)
-        refuse_first_version(given)
         sweep, mistakes = read_sweep(given, folder, cls)
         if sweep:
             given = completed(given, sweep)
@@ -376,11 +421,15 @@ class _Parts:
 _PARTS = tuple(_Parts.__dataclass_fields__)
 
 
-def _plan(parts: Mapping[str, Any]) -> Plan:
+def _experiment(parts: Mapping[str, Any]) -> Experiment:
     given = parts["ensemble"]
-    random = as_random_interface(parts["random"])
-    return make_plan(
-        parts["problem"], random, parts["method"], given.seed, given.keep, given.keep_samples
+    return Experiment(
+        parts["problem"],
+        parts["random"],
+        parts["method"],
+        keep=given.keep,
+        keep_samples=given.keep_samples,
+        seed=given.seed,
     )
 
 
@@ -392,3 +441,61 @@ def _at_points(text: str, points: list[Point]) -> str:
 def study_schema() -> dict[str, Any]:
     """JSON schema of a study file."""
     return pydantic.TypeAdapter(Study).json_schema()
+
+
+def read_setup(path: Path) -> tuple[Problem, Any]:
+    """Return the problem of a study file and its method or None, for what draws no samples.
+
+    Of a sweep, the first values.
+    """
+    given, folder = read_toml(path), path.parent
+    problems = [
+        unknown_name("study", name, Study.__dataclass_fields__)
+        for name in given
+        if name not in Study.__dataclass_fields__
+    ]
+    sweep, _ = read_sweep(given, folder, Study)
+    given = completed(given, sweep)
+    if "problem" not in given:
+        problems.append("problem: missing")
+    found: dict[str, Any] = {}
+    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod}
+    for name, kind in kinds.items():
+        if name not in given:
+            continue
+        try:
+            found[name] = pydantic.TypeAdapter(kind).validate_python(
+                given[name], context=reading(folder)
+            )
+        except pydantic.ValidationError as error:
+            problems += explain(error, Study, prefix=(name,))
+    if problems:
+        raise InputError(problems)
+    return found["problem"], found.get("method")
+
+
+def open_run(path: Any) -> StoredRun:
+    """Open a run on disk for reading.
+
+    Parameters
+    ----------
+    path : path
+        Its folder, as given to `Study.run` or ``stiction run --out``.
+
+    Returns
+    -------
+    StoredRun
+        With `study`, `status()`, `dataset()` and `export(path)`.
+
+    Raises
+    ------
+    InputError
+        If it is no path.
+    StoreError
+        If there is no run, or it cannot be read.
+    """
+    place = as_path("path", path)
+    if not place.is_dir():
+        raise StoreError(f"{place}: there is no run here; a run is a folder")
+    store = Store(place)
+    return StoredRun(store, Study.from_dict(store.study, trusted=True))

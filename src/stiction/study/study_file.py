@@ -12,27 +12,9 @@ from stiction.errors import InputError
 from stiction.placed import placed_profile
 from stiction.study.sweep import Sweep, unknown_keys
 
-FIRST_VERSION = ("strength", "residual_strength", "initial_stress", "weakening_rate")
-"""Tables of the study files of the first version, now below [random]."""
-
-
-def refuse_first_version(given: Any) -> None:
-    """Say what to write instead of the tables of the first version's study files."""
-    if not isinstance(given, dict) or "random" in given:
-        return
-    old = [name for name in FIRST_VERSION if name in given]
-    if old:
-        raise InputError(
-            [
-                f"{name}: what is random stands in one table now: write [random.{name}]"
-                for name in old
-            ]
-            + ["sweep: keys below these tables begin with 'random.' as well"] * ("sweep" in given)
-        )
-
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """What a TOML file holds; `InputError` if it is none."""
+    """Return what a TOML file holds; `InputError` if it is none."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -51,7 +33,7 @@ def reading(folder: str | Path | None) -> dict[str, Any]:
 
 
 def read_sweep(given: Any, folder: str | Path | None, study: type) -> tuple[Any, list[str]]:
-    """The axes of a study in plain form and its unknown keys; nothing if it cannot be read."""
+    """Return the axes of a study in plain form and its unknown keys; nothing if unreadable."""
     if not isinstance(given, dict) or "sweep" not in given:
         return (), []
     try:
@@ -63,7 +45,7 @@ def read_sweep(given: Any, folder: str | Path | None, study: type) -> tuple[Any,
 
 
 def completed(given: dict[str, Any], axes: Any) -> dict[str, Any]:
-    """The same with the first value of every swept key that has none of its own."""
+    """Return the same with the first value of every swept key that has none of its own."""
     result = given
     for axis in axes:
         if not axis.steps:

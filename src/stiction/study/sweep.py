@@ -17,16 +17,16 @@ import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction._checks import is_whole
-from stiction.dotted_keys import CORRELATION
-from stiction.ensemble.assemble import GridAxis
+from stiction.ensemble.dataset import GridAxis
 from stiction.errors import InputError, unknown_name
 from stiction.model import _models_in, describe, to_plain
 from stiction.placed import Placed, is_profile, placed_profile
 from stiction.results import Variable
+from stiction.study.dotted_keys import CORRELATION
 
 MOST_POINTS = 100_000
 _FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
-_FIXED_TABLES = ("title", "sweep", "cluster", "inference", "ensemble.keep_limit")
+_FIXED_TABLES = ("title", "sweep", "ensemble.keep_limit")
 _RANGE = ("start", "stop", "count", "spacing")
 _UNITS = {
     "length": "m",

@@ -17,9 +17,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction.ensemble.files import cannot_write
 from stiction.errors import InputError, warn_accuracy
-from stiction.files import write_dataset
+from stiction.files import cannot_write, write_dataset
 from stiction.progress import Meter
 from stiction.results import DIRECTION
 

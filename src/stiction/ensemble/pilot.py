@@ -1,0 +1,137 @@
+"""A pilot: some samples of an inexpensive method solved by its exact counterpart too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.criterion.method import LocalCriterion
+from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.experiment import Experiment
+from stiction.equilibrium.method import Equilibrium
+from stiction.errors import InputError, collect_warnings, warn_accuracy
+from stiction.progress import Meter
+
+ON_A_LINE, ON_A_PLANE = 32, 8
+"""Samples of a pilot."""
+MOST_POINTS = 8
+"""Points of a sweep that have a pilot."""
+WORTH_A_WARNING = 0.01
+
+
+class Pilot(NamedTuple):
+    """How far a method is from its exact counterpart, relative to the mean of the latter.
+
+    Attributes
+    ----------
+    samples : int
+        Solved by both.
+    bias, scatter : float
+        Mean and standard deviation of the difference.
+    """
+
+    samples: int
+    bias: float
+    scatter: float
+
+
+def exact_counterpart(experiment: Experiment) -> Experiment | None:
+    """Return the experiment by the method that the given one approximates; None if there is none.
+
+    The counterpart of the local criterion is `Equilibrium`, unless it cannot take the problem.
+    """
+    method = Equilibrium()
+    if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
+        return None
+    return Experiment(experiment.problem, experiment.random, method, seed=experiment.seed)
+
+
+def solved(experiment: Experiment, draws: Array, variable: str = "critical_stress") -> Array:
+    """Solve draws (samples, dimension) in threads; NaN where a sample cannot be solved."""
+
+    def one(row: Array) -> float:
+        try:
+            return float(experiment.onset(experiment.profiles(row[None, :]))[variable][0])
+        except (InputError, RuntimeError, ArithmeticError):
+            return float("nan")
+
+    with ThreadPoolExecutor(usable_cores()) as pool:
+        # Each in the context of the caller, which collects warnings.
+        found = [pool.submit(copy_context().run, one, row) for row in draws]
+        return np.array([future.result() for future in found])
+
+
+def compare(
+    experiment: Experiment, draws: Array, variable: str = "critical_stress"
+) -> Pilot | None:
+    """Solve draws by a method and by its exact counterpart.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    draws : (samples, dimension) array
+    variable : str
+        The stress to compare, `critical_stress` or `first_instability`.
+
+    Returns
+    -------
+    Pilot
+        None if there is no counterpart, or fewer than two samples are solved by both.
+    """
+    exact = exact_counterpart(experiment)
+    if exact is None:
+        return None
+    with collect_warnings():  # the ensemble itself warns
+        near, true = solved(experiment, draws, variable), solved(exact, draws, variable)
+    both = np.isfinite(near) & np.isfinite(true)
+    if both.sum() < 2:
+        return None
+    difference = (near - true)[both] / abs(float(true[both].mean()))
+    return Pilot(int(both.sum()), float(difference.mean()), float(difference.std(ddof=1)))
+
+
+def pilot_attributes(
+    points: Sequence[Experiment], samples: int, first: int = 0
+) -> Mapping[str, Any]:
+    """Compare the first samples of some points, and warn of a difference beyond 1 %.
+
+    Parameters
+    ----------
+    points : sequence of Experiment
+        Of many, eight are taken, the first and the last among them.
+    samples, first : int
+        Of the ensemble.
+
+    Returns
+    -------
+    dict
+        'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; empty if no
+        method has an exact counterpart.
+    """
+    chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
+    found: list[Pilot] = []
+    with Meter("comparing with the exact onset", len(chosen), unit="points") as meter:
+        for number in chosen:
+            experiment = points[int(number)]
+            size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
+            draws = experiment.draws(experiment.seed, first, min(samples, size))
+            pilot = compare(experiment, draws)
+            found += [pilot] if pilot else []
+            meter.advance()
+    if not found:
+        return {}
+    bias = max((pilot.bias for pilot in found), key=abs)
+    scatter = max(pilot.scatter for pilot in found)
+    if max(abs(bias), scatter) > WORTH_A_WARNING:
+        where = " at the worst point of the sweep" if len(points) > 1 else ""
+        warn_accuracy(
+            f"the local criterion differs from the exact onset by {100.0 * bias:+.2g} % on average,"
+            f" with a scatter of {100.0 * scatter:.2g} %{where} (a pilot of {found[0].samples}"
+            " samples); method=st.Equilibrium() has no such error"
+        )
+    return {"pilot_samples": found[0].samples, "pilot_bias": bias, "pilot_scatter": scatter}
