@@ -68,14 +68,6 @@ def check_instance(name: str, value: Any, kind: type) -> None:
         raise InputError(f"{name}: must be {article} {kind.__name__}, got {describe(value)}")
 
 
-def refusals(problem: Any, method: Any) -> list[str]:
-    """Why a method does not take a problem; no texts if it does."""
-    return [
-        f"method: the {method.label} cannot take this: {reason}"
-        for reason in method.supports(problem)
-    ]
-
-
 def check_progress(value: Any) -> None:
     """Refuse what is neither a truth value nor a function."""
     function = callable(value) and not isinstance(value, type)

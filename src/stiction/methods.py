@@ -1,4 +1,4 @@
-"""One call, any method: what a method is, which there are, and the onset of given profiles."""
+"""What a method is, which there are, and the onset of given profiles by any of them."""
 
 from __future__ import annotations
 
@@ -7,28 +7,31 @@ from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
+from pydantic import WrapValidator
 
-from stiction._checks import check_instance, refusals
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
-from stiction.model import describe, to_plain
+from stiction.model import Progress, checked, describe, to_plain
 from stiction.problem import Problem
-from stiction.profile_nodes import Gaps, check_gaps
+from stiction.profile_nodes import Gaps
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
     DIRECTION,
     FRICTION_COEFFICIENT,
+    ONSET_VARIABLES,
     SAMPLE,
     Variable,
     coordinate,
     to_dataset,
 )
 from stiction.sample import Sample, named_profiles
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FIRST = 16
 """Samples that `onset` solves before it knows how long one takes."""
@@ -108,7 +111,7 @@ def methods() -> Mapping[str, Any]:
 
 
 def check_method(method: Any) -> None:
-    """Refuse what is not a method object, in particular the class instead of an instance."""
+    """Raise an `InputError` unless `method` is a method; the class instead of an object is none."""
     if isinstance(method, type):
         raise InputError(
             f"method: must be an object, got the class {method.__name__}; write"
@@ -124,8 +127,28 @@ def check_method(method: Any) -> None:
         raise InputError(f"method: {describe(method)} lacks {', '.join(missing)}")
 
 
+def _as_method(value: Any, _: Any) -> Any:
+    try:
+        check_method(value)
+    except InputError as error:
+        raise InputError([text.removeprefix("method: ") for text in error.problems]) from None
+    return value
+
+
+MethodObject: TypeAlias = Annotated[Any, WrapValidator(_as_method)]
+"""Annotation of an argument that is a method; see `stiction.model.checked`."""
+
+
+def refusals(problem: Problem, method: Method) -> list[str]:
+    """Return why a method does not take a problem; no texts if it does."""
+    return [
+        f"method: the {method.label} cannot take this: {reason}"
+        for reason in method.supports(problem)
+    ]
+
+
 def accepted(method: Method) -> tuple[str, ...]:
-    """What `Problem.sample` may let through for a method, besides what every method can do."""
+    """Return what `Problem.sample` may let through for a method, beyond what every one takes."""
     return getattr(method, "accepts", ())
 
 
@@ -137,30 +160,60 @@ def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
         return {"study_incomplete": str(error)}
 
 
-def solve(solver: Solver, sample: Sample) -> Values:
-    """The solver's values, and what follows from them for every method alike."""
-    values = dict(solver(sample))
-    pressure = sample.normal_pressure.mean(axis=sample.axes)
-    if not np.isnan(pressure).all():
-        values["friction_coefficient"] = values["critical_stress"] / pressure
-    return values
+def prepared(problem: Problem, method: Method) -> Solver:
+    """Return the solver of a method, with what follows from its values for every method alike.
+
+    The solver raises `InputError` if its values are not those that the method promises.
+    """
+    solver = method.prepare(problem)
+    variables = method.variables(problem)
+    lacking = [name for name in ONSET_VARIABLES if name not in variables]
+    if lacking:
+        raise InputError(f"method: the variables of {method.label} lack {', '.join(lacking)}")
+
+    def solve(sample: Sample) -> Values:
+        values = {name: np.asarray(found) for name, found in solver(sample).items()}
+        _check_values(method, values, variables, sample)
+        pressure = sample.normal_pressure.mean(axis=sample.axes)
+        if not np.isnan(pressure).all():
+            values["friction_coefficient"] = values["critical_stress"] / pressure
+        return values
+
+    return solve
+
+
+def _check_values(
+    method: Method, values: Values, variables: Mapping[str, Variable], sample: Sample
+) -> None:
+    sizes = dict(zip(("x", "y"), sample.shape, strict=False))
+    sizes |= {"sample": sample.samples, DIRECTION: 2}
+    problems = [f"does not return {name!r}" for name in variables if name not in values]
+    for name, found in values.items():
+        if name not in variables:
+            problems.append(f"returns {name!r}, which is none of its variables")
+            continue
+        dims = variables[name].dims
+        shape = tuple(sizes.get(dim) for dim in dims)
+        if found.shape != shape and None not in shape:
+            over = ", ".join(dims)
+            problems.append(f"returns {name!r} of shape {found.shape}, not {shape} over ({over})")
+    if problems:
+        raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
 
 
 def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
     """All samples, some at a time: the numbers of one do not depend on those beside it."""
-    solver = method.prepare(problem)
-    parts: list[Values] = []
+    solver = prepared(problem, method)
+    parts: list[Mapping[str, NDArray[Any]]] = []
     with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
         for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
-            parts.append(solve(solver, sample.part(some)))
+            parts.append(solver(sample.part(some)))
             meter.advance(some.stop - some.start)
-    if len(parts) == 1:
-        return parts[0]
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
 def variables_of(problem: Problem, method: Method, pressure: bool = False) -> dict[str, Variable]:
-    """All that `solve` returns; `pressure` says that the normal pressure differs by sample."""
+    """Return the variables of a prepared solver; `pressure`: if that differs by sample."""
     variables = dict(method.variables(problem))
     if pressure or problem.load.normal_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
@@ -175,7 +228,7 @@ def label(
     attributes: Mapping[str, Any],
     more_variables: Mapping[str, Variable] = MappingProxyType({}),
 ) -> xr.Dataset:
-    """Values of many samples as a dataset over 'sample' (and the nodes where they have them)."""
+    """Label values of many samples: a dataset over 'sample', and the nodes where they differ."""
     variables = variables_of(problem, method, "friction_coefficient" in values)
     variables |= dict(more_variables)
     coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
@@ -185,15 +238,16 @@ def label(
     return to_dataset(values, variables, coordinates, attributes)
 
 
+@checked
 def onset(
     problem: Problem,
     profiles: Any,
     *,
-    method: Method,
+    method: MethodObject,
     gaps: Gaps = "refuse",
-    progress: Show = True,
+    progress: Progress = True,
 ) -> xr.Dataset:
-    """At which load, and where, do interfaces of given strength begin to slide?
+    """Compute at which load, and where, interfaces of given strength begin to slide.
 
     Parameters
     ----------
@@ -206,13 +260,12 @@ def onset(
         its coordinate (m) decides where a value belongs, and `units` that are stated are converted;
         see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
-        How to find out; nothing is chosen silently.
+        The method; there is no default.
     gaps : {"refuse", "fill", "skip"}
-        Whether missing values (NaN) are an error, are filled with straight lines between their
-        ends, or make that the samples that have any are left out; the others keep their numbers.
+        Whether to refuse missing values (NaN), fill them with straight lines between their ends,
+        or drop the samples that contain any (the others keep their index).
     progress : bool or callable
-        True shows how far it is, on standard error, once it takes more than two seconds; a
-        callable gets (done, total).
+        True shows progress on standard error after two seconds; a callable gets (done, total).
 
     Returns
     -------
@@ -225,7 +278,7 @@ def onset(
     Raises
     ------
     InputError
-        Naming all that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Warns
     -----
@@ -243,11 +296,8 @@ def onset(
     >>> bool(found.critical_stress.item() > tau_p.min())
     True
     """
-    check_method(method)
-    check_instance("problem", problem, Problem)
     if refused := refusals(problem, method):
         raise InputError(refused)
-    check_gaps(gaps)
     attributes = study_attributes(problem, method)
     measured = None
     if not isinstance(profiles, Sample):

@@ -240,9 +240,10 @@ def _models_in(annotation: Any) -> list[type]:
 
 def _parameters(owner: Any) -> dict[str, Any]:
     """Names and annotations of the fields of a model, or of the arguments of a function."""
-    hints = typing.get_type_hints(owner, include_extras=True)
     if dataclasses.is_dataclass(owner):
+        hints = typing.get_type_hints(owner, include_extras=True)
         return {field.name: hints[field.name] for field in dataclasses.fields(owner) if field.init}
+    hints = typing.get_type_hints(_without_return(owner), include_extras=True)
     return {name: hints.get(name, Any) for name in inspect.signature(owner).parameters}
 
 
@@ -395,12 +396,8 @@ def checked(function: Function) -> Function:
     A class in an annotation takes its own instances only, not the tables of a study file. All that
     is wrong comes as one `InputError`.
     """
-    hints = typing.get_type_hints(function, include_extras=True)
-    plain = types.FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__,
-        function.__closure__,
-    )  # fmt: skip
-    plain.__kwdefaults__ = function.__kwdefaults__
+    plain = _without_return(function)
+    hints = typing.get_type_hints(plain, include_extras=True)
     plain.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
     validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(plain)
 
@@ -412,6 +409,18 @@ def checked(function: Function) -> Function:
             raise InputError(explain(error, function)) from None
 
     return typing.cast(Function, call)
+
+
+def _without_return(function: Any) -> types.FunctionType:
+    """The same function without an annotation of its result, which may name what is not loaded."""
+    plain = types.FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__,
+        function.__closure__,
+    )  # fmt: skip
+    plain.__kwdefaults__ = function.__kwdefaults__
+    names = function.__annotations__.items()
+    plain.__annotations__ = {name: hint for name, hint in names if name != "return"}
+    return plain
 
 
 def _instances(annotation: Any) -> Any:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from stiction import __version__
 from stiction.interface import Interface
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,8 @@ def to_dataset(
         Strings and numbers are kept, anything else is written as JSON.
     """
 
+    import xarray as xr
+
     def attrs(variable: Variable) -> dict[str, str]:
         return {"units": variable.units, "long_name": variable.long_name}
 
@@ -106,8 +110,8 @@ def to_dataset(
     coords = {name: (v.dims, array, attrs(v)) for name, (array, v) in coordinates.items()}
     dataset = xr.Dataset(data, coords=coords)
     dataset.attrs["stiction_version"] = __version__
-    dataset.attrs["numpy_version"] = np.__version__
-    dataset.attrs["numba_version"] = numba.__version__
+    for library in ("numpy", "numba"):
+        dataset.attrs[f"{library}_version"] = version(library)
     for name, value in attributes.items():
         plain = isinstance(value, str | int | float)
         dataset.attrs[name] = value if plain else json.dumps(value)

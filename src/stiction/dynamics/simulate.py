@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import refusals
 from stiction.dynamics import monitor
 from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
 from stiction.dynamics.checks import (
@@ -38,6 +37,7 @@ from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
+from stiction.methods import refusals
 from stiction.model import describe, real_array, to_plain
 from stiction.problem import Problem
 from stiction.profiles import at_nodes

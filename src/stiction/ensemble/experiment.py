@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import refusals
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.methods import Values, accepted, check_method, solve, variables_of
+from stiction.methods import Values, accepted, check_method, prepared, refusals, variables_of
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.coefficients import (
@@ -208,7 +207,7 @@ class Experiment:
         InputError
             If a sample does not fit the method.
         """
-        return solve(_solver(self.problem, self.method), self.sample(profiles))
+        return _solver(self.problem, self.method)(self.sample(profiles))
 
     def results(self, seed: int, first: int, count: int) -> Values:
         """Return all `variables` of samples first .. first + count - 1, solved at once.
@@ -254,7 +253,7 @@ class Experiment:
 
 @lru_cache(maxsize=8)
 def _solver(problem: Problem, method: Any) -> Any:
-    return method.prepare(problem)
+    return prepared(problem, method)
 
 
 def _keeping(

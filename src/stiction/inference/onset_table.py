@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import refusals
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
@@ -20,6 +19,7 @@ from stiction.errors import InputError
 from stiction.inference.affine import Affine
 from stiction.inference.prior import Prior
 from stiction.interface import Interface
+from stiction.methods import refusals
 from stiction.progress import Meter
 from stiction.random.draws import BLOCK
 

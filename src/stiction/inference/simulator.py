@@ -14,13 +14,12 @@ from stiction._checks import (
     check_instance,
     is_finite,
     numbers,
-    refusals,
 )
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import full_key, with_parameters
-from stiction.methods import Method, check_method
+from stiction.methods import Method, check_method, refusals
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -92,9 +91,7 @@ class Simulator:
         experiment = Experiment(problem, random, self.method)
         parts = [
             experiment.results(self.seed, start, count)["critical_stress"]
-            for start, count in experiment.batches(
-                first, self.samples, max(256, experiment.batch)
-            )
+            for start, count in experiment.batches(first, self.samples, max(256, experiment.batch))
         ]
         peaks: Array = np.concatenate(parts)
         if self.load_cell_error > 0.0:
