@@ -19,5 +19,5 @@ with st.plot.paper_style():
 for axes, ratio in zip(panels, (0.25, 2.0), strict=True):
     strength = st.paper.strength(problem, correlation_ratio=ratio)
     tau_p = strength.sample(problem.interface, seed=3)
-    st.plot.nucleation_stress(problem, tau_p, ax=axes)
+    st.plot.field(problem, tau_p, ax=axes)
     axes.set_title(rf"$\xi_0/h_n$ = {ratio:g}")

@@ -62,10 +62,8 @@ def test_plots_take_axes_and_leave_the_others_alone(system):
     problem, _, tau_p = system
     figure, (left, right) = plt.subplots(1, 2)
     assert st.plot.field(problem, tau_p, ax=right) is right
-    assert st.plot.nucleation_stress(problem, tau_p[0], ax=right) is right
     assert not left.lines
-    lowest = st.nucleation_stress(problem, tau_p[0]).min() * 1e-6
-    assert right.lines[-1].get_ydata() == pytest.approx([lowest])
+    assert right.lines[0].get_ydata() == pytest.approx(tau_p[0] * 1e-6)
     with pytest.raises(st.InputError, match=r"ax: must be matplotlib axes, got ndarray"):
         st.plot.field(problem, tau_p, ax=np.array(figure.axes))
 
@@ -150,7 +148,6 @@ def test_path_and_rupture(system):
 def test_planes(plane):
     problem, tau_p = plane
     assert st.plot.field(problem, tau_p).images
-    assert st.plot.nucleation_stress(problem, tau_p).images
     local = st.onset(problem, tau_p, method=st.LocalCriterion())
     place = local.critical_position.values[0] * 1e3
     axes = st.plot.onset(local, tau_p)

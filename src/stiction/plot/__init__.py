@@ -7,7 +7,7 @@ return a figure; `film` writes a file.
 
 from stiction.plot.distributions import monte_carlo, quantiles
 from stiction.plot.failure import failure_curve, weak_spots
-from stiction.plot.fields import field, nucleation_stress
+from stiction.plot.fields import field
 from stiction.plot.films import film
 from stiction.plot.fits import fit, posterior
 from stiction.plot.onsets import equilibrium_path, onset
@@ -22,7 +22,6 @@ __all__ = [
     "fit",
     "front",
     "monte_carlo",
-    "nucleation_stress",
     "onset",
     "paper_style",
     "posterior",

@@ -1,4 +1,4 @@
-"""Profiles along an interface, and their moving average over the nucleation length."""
+"""Profiles along an interface."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from stiction.criterion.nucleation import nucleation_stress as local_average
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.plot import maps
-from stiction.plot.axes import add_friction_scale, add_legend, on_axes, unit_for, with_unit
-from stiction.plot.style import INK, PAGE, QUIET, series
+from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
+from stiction.plot.style import INK, PAGE, series
 from stiction.problem import Problem
 from stiction.sample import PROFILES
 
@@ -81,64 +80,6 @@ def field(
         finish_line(axes, interface, text)
         if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
             add_friction_scale(axes, where, "y", factor)
-    return axes
-
-
-def nucleation_stress(problem: Problem, strength: Any, *, ax: Axes | None = None) -> Axes:
-    """Draw the strength, its average over the nucleation length, and the minimum of that.
-
-    Parameters
-    ----------
-    problem : Problem
-        With a uniform weakening rate.
-    strength : array
-        tau_p, Pa, of shape (nodes,), on a plane (nx, ny).
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    InputError
-        If the strength does not fit the interface or there is no single nucleation length.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=256)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
-    >>> st.plot.nucleation_stress(problem, tau_p).get_ylabel()
-    'stress (MPa)'
-    """
-    interface = problem.interface
-    tau_p = rows_of(interface, strength)[0]
-    tau_n = local_average(problem, tau_p)
-    factor, unit = unit_for("Pa", tau_p)
-    lowest = int(tau_n.argmin())
-    if interface.is_plane:
-        with on_axes(ax, height=maps.height(interface)) as axes:
-            bar = maps.image(axes, interface, tau_n * factor, cmap="cividis")
-            text = rf"nucleation stress $\tau_n$ ({unit})"
-            axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
-            scale, _ = unit_for("m", interface.lengths)
-            entry = np.unravel_index(lowest, tau_n.shape)
-            place = [i * h * scale for i, h in zip(entry, interface.spacings, strict=True)]
-            axes.plot(*place, "o", markerfacecolor="white", markeredgecolor=INK)
-            maps.label(axes, interface)
-        return axes
-    with on_axes(ax, width=PAGE, height=2.6) as axes:
-        x = places(interface)
-        axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-        axes.plot(x, tau_n * factor, label=r"nucleation stress $\tau_n$", **series(0))
-        least = tau_n[lowest] * factor
-        text = rf"minimum {least:.4f} {unit}"
-        axes.plot(x[lowest], least, "o", color=series(2)["color"], label=text)
-        finish_line(axes, interface, with_unit("stress", unit))
-        add_friction_scale(axes, problem, "y", factor)
-        add_legend(axes, ax)
     return axes
 
 
