@@ -122,7 +122,7 @@ class Setting:
         h_n = 2.0 * 0.5788869418506 * SOLID.effective_modulus("II") / self.weakening_rate
         waves = (
             2.0
-            * st.PowerLawSpectrum(correlation_length=self.correlation_length).cutoff
+            * st.PowerLawSpectrum(correlation_length=self.correlation_length).cutoff()
             / (2.0 * math.pi)
         )
         wanted = max(SHOWN_NODES * self.length * 1e-3 / h_n, waves * self.length)

@@ -48,22 +48,22 @@ from stiction.load import Load as Load
 from stiction.methods import onset as onset
 from stiction.problem import Problem as Problem
 from stiction.profiles import read_profile as read_profile
-from stiction.random.custom_spectrum import CustomSpectrum as CustomSpectrum
-from stiction.random.families import (
+from stiction.random.marginals import Beta as Beta
+from stiction.random.marginals import (
     Gamma as Gamma,
 )
-from stiction.random.families import (
+from stiction.random.marginals import (
     Lognormal as Lognormal,
 )
-from stiction.random.families import (
+from stiction.random.marginals import (
     TruncatedNormal as TruncatedNormal,
 )
-from stiction.random.families import (
+from stiction.random.marginals import (
     Weibull as Weibull,
 )
-from stiction.random.marginals import Beta as Beta
 from stiction.random.random_field import RandomField as RandomField
 from stiction.random.random_interface import RandomInterface as RandomInterface
+from stiction.random.spectra import CustomSpectrum as CustomSpectrum
 from stiction.random.spectra import (
     ExponentialSpectrum as ExponentialSpectrum,
 )

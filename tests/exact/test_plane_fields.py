@@ -70,7 +70,7 @@ def test_every_wave_vector_in_the_ellipse_is_a_mode_once():
 def test_a_cut_has_the_correlation_of_the_line(spectrum):
     """Of z and of the strength, on the periodic grid, but for what truncation leaves out."""
     field = field_of(spectrum, mean_mode=True)
-    left_out = 1.0 - spectrum.plane_power_within(spectrum.plane_cutoff)
+    left_out = 1.0 - spectrum.power_within(spectrum.cutoff(2), 2)
     for of in ("z", "strength"):
         plane, line = field.correlation(PLANE, of=of), field.correlation(LINE, of=of)
         assert plane[0, 0] == pytest.approx(1.0, rel=1e-12)
@@ -87,8 +87,7 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     wave = 2.0 * np.pi / 0.3
     k = np.array([0.0, 0.3, 1.0, 2.0]) * wave
     across = [
-        quad(lambda q, a=a: spectrum.plane_density(np.hypot(a, q * wave)), 0.0, np.inf)[0]
-        for a in k
+        quad(lambda q, a=a: spectrum.density(np.hypot(a, q * wave), 2), 0.0, np.inf)[0] for a in k
     ]
     np.testing.assert_allclose(
         np.array(across) / across[0],
@@ -96,17 +95,17 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
         rtol=1e-7,  # of the quadrature, or of the integral at k = 0
         atol=1e-9,
     )
-    cutoff = spectrum.plane_cutoff
-    inside = quad(lambda k: k * spectrum.plane_density(k), 0.0, cutoff, limit=200)[0]
-    whole = inside + quad(lambda k: k * spectrum.plane_density(k), cutoff, np.inf, limit=200)[0]
-    assert inside / whole == pytest.approx(spectrum.plane_power_within(cutoff), rel=1e-6)
-    assert inside / whole == pytest.approx(spectrum.power_kept or spectrum._default_power, rel=1e-6)
+    cutoff = spectrum.cutoff(2)
+    inside = quad(lambda k: k * spectrum.density(k, 2), 0.0, cutoff, limit=200)[0]
+    whole = inside + quad(lambda k: k * spectrum.density(k, 2), cutoff, np.inf, limit=200)[0]
+    assert inside / whole == pytest.approx(spectrum.power_within(cutoff, 2), rel=1e-6)
+    assert inside / whole == pytest.approx(spectrum.power_kept or spectrum.default_power, rel=1e-6)
 
 
 def test_own_spectrum_is_the_density_on_the_plane():
     named = st.SquaredExponentialSpectrum(correlation_length=0.3, power_kept=0.99)
-    own = st.CustomSpectrum(function=named.plane_density, power_kept=0.99)
-    assert own.plane_cutoff == pytest.approx(named.plane_cutoff, rel=1e-8)
+    own = st.CustomSpectrum(function=lambda k: named.density(k, 2), power_kept=0.99)
+    assert own.cutoff(2) == pytest.approx(named.cutoff(2), rel=1e-8)
     one, other = (field_of(s, mean_mode=True).modes(PLANE).sigma for s in (named, own))
     np.testing.assert_allclose(one, other, rtol=1e-12)
     slow = st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + (0.3 * k) ** 2))

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 import stiction as st
 from stiction.criterion.eigenproblem import exact_weight
-from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.statistics.moments import (
     nucleation_limits,
     nucleation_statistics,

@@ -56,7 +56,7 @@ def test_correlation_of_z_and_of_the_strength_differ_as_the_hermite_expansion_sa
     z, tau = strength.correlation(interface, of="z"), strength.correlation(interface)
     assert np.all(np.abs(tau[1:]) < np.abs(z[1:]))
     # The first Hermite coefficient carries 0.966 of the variance of this Beta marginal.
-    from stiction.random.hermite import hermite_coefficients
+    from stiction.random.mapping import hermite_coefficients
 
     power = hermite_coefficients(strength.marginal)[1:] ** 2
     assert power[0] / power.sum() == pytest.approx(0.966, abs=5e-4)

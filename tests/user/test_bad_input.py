@@ -337,7 +337,7 @@ def test_short_interface_warns_and_the_mean_mode_silences_it(recwarn):
 @pytest.mark.parametrize(("lost", "warns"), [(0.05, True), (5e-5, False)])
 def test_coarse_grid_warns_from_a_ten_thousandth_of_the_variance(lost, warns, recwarn):
     spectrum = st.SquaredExponentialSpectrum(correlation_length=2e-3, power_kept=0.999999)
-    interface = st.Interface(length=0.1, nodes=2 * round(spectrum._power_quantile(1 - lost) / 62.8))
+    interface = st.Interface(length=0.1, nodes=2 * round(spectrum.quantile(1 - lost) / 62.8))
     make_strength(spectrum=spectrum).sample(interface)
     assert bool(recwarn.list) == warns
     if warns:

@@ -23,7 +23,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.table import NONE, Failure, Table
 from stiction.errors import InputError, WorkerError
 from stiction.methods import Values
-from stiction.random.draws import BLOCK, block_of
+from stiction.random.synthesis import BLOCK, block_of
 
 MOST_BYTES = 16 * 2**20
 """Of the values of a piece of work."""

@@ -16,15 +16,21 @@ from stiction.errors import InputError, unknown_name
 from stiction.methods import Values, accepted, check_method, prepared, refusals, variables_of
 from stiction.model import describe
 from stiction.problem import Problem
-from stiction.random.coefficients import (
-    in_stress,
+from stiction.random.checks import check_residual, warn_if_unresolved
+from stiction.random.pressure import (
+    check_pressure,
     mean_in_stress,
     profiles_in_stress,
     support_in_stress,
 )
-from stiction.random.draws import block_of
-from stiction.random.overlap import check_residual
+<<<<<<< HEAD
+from stiction.random.synthesis import block_of
+from stiction.random.checks import check_residual
 from stiction.random.random_interface import as_random_interface
+=======
+from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.synthesis import block_of
+>>>>>>> e64bc73 (Spectra, modes, draws and synthesis once for any dimension; a marginal says what shifts and scales it)
 from stiction.results import Variable, along
 from stiction.sample import PROFILES, Sample
 
@@ -92,7 +98,8 @@ class Experiment:
         problems = []
         names: set[str] = set()
         try:
-            random = in_stress(self.problem, as_random_interface(self.random))
+            random = as_random_interface(self.random)
+            check_pressure(self.problem, random)
         except InputError as error:
             problems += error.problems
         else:
@@ -159,6 +166,8 @@ class Experiment:
         self.random.warn_if_inaccurate(self.problem.interface)
         self.problem.warn_of_units(self.mean("strength"))
         check_residual(self.problem, self.random.properties)
+        warn_if_unresolved(self.problem, self.random)
+        warn_if_unresolved(self.problem, self.random)
 
     def draws(self, seed: int, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.

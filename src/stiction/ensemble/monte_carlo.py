@@ -30,7 +30,7 @@ from stiction.methods import Method
 from stiction.model import describe, names_to_keep, to_plain
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, check_time_limit
-from stiction.random.overlap import check_residual
+from stiction.random.checks import check_residual
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.random.resolution import warn_if_inaccurate

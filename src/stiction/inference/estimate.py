@@ -21,7 +21,7 @@ from stiction.inference.spectrum_fit import (
 )
 from stiction.inference.whittle import Model, Observed, hermite_shares, make_observed
 from stiction.inference.window import Window, make_window, without_trend
-from stiction.random.quantile_table import from_normal
+from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
 NEGLIGIBLE = 1e-4

@@ -38,7 +38,6 @@ from stiction.inference.whittle import Observed
 from stiction.interface import Interface
 from stiction.model import describe
 from stiction.progress import Meter, Show, check_time_limit
-from stiction.random.resolution import warn_if_inaccurate
 
 if TYPE_CHECKING:
     pass
@@ -350,7 +349,7 @@ def _result(
         warn_accuracy(text)
     if interface is not None:
         found.field.modes(interface)
-        warn_if_inaccurate(found.field, interface)
+        found.field.warn_if_inaccurate(interface)
     details = Details(
         values, tuple(records), found, setting, observed,
         tuple(one.estimate for one in repeated),

@@ -22,8 +22,15 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.noisy_marginal import without_noise
 from stiction.model import describe
-from stiction.random.families import Gamma, Lognormal, TruncatedNormal, Weibull
-from stiction.random.marginals import Beta, ScipyMarginal, _marginal
+from stiction.random.marginals import (
+    Beta,
+    Gamma,
+    Lognormal,
+    ScipyMarginal,
+    TruncatedNormal,
+    Weibull,
+    marginal_of,
+)
 
 WIDEST = 10.0
 """Ranges of the values that free bounds may lie away from them: beyond, they are not seen."""
@@ -267,7 +274,7 @@ def _by_scipy(name: str, values: Array, fixed: dict[str, float]) -> Any:
         found = family.fit(values, **options)
     except Exception as error:  # every family of scipy has its own
         raise InputError(f"marginal: scipy cannot fit {name!r} to this: {error}") from None
-    return _marginal(family(*found))
+    return marginal_of(family(*found))
 
 
 _OWN: dict[str, Callable[[Array, dict[str, float]], Any]] = {

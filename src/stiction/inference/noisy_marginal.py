@@ -17,8 +17,14 @@ import scipy.stats
 from scipy.special import betainc, gammainc, ndtr
 
 from stiction.arrays import Array
-from stiction.random.families import Gamma, Lognormal, TruncatedNormal, Weibull
-from stiction.random.marginals import Beta, ScipyMarginal
+from stiction.random.marginals import (
+    Beta,
+    Gamma,
+    Lognormal,
+    ScipyMarginal,
+    TruncatedNormal,
+    Weibull,
+)
 
 BINS = 160
 NODES = 9

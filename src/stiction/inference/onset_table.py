@@ -21,7 +21,7 @@ from stiction.inference.prior import Prior
 from stiction.interface import Interface
 from stiction.methods import refusals
 from stiction.progress import Meter
-from stiction.random.draws import BLOCK
+from stiction.random.synthesis import BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 """Nodes along each parameter that is simulated, by how many there are."""

@@ -16,7 +16,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
 from stiction.problem import Problem
-from stiction.random.marginals import scipy_marginal
+from stiction.random.marginals import marginal_of
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.dotted_keys import with_values
@@ -141,9 +141,8 @@ def distribution_of(key: str, value: Any) -> Any:
         return value
     spacing = "linear"
     if isinstance(value, Mapping) and "type" in value:
-        parameters = {name: own for name, own in value.items() if name != "type"}
         try:
-            return scipy_marginal(str(value["type"]), parameters).distribution
+            return marginal_of(dict(value)).distribution
         except InputError as error:
             raise InputError([f"prior: {key}: {text}" for text in error.problems]) from None
     if isinstance(value, Mapping):

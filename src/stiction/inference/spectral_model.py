@@ -48,8 +48,8 @@ class Grid:
         wavenumber is folded back, and what lies above `FOLDS` times that, which is flat by then,
         evenly. With `end_seen` false it is truncated at the sampling wavenumber at the lowest.
         """
-        plane = len(self.shape) == 2
-        cutoff = spectrum.plane_cutoff if plane else spectrum.cutoff
+        dimensions = len(self.shape)
+        cutoff = spectrum.cutoff(dimensions)
         sampling = [2.0 * math.pi / d for d in self.spacings]
         steps = [s / n for s, n in zip(sampling, self.whole, strict=True)]
         stretch = (1.0, anisotropy)[: len(self.shape)]
@@ -67,8 +67,10 @@ class Grid:
             number = np.arange(n // 2 + 1) if last else fft.fftfreq(n, 1.0 / n)
             axes.append(stretch[axis] * step * number)
         total = self._folded(spectrum, axes, ranges, sampling, stretch, end)
-        within = spectrum.plane_power_within if plane else spectrum.power_within
-        missed = 1.0 - within(end) / within(cutoff) if end < cutoff else 0.0
+        missed = 0.0
+        if end < cutoff:
+            kept = [spectrum.power_within(k, dimensions) for k in (end, cutoff)]
+            missed = 1.0 - kept[0] / kept[1]
         weight = self._doubled(total.shape)
         total *= (1.0 - missed) / float(np.sum(weight * total))
         total += missed / math.prod(self.whole)
@@ -96,7 +98,7 @@ class Grid:
                 if min(np.abs(kx).min(), np.abs(ky).min()) > (1.0 + EDGE) * end:
                     continue
                 k = np.hypot(kx[:, None], ky[None, :])
-                found += spectrum.plane_density(k) * kept(k)
+                found += spectrum.density(k, 2) * kept(k)
         return found
 
     def _doubled(self, shape: tuple[int, ...]) -> Array:

@@ -24,7 +24,7 @@ from scipy.ndimage import uniform_filter
 from stiction.arrays import Array
 from stiction.inference.spectral_model import Grid
 from stiction.inference.window import Window
-from stiction.random.marginals import quantile_of_normal
+from stiction.random.mapping import quantile_of_normal
 
 FLOOR = 1e-3
 """Of the highest power, averaged over records and neighbours."""
@@ -36,7 +36,7 @@ REACH, POINTS = 6.0, 481
 def hermite_shares(marginal: Any) -> Array:
     """Shares of the variance in the Hermite orders 0, 1, ..., which sum to 1.
 
-    As `stiction.random.hermite.hermite_coefficients`, with fewer points and orders: a hundredth of
+    As `stiction.random.mapping.hermite_coefficients`, with fewer points and orders: a hundredth of
     its cost and an error below 1e-4, the last order standing for all that are left out.
     """
     z = np.linspace(-REACH, REACH, POINTS)

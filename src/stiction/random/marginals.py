@@ -1,24 +1,55 @@
-"""Marginal distributions: how strength is distributed at a point."""
+"""Marginal distributions: how strength is distributed at a point.
+
+In the families that are given by mean and coefficient of variation, `mean` is the mean of the field
+and `cv` its standard deviation over its mean, whatever the bound `low`. scipy's own parameters
+(shapes, loc, scale) follow from them. To add a family, write one class with a `_freeze` and add it
+to `MARGINALS`.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 import scipy.stats
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
-from scipy.special import ndtr
+from pydantic import model_validator
+from scipy.optimize import brentq, root
+from scipy.special import gammaln
 
-from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.model import Positive, Real, _number, model
-from stiction.random.families import FAMILIES
+from stiction.random.kinds import OneOf, from_table
+
+
+class Marginal:
+    """What all marginals share: a frozen `scipy.stats` distribution."""
+
+    type: str
+
+    def _freeze(self) -> Any:
+        raise NotImplementedError
+
+    @cached_property
+    def distribution(self) -> Any:
+        """The same as a frozen `scipy.stats` distribution."""
+        return self._freeze()
+
+    @property
+    def affine(self) -> tuple[str, ...]:
+        """Names of parameters that only shift or scale the distribution while the others stay."""
+        return ()
+
+    @property
+    def location_and_scale(self) -> tuple[float, float]:
+        """a and b, linear in the parameters `affine`, which do not change (tau_p - a)/b."""
+        return 0.0, 1.0
 
 
 @model(kw_only=True)
-class Beta:
+class Beta(Marginal):
     """Beta distribution on [low, high].
 
     Parameters
@@ -52,21 +83,251 @@ class Beta:
             raise InputError(f"low must be below high, got low={self.low:g}, high={self.high:g}")
         return self
 
+    def _freeze(self) -> Any:
+        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
+
     @property
-    def distribution(self) -> Any:
-        """The same as a frozen `scipy.stats` distribution."""
-        return _frozen_beta(self.alpha, self.beta, self.low, self.high)
+    def affine(self) -> tuple[str, ...]:
+        return ("low", "high")
+
+    @property
+    def location_and_scale(self) -> tuple[float, float]:
+        return self.low, self.high - self.low
 
 
-@lru_cache(maxsize=64)
-def _frozen_beta(alpha: float, beta: float, low: float, high: float) -> Any:
-    """Kept, because to freeze a distribution takes scipy a millisecond, and a sweep has many."""
-    return scipy.stats.beta(alpha, beta, low, high - low)
+@model(kw_only=True)
+class _AboveLow(Marginal):
+    """Families above a lower bound, known by mean and coefficient of variation."""
+
+    mean: Positive
+    cv: Positive
+    low: Real = 0.0
+
+    @model_validator(mode="after")
+    def _mean_above_low(self) -> Self:
+        if not self.mean > self.low:
+            raise InputError(f"mean must be above low, got mean={self.mean:g}, low={self.low:g}")
+        return self
+
+    @property
+    def _excess(self) -> float:
+        """Mean above the lower bound."""
+        return self.mean - self.low
+
+    @property
+    def _ratio(self) -> float:
+        """Standard deviation over the mean above the lower bound."""
+        return self.cv * abs(self.mean) / self._excess
+
+    @property
+    def affine(self) -> tuple[str, ...]:
+        return ("mean",) if self.low == 0.0 else ()
+
+    @property
+    def location_and_scale(self) -> tuple[float, float]:
+        return self.low, self._excess
+
+
+@model(kw_only=True)
+class Lognormal(_AboveLow):
+    """Lognormal distribution above `low`.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the field, such as 0.6e6 Pa; above `low`.
+    cv : float
+        Standard deviation over mean, positive.
+    low : float
+        Lower bound, 0 if left out.
+
+    Raises
+    ------
+    InputError
+        If the mean is not above the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> round(st.Lognormal(mean=1e6, cv=0.2, low=0.3e6).distribution.std())
+    200000
+    """
+
+    type: Literal["lognormal"] = "lognormal"
+
+    def _freeze(self) -> Any:
+        shape = math.sqrt(math.log1p(self._ratio**2))
+        scale = self._excess / math.sqrt(1.0 + self._ratio**2)
+        return scipy.stats.lognorm(shape, self.low, scale)
+
+
+@model(kw_only=True)
+class Weibull(_AboveLow):
+    """Weibull distribution (of minima) above `low`.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the field; above `low`.
+    cv : float
+        Standard deviation over mean, positive.
+    low : float
+        Lower bound, 0 if left out.
+
+    Raises
+    ------
+    InputError
+        If the mean is not above the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> round(st.Weibull(mean=1e6, cv=0.1).distribution.args[0], 2)  # shape
+    12.15
+    """
+
+    type: Literal["weibull"] = "weibull"
+
+    @model_validator(mode="after")
+    def _as_wide_as_can_be_solved(self) -> Weibull:
+        if not 1e-3 < self._ratio < 10.0:
+            raise InputError(
+                "cv: the standard deviation over the mean above low must lie between 0.001 and"
+                f" 10, got {self._ratio:g}"
+            )
+        return self
+
+    def _freeze(self) -> Any:
+        def excess(log_shape: float) -> float:
+            inverse = math.exp(-log_shape)
+            spread = gammaln(1.0 + 2.0 * inverse) - 2.0 * gammaln(1.0 + inverse)
+            return float(math.expm1(spread)) - self._ratio**2
+
+        # The ratio falls from 10 to 0.001 as the shape rises from 0.2 to 1300.
+        shape = math.exp(brentq(excess, math.log(0.15), math.log(2e3), xtol=1e-14))
+        scale = self._excess / math.exp(gammaln(1.0 + 1.0 / shape))
+        return scipy.stats.weibull_min(shape, self.low, scale)
+
+
+@model(kw_only=True)
+class Gamma(_AboveLow):
+    """Gamma distribution above `low`.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the field; above `low`.
+    cv : float
+        Standard deviation over mean, positive.
+    low : float
+        Lower bound, 0 if left out.
+
+    Raises
+    ------
+    InputError
+        If the mean is not above the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> round(st.Gamma(mean=1e6, cv=0.5).distribution.args[0], 2)  # shape
+    4.0
+    """
+
+    type: Literal["gamma"] = "gamma"
+
+    def _freeze(self) -> Any:
+        shape = self._ratio**-2
+        return scipy.stats.gamma(shape, self.low, self._excess / shape)
+
+
+@model(kw_only=True)
+class TruncatedNormal(Marginal):
+    """Normal distribution cut off at `low` and `high`.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the field, that is after the cut; between `low` and `high`.
+    cv : float
+        Standard deviation over mean, after the cut, positive.
+    low : float
+        0 if left out.
+    high : float, optional
+        No upper bound if left out.
+
+    Raises
+    ------
+    InputError
+        If the bounds are not in order, or no cut normal distribution has these moments: it is less
+        scattered than an exponential, or between two bounds a uniform, distribution.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> marginal = st.TruncatedNormal(mean=1e6, cv=0.2, low=0.5e6, high=1.5e6)
+    >>> round(float(marginal.distribution.median()))
+    1000000
+    """
+
+    mean: Real
+    cv: Positive
+    low: Real = 0.0
+    high: Real | None = None
+    type: Literal["truncated_normal"] = "truncated_normal"
+
+    @property
+    def _top(self) -> float:
+        return math.inf if self.high is None else self.high
+
+    @model_validator(mode="after")
+    def _ordered(self) -> TruncatedNormal:
+        if not self.low < self.mean < self._top:
+            raise InputError(
+                f"mean must lie between low and high, got low={self.low:g}, mean={self.mean:g},"
+                f" high={self._top:g}"
+            )
+        _ = self.distribution
+        return self
+
+    def _freeze(self) -> Any:
+        deviation = self.cv * abs(self.mean)
+        excess, room = self.mean - self.low, self._top - self.mean
+
+        def parameters(guess: Any) -> tuple[float, float, float, float]:
+            centre = self.mean + deviation * float(guess[0])
+            width = deviation * math.exp(float(guess[1]))
+            return (self.low - centre) / width, (self._top - centre) / width, centre, width
+
+        def moments(guess: Any) -> Any:
+            try:
+                mean, variance = scipy.stats.truncnorm.stats(*parameters(guess))
+            except (FloatingPointError, ValueError):
+                return np.array([1e3, 1e3])
+            return np.array([(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0])
+
+        possible = deviation < excess and deviation**2 < excess * room / 2.0
+        found = root(moments, [0.0, 0.0], tol=1e-12) if possible else None
+        if found is None or not np.abs(moments(found.x)).max() < 1e-8:
+            raise InputError(
+                f"no normal distribution cut at low={self.low:g} and high={self._top:g} has"
+                f" mean={self.mean:g} and cv={self.cv:g}: it would have to be wider than the cut"
+                " leaves; lower cv or the bound, or take st.Lognormal or st.Beta"
+            )
+        return scipy.stats.truncnorm(*parameters(found.x))
+
+    @property
+    def affine(self) -> tuple[str, ...]:
+        return ("mean",) if self.low == 0.0 and self.high is None else ()
+
+    @property
+    def location_and_scale(self) -> tuple[float, float]:
+        return self.low, self.mean - self.low
 
 
 @dataclass(frozen=True)
-class ScipyMarginal:
-    """A continuous `scipy.stats` distribution, known by name and parameters.
+class ScipyMarginal(Marginal):
+    """A continuous `scipy.stats` distribution.
 
     Attributes
     ----------
@@ -74,36 +335,79 @@ class ScipyMarginal:
         scipy's name.
     parameters : tuple of (str, float)
         Shapes, loc and scale that were given.
+    frozen : optional
+        A distribution that scipy has no name for: for Python only, and equal to itself only.
     """
 
     type: str
-    parameters: tuple[tuple[str, float], ...]
+    parameters: tuple[tuple[str, float], ...] = ()
+    frozen: Any = None
 
-    @cached_property
-    def distribution(self) -> Any:
-        """The frozen distribution."""
+    def _freeze(self) -> Any:
+        if self.frozen is not None:
+            return self.frozen
         return getattr(scipy.stats, self.type)(**dict(self.parameters))
 
+    @property
+    def affine(self) -> tuple[str, ...]:
+        return () if self.frozen is not None else ("loc", "scale")
 
-@dataclass(frozen=True)
-class PythonMarginal:
-    """A distribution that scipy does not know by name: for Python only, equal to itself only.
+    @property
+    def location_and_scale(self) -> tuple[float, float]:
+        own = dict(self.parameters)
+        return own.get("loc", 0.0), own.get("scale", 1.0)
 
-    Attributes
-    ----------
-    distribution
-        The frozen distribution.
+
+MARGINALS: dict[str, Any] = {
+    "beta": Beta,
+    "lognormal": Lognormal,
+    "weibull": Weibull,
+    "gamma": Gamma,
+    "truncated_normal": TruncatedNormal,
+}
+"""By their names in study files. 'beta' and 'gamma' are scipy's where its parameters are given."""
+
+
+def marginal_of(value: Any) -> Marginal:
+    """The marginal of one, of a table {type, ...}, or of a frozen scipy.stats distribution.
+
+    Raises
+    ------
+    InputError
+        If it is none of them, or its mean or standard deviation is not finite.
     """
+    if isinstance(value, Marginal):
+        return value
+    if isinstance(value, dict):
+        return _of_table(value)
+    if isinstance(value, scipy.stats.rv_continuous):
+        value = _without_parameters(value)
+    family = getattr(value, "dist", None)
+    if not isinstance(family, scipy.stats.rv_continuous):
+        raise InputError(
+            "must be st.Beta(...), st.Lognormal(...) or a frozen continuous scipy.stats"
+            f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
+        )
+    if not _is_scipys(family):
+        found = ScipyMarginal(type(family).__name__, frozen=value)
+        return _with_moments(found, value.args)
+    parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
+    return _of_scipy(family.name, parameters)
 
-    distribution: Any
+
+def _of_table(table: dict[str, Any]) -> Marginal:
+    name = str(table.get("type"))
+    scipys = {"a", "b", "loc", "scale"} & set(table)
+    if "type" in table and (name not in MARGINALS or (name in ("beta", "gamma") and scipys)):
+        return _of_scipy(name, {key: one for key, one in table.items() if key != "type"})
+    found: Marginal = from_table(MARGINALS, table)
+    return found
 
 
-def _continuous_names() -> list[str]:
-    return [
-        name
-        for name in dir(scipy.stats)
-        if isinstance(getattr(scipy.stats, name), scipy.stats.rv_continuous)
-    ]
+def _is_scipys(family: Any) -> bool:
+    """Whether a family is the one that scipy has under its name."""
+    name = str(getattr(family, "name", None) or type(family).__name__)
+    return type(family) is type(getattr(scipy.stats, name, None))
 
 
 def _parameter_names(family: Any) -> list[str]:
@@ -111,11 +415,16 @@ def _parameter_names(family: Any) -> list[str]:
     return [*shapes, "loc", "scale"]
 
 
-def scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
-    """A distribution by scipy's name for it and its parameters, checked."""
-    names = [*_continuous_names(), *FAMILIES]
+@lru_cache(maxsize=1)
+def _scipy_names() -> list[str]:
+    every = (getattr(scipy.stats, name) for name in dir(scipy.stats))
+    return [one.name for one in every if isinstance(one, scipy.stats.rv_continuous)]
+
+
+def _of_scipy(name: str, parameters: dict[str, Any]) -> Marginal:
+    names = [*_scipy_names(), *MARGINALS]
     if name not in names:
-        valid = ["beta", *FAMILIES, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
+        valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
         text = unknown_name("type", name, names).split(" (valid:")[0]
         raise InputError(f"{text} (valid: {', '.join(valid)} and scipy.stats' other continuous)")
     known = _parameter_names(getattr(scipy.stats, name))
@@ -132,28 +441,27 @@ def scipy_marginal(name: str, parameters: dict[str, Any]) -> ScipyMarginal:
             problems.append(f"{name}.{key}: must be a finite number, got {value!r}")
     if problems:
         raise InputError(problems)
-    result = ScipyMarginal(name, tuple((k, float(v)) for k, v in parameters.items()))
-    _check_moments(name, result.distribution, parameters)
-    return result
+    found = ScipyMarginal(name, tuple((key, float(value)) for key, value in parameters.items()))
+    return _with_moments(found, parameters)
 
 
-def _check_moments(name: str, distribution: Any, parameters: Any) -> None:
-    mean, deviation = distribution.mean(), distribution.std()
+def _with_moments(marginal: Marginal, parameters: Any) -> Marginal:
+    mean, deviation = marginal.distribution.mean(), marginal.distribution.std()
     if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
         raise InputError(
-            f"{name}: must have a finite mean and a positive, finite standard deviation,"
+            f"{marginal.type}: must have a finite mean and a positive, finite standard deviation,"
             f" got {mean:g} and {deviation:g} from {parameters}"
         )
+    return marginal
 
 
-def _frozen(family: Any) -> Any:
-    """A distribution without parameters, such as a histogram, as a frozen one; others are refused.
+def _without_parameters(family: Any) -> Any:
+    """Freeze a distribution without parameters, such as a histogram, and refuse all others.
 
     A named family without its parameters would stand at 0 Pa with a width of 1 Pa.
     """
-    name = str(getattr(family, "name", None) or type(family).__name__)
-    known = type(family) is type(getattr(scipy.stats, name, None))
-    if known or family.shapes:
+    if _is_scipys(family) or family.shapes:
+        name = str(getattr(family, "name", None) or type(family).__name__)
         given = ", ".join(f"{key}=..." for key in _parameter_names(family))
         raise InputError(
             f"scipy.stats.{name} is a family without parameters; freeze it by giving them:"
@@ -162,85 +470,21 @@ def _frozen(family: Any) -> Any:
     return family()
 
 
-def _marginal(value: Any) -> Any:
-    if isinstance(value, (Beta, ScipyMarginal, PythonMarginal, *FAMILIES.values())):
-        return value
-    if isinstance(value, dict):
-        given = dict(value)
-        name = given.pop("type", None)
-        if name is None:
-            raise InputError("type: missing; name a distribution, such as type = 'beta'")
-        if name == "beta" and not {"a", "b"} & set(given):
-            return Beta(**given)
-        if name in FAMILIES and not (name == "gamma" and {"a", "loc", "scale"} & set(given)):
-            return FAMILIES[name](**given)
-        return scipy_marginal(str(name), given)
-    family = getattr(value, "dist", None)
-    if isinstance(value, scipy.stats.rv_continuous):
-        return _marginal(_frozen(value))
-    if not isinstance(family, scipy.stats.rv_continuous):
-        raise InputError(
-            "must be st.Beta(...), st.Lognormal(...) or a frozen continuous scipy.stats"
-            f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
-        )
-    name = str(getattr(family, "name", ""))
-    if type(family) is not type(getattr(scipy.stats, name, None)):
-        _check_moments(type(family).__name__, value, value.args)
-        return PythonMarginal(value)
-    parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return scipy_marginal(name, parameters)
-
-
-def _serialise(value: Any) -> Any:
-    if isinstance(value, PythonMarginal):
-        name = type(value.distribution.dist).__name__
-        raise ValueError(f"marginal is the Python distribution {name!r}; use one that scipy names")
-    if isinstance(value, (Beta, *FAMILIES.values())):
-        own: Any = value
-        known = {field.name: getattr(own, field.name) for field in fields(own)}
+def _plain(value: Any) -> dict[str, Any]:
+    if not isinstance(value, ScipyMarginal):
+        known = {field.name: getattr(value, field.name) for field in fields(value)}
         return {name: one for name, one in known.items() if one is not None}
+    if value.frozen is not None:
+        raise ValueError(f"marginal is the Python distribution {value.type!r}; use one that scipy"
+                         " names")  # fmt: skip
     return {"type": value.type, **dict(value.parameters)}
 
 
-Marginal: TypeAlias = Annotated[
+AnyMarginal: TypeAlias = Annotated[
     Any,
-    BeforeValidator(_marginal),
-    PlainSerializer(_serialise),
-    WithJsonSchema(
-        {
-            "type": "object",
-            "description": "type = 'beta' with alpha, beta, low, high; 'lognormal', 'weibull',"
-            " 'gamma' or 'truncated_normal' with mean, cv and low; or the name of a continuous"
-            " scipy.stats distribution with its shapes, loc and scale",
-            "properties": {"type": {"type": "string"}},
-            "required": ["type"],
-        }
+    OneOf(
+        MARGINALS, marginal_of, _plain,
+        "the name of a continuous scipy.stats distribution with its shapes, loc and scale",
     ),
-]
+]  # fmt: skip
 """`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""
-
-
-def quantile_of_normal(distribution: Any, z: Array) -> Array:
-    """F^-1(Phi(z)) by scipy, through the survival function above the median.
-
-    Parameters
-    ----------
-    distribution : frozen scipy.stats distribution
-    z : array
-
-    Returns
-    -------
-    array of the shape of `z`
-
-    Notes
-    -----
-    Grigoriu (1995): translation process. Phi(z) rounds to 1 long before z = 8; the upper tail
-    keeps its digits only through 1 - Phi(z) = Phi(-z), and only where scipy computes the inverse
-    survival function of the family directly.
-    """
-    z = np.asarray(z, dtype=np.float64)
-    tail = ndtr(-np.abs(z))
-    lower = distribution.ppf(np.where(z < 0.0, tail, 0.5))
-    upper = distribution.isf(np.where(z < 0.0, 0.5, tail))
-    result: Array = np.where(z < 0.0, lower, upper)
-    return result

@@ -9,25 +9,28 @@ from typing import Any, Literal
 
 import numpy as np
 import pydantic
-from pydantic import model_validator
 
 from stiction._checks import check_choice, check_memory, too_many_samples
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import Flag, Positive, describe, model, real_array, whole
-from stiction.random.custom_spectrum import CustomSpectrum
-from stiction.random.draws import block_of, standard_normal
-from stiction.random.hermite import correlation_of_mapped, hermite_coefficients, share_unaccounted
-from stiction.random.marginals import Marginal
-from stiction.random.modes import Modes, line_modes, plane_modes
-from stiction.random.quantile_table import from_normal
-from stiction.random.resolution import warn_if_inaccurate
-from stiction.random.spectra import Spectrum
-from stiction.random.spectral_density import lag_of_correlation
-from stiction.random.synthesis import gaussian_planes, gaussian_rows
+from stiction.random.mapping import (
+    correlation_of_mapped,
+    from_normal,
+    hermite_coefficients,
+    share_unaccounted,
+)
+from stiction.random.marginals import AnyMarginal
+from stiction.random.modes import Modes, make_modes
+from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
+from stiction.random.synthesis import block_of, gaussian, standard_normal
 
 ENOUGH_ACCOUNTED = 0.01
+FEWEST_LENGTHS = 8.0 * math.pi
+"""e-folding lengths in an interface below which a missing mean mode may be felt."""
+LOST, FALLEN, MISSED = 1e-4, 0.02, 0.1
+"""What is worth a warning: shares of the variance and the power, and of a correlation."""
 
 
 @model
@@ -77,18 +80,11 @@ class RandomField:
     ((3, 512), True)
     """
 
-    marginal: Marginal
+    marginal: AnyMarginal
     spectrum: Spectrum
     mean_mode: Flag = False
     anisotropy: Positive | None = None
     of: Literal["friction_coefficient"] | None = None
-
-    @model_validator(mode="after")
-    def _tabulated_marginal(self) -> RandomField:
-        low, high = self.marginal.distribution.support()
-        if not low < high:
-            raise InputError(f"marginal: its support [{low:g}, {high:g}] is empty")
-        return self
 
     @property
     def mean(self) -> float:
@@ -152,13 +148,7 @@ class RandomField:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        if interface.is_plane:
-            return gaussian_planes(
-                draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape
-            )
-        z = np.empty((draws.shape[0], interface.size))
-        gaussian_rows(draws, modes.sigma, self.mean_mode, interface.size, z)
-        return z
+        return gaussian(draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape)
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
         """The map from draws to profiles.
@@ -213,9 +203,34 @@ class RandomField:
             If the grid is coarser than the spectrum, or the interface is short against the
             correlation length and the field has no mean mode.
         """
-        warn_if_inaccurate(self, interface)
+        self.warn_if_inaccurate(interface)
         draws = self.draws(interface, samples, seed, first, stream=stream)
         return self.profiles(interface, draws)
+
+    def warn_if_inaccurate(self, interface: Interface) -> None:
+        """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
+        modes = self.modes(interface)
+        lost = modes.unresolved(interface)
+        if lost > LOST:
+            nodes = " x ".join(map(str, interface.shape))
+            enough = " x ".join(str(2 * most) for most in modes.highest)
+            warn_accuracy(
+                f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
+                f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
+                f" grid does not resolve (interface.nodes >= {enough} resolves all)"
+            )
+        if isinstance(self.spectrum, CustomSpectrum):
+            _warn_of_lines(self.spectrum, modes, interface, self.anisotropy or 1.0)
+        if self.mean_mode:
+            return
+        ratio = min(interface.lengths) / self.spectrum.efolding_length
+        gap = _lowest_correlation(self, interface) if ratio < FEWEST_LENGTHS else 0.0
+        if gap > FALLEN:
+            warn_accuracy(
+                f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
+                f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
+                " RandomField(mean_mode=True) restores the mean's variability"
+            )
 
     def correlation(self, interface: Interface, *, of: str = "strength") -> Array:
         """Correlation at the lags ``interface.coordinates``, (*shape), on the periodic interface.
@@ -232,15 +247,11 @@ class RandomField:
             If the tails of the marginal are too heavy for its correlation, with the largest error.
         """
         modes = self.modes(interface)
-        if interface.is_plane:  # the field whose amplitudes are its own standard deviations
-            draws = np.zeros((1, modes.dimension))
-            start = int(self.mean_mode)
-            draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
-            rho = self.gaussian(interface, draws)[0]
-        else:
-            spectrum = np.zeros(interface.size)
-            np.add.at(spectrum, np.arange(modes.sigma.size) % interface.size, modes.sigma**2)
-            rho = np.fft.fft(spectrum).real
+        # The field whose amplitudes are its own standard deviations.
+        draws = np.zeros((1, modes.dimension))
+        start = int(self.mean_mode)
+        draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
+        rho = self.gaussian(interface, draws)[0]
         if _which(of) == "z":
             return rho
         return correlation_of_mapped(rho, self._map_coefficients())
@@ -321,12 +332,45 @@ def check_counts(**counts: Any) -> dict[str, int]:
 
 @lru_cache(maxsize=256)
 def _modes(field: RandomField, interface: Interface) -> Modes:
-    if interface.is_plane:
-        ratio = field.anisotropy or 1.0
-        return plane_modes(field.spectrum, field.mean_mode, ratio, interface)
-    if field.anisotropy is not None:
+    if field.anisotropy is not None and not interface.is_plane:
         raise InputError(
             f"anisotropy: is a ratio of correlation lengths along y and x, and a line has no y; got"
             f" {field.anisotropy:g}, leave it out"
         )
-    return line_modes(field.spectrum, field.mean_mode, interface)
+    return make_modes(field.spectrum, field.mean_mode, field.anisotropy or 1.0, interface)
+
+
+@lru_cache(maxsize=64)
+def _lowest_correlation(field: RandomField, interface: Interface) -> float:
+    """By how much the correlation of z falls below zero."""
+    return -float(field.correlation(interface, of="z").min())
+
+
+def _warn_of_lines(
+    spectrum: CustomSpectrum, modes: Modes, interface: Interface, anisotropy: float
+) -> None:
+    """Warn where the modes of an interface fall beside or upon something narrow.
+
+    Each mode stands for a cell around k and one around -k. Their sum is compared with the integral
+    over the ball that has the volume of all these cells, less that of the cell around zero.
+    """
+    if modes.count < 1:
+        return
+    dimensions = len(interface.shape)
+    cell = (2.0 * math.pi) ** dimensions / interface.extent * anisotropy ** (dimensions - 1)
+    k = modes.lengths(interface, anisotropy)[1:]
+    seen = 2.0 * cell * float(spectrum.density(k, dimensions).sum())
+    ball = (2.0, math.pi)[dimensions - 1]  # volume of that of radius 1
+    inner, outer = (
+        spectrum.power_integral((cells * cell / ball) ** (1.0 / dimensions), dimensions)
+        for cells in (1, 2 * modes.count + 1)
+    )
+    whole = dimensions * ball * (outer - inner)
+    ratio = seen / whole if whole > 0.0 else math.inf
+    if abs(ratio - 1.0) > MISSED:
+        apart = 2.0 * math.pi / max(interface.lengths)
+        warn_accuracy(
+            f"the modes of this interface, {apart:.3g} rad/m apart, carry {ratio:.3g} times the"
+            " power of the spectrum: it has lines or steps narrower than that, which a longer"
+            " interface would resolve"
+        )

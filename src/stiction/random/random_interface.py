@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property, lru_cache, reduce
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,9 @@ from stiction.errors import InputError, unknown_name
 from stiction.friction.law import SCALES
 from stiction.interface import Interface
 from stiction.model import describe, model
-from stiction.random.draws import block_of, standard_normal
 from stiction.random.modes import Modes
 from stiction.random.random_field import RandomField, check_counts
-from stiction.random.resolution import warn_if_inaccurate
+from stiction.random.synthesis import block_of, standard_normal
 from stiction.sample import PROFILES
 
 NAMES = tuple(PROFILES)
@@ -71,25 +70,6 @@ Correlation = Annotated[
 ]
 
 
-def nearest_correlation(matrix: Array) -> Array:
-    """The correlation matrix nearest to a symmetric one with unit diagonal.
-
-    Alternating projections with Dykstra's correction (Higham, 2002), in the Frobenius norm.
-    """
-    correction = np.zeros_like(matrix)
-    result = matrix.copy()
-    for _ in range(500):
-        shifted = result - correction
-        values, vectors = np.linalg.eigh(shifted)
-        positive: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        correction = positive - shifted
-        before, result = result, positive.copy()
-        np.fill_diagonal(result, 1.0)
-        if np.abs(result - before).max() < 1e-12:
-            break
-    return result
-
-
 def lower_factor(matrix: Array) -> Array:
     """L with L L^T = matrix, lower triangular, of a matrix that may be singular."""
     size = matrix.shape[0]
@@ -105,29 +85,23 @@ def lower_factor(matrix: Array) -> Array:
     return factor
 
 
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Where the draws of each property stand in the vector of all draws.
+class Drawn(NamedTuple):
+    """The draws of one property in the vector of all draws of a sample.
 
     Attributes
     ----------
-    names : tuple of str
-    starts : tuple of int
-        First entry of each property.
-    ranks : tuple of arrays of int
-        Modes drawn for each, by their `Modes.ranks`: its own and those of all that it is
-        correlated with.
-    mean_mode : tuple of bool
+    columns : slice
+        Where they stand.
+    ranks : array of int
+        Modes drawn, by their `Modes.ranks`: those of the property and of all that it is correlated
+        with.
+    mean_mode : bool
         Whether the mean mode is drawn.
-    dimension : int
-        Length of the vector.
     """
 
-    names: tuple[str, ...]
-    starts: tuple[int, ...]
-    ranks: tuple[NDArray[np.int64], ...]
-    mean_mode: tuple[bool, ...]
-    dimension: int
+    columns: slice
+    ranks: NDArray[np.int64]
+    mean_mode: bool
 
 
 @model(kw_only=True)
@@ -153,7 +127,7 @@ class RandomInterface:
     ------
     InputError
         If two properties say the same, a correlated one is not given, or the correlations
-        contradict each other; the nearest ones that do not are named.
+        contradict each other.
 
     Notes
     -----
@@ -206,16 +180,9 @@ class RandomInterface:
         if not problems:
             matrix = self.matrix
             if np.linalg.eigvalsh(matrix)[0] < -DEFINITE:
-                nearest = nearest_correlation(matrix)
-                pairs = ", ".join(
-                    f"{one}/{other} = {nearest[i, j]:.4g}"
-                    for i, one in enumerate(self.names)
-                    for j, other in enumerate(self.names)
-                    if i < j and matrix[i, j] != 0.0
-                )
                 problems.append(
                     "correlation: these coefficients contradict each other (their matrix is not"
-                    f" positive definite); the nearest that do not are {pairs}"
+                    " positive definite); bring them nearer to 0"
                 )
         if problems:
             raise InputError(problems)
@@ -242,16 +209,12 @@ class RandomInterface:
                 matrix[i, j] = matrix[j, i] = rho
         return matrix
 
-    def layout(self, interface: Interface) -> Layout:
-        """How many draws a sample takes and where they stand."""
-        return _layout(self, interface)
-
     def dimension(self, interface: Interface) -> int:
-        """Number of standard normal draws a sample."""
-        return self.layout(interface).dimension
+        """Return the number of standard normal draws of a sample."""
+        return max(drawn.columns.stop for drawn in _layout(self, interface).values())
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
-        """Independent standard normal draws of samples first .. first + samples - 1.
+        """Draw samples number `first`, `first` + 1, ..., independent standard normal numbers.
 
         Draw j of a property of sample i depends on (seed, property, i, j) only.
 
@@ -261,37 +224,34 @@ class RandomInterface:
             Those of each property side by side, in the order of `names`.
         """
         counts = check_counts(samples=samples, seed=seed, first=first)
-        layout = self.layout(interface)
-        each = layout.dimension + len(layout.names) * interface.size
+        each = self.dimension(interface) + len(self.names) * interface.size
         check_memory("samples", 8.0 * counts["samples"] * each)
-        options = {"first": counts["first"], "block": block_of(len(interface.shape))}
+        block = block_of(len(interface.shape))
         parts = [
             standard_normal(
-                counts["seed"],
-                counts["samples"],
-                ranks,
+                **counts,
+                ranks=drawn.ranks,
                 stream=NAMES.index(name),
-                mean_mode=mean,
-                **options,
+                mean_mode=drawn.mean_mode,
+                block=block,
             )
-            for name, ranks, mean in zip(layout.names, layout.ranks, layout.mean_mode, strict=True)
+            for name, drawn in _layout(self, interface).items()
         ]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
-        """The map from draws (samples, dimension) to profiles by name, (samples, *shape) each."""
-        layout = self.layout(interface)
-        ends = (*layout.starts[1:], layout.dimension)
-        own = [draws[:, a:b] for a, b in zip(layout.starts, ends, strict=True)]
-        factor = lower_factor(self.matrix) if self.correlation else None
+        """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
+        layout = _layout(self, interface)
+        own = [draws[:, drawn.columns] for drawn in layout.values()]
+        factor = lower_factor(self.matrix) if self.correlation else np.eye(len(own))
         found = {}
         for i, (name, field) in enumerate(self.properties.items()):
             mixed = own[i]
-            if factor is not None and factor[i, i] != 1.0:
+            if factor[i, i] != 1.0:
                 mixed = sum((factor[i, j] * own[j] for j in np.flatnonzero(factor[i])), 0.0 * mixed)
-            if layout.mean_mode[i] and not field.mean_mode:
+            if layout[name].mean_mode and not field.mean_mode:
                 mixed = mixed[:, 1:]
-            mixed = _of_modes(mixed, layout.ranks[i], field.modes(interface))
+            mixed = _of_modes(mixed, layout[name].ranks, field.modes(interface))
             found[name] = field.profiles(interface, np.ascontiguousarray(mixed))
         return found
 
@@ -311,7 +271,7 @@ class RandomInterface:
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of fields that the grid or the interface cannot do justice to."""
         for field in self.properties.values():
-            warn_if_inaccurate(field, interface)
+            field.warn_if_inaccurate(interface)
 
 
 def _of_modes(draws: Array, ranks: NDArray[np.int64], modes: Modes) -> Array:
@@ -324,18 +284,19 @@ def _of_modes(draws: Array, ranks: NDArray[np.int64], modes: Modes) -> Array:
 
 
 @lru_cache(maxsize=256)
-def _layout(random: RandomInterface, interface: Interface) -> Layout:
-    names = random.names
-    own = [field.modes(interface).ranks for field in random.properties.values()]
-    means = [field.mean_mode for field in random.properties.values()]
-    linked = np.linalg.matrix_power(random.matrix != 0.0, max(len(names), 1))
-    ranks, mean_mode, starts = [], [], [0]
-    for i in range(len(names)):
-        group = np.flatnonzero(linked[i])
-        ranks.append(reduce(np.union1d, [own[j] for j in group]))
-        mean_mode.append(any(means[j] for j in group))
-        starts.append(starts[-1] + 2 * ranks[-1].size + int(mean_mode[-1]))
-    return Layout(names, tuple(starts[:-1]), tuple(ranks), tuple(mean_mode), starts[-1])
+def _layout(random: RandomInterface, interface: Interface) -> dict[str, Drawn]:
+    """Draws of each property by name."""
+    fields_of = list(random.properties.values())
+    linked = np.linalg.matrix_power(random.matrix != 0.0, len(fields_of))
+    found, start = {}, 0
+    for name, row in zip(random.names, linked, strict=True):
+        group = [fields_of[j] for j in np.flatnonzero(row)]
+        ranks = reduce(np.union1d, [field.modes(interface).ranks for field in group])
+        mean_mode = any(field.mean_mode for field in group)
+        end = start + 2 * ranks.size + int(mean_mode)
+        found[name] = Drawn(slice(start, end), ranks, mean_mode)
+        start = end
+    return found
 
 
 assert {field.name for field in fields(RandomInterface)} == {*NAMES, "correlation"}

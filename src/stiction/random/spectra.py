@@ -1,29 +1,248 @@
-"""Named power spectral densities of the underlying Gaussian field.
+"""Power spectral densities of the underlying Gaussian field, on lines and on planes.
 
 On a plane the field is isotropic, and a line cut through it has the correlation of the field on a
-line. That makes the density on the plane, as a function of the length of the wave vector, the
-inverse Abel transform of the line's: with the power of (1 + k^2) less by a half where the line's is
-a power of that, and the same where it is Gaussian.
+line. That fixes the density in D dimensions as a function of the length of the wave vector (it is
+the inverse Abel transform of the line's): a power of 1 + k^2 has (D - 1)/2 added to its exponent,
+and a Gaussian stays what it is. What is sampled is the truncated spectrum, so correlations and
+lengths are of that. To add a spectrum, write one class and add it to `SPECTRA`.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import math
+from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
-from scipy.special import betainc, betaincinv, erf, erfinv, gammaln, kve
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import (
+    betainc,
+    betaincinv,
+    gammainc,
+    gammainccinv,
+    gammaln,
+    kve,
+)
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import Positive, _number, model
-from stiction.random.custom_spectrum import CustomSpectrum
-from stiction.random.spectral_density import ScaledSpectrum, Share, SpectralDensity, one_truncation
+from stiction.model import Positive, _number, describe, model
+from stiction.random.kinds import OneOf, from_table
+
+Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
+ACCURACY = 1e-12
+LARGEST_ERROR = 1e-6
+"""Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
+
+
+class SpectralDensity:
+    """What all spectra share; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
+
+    power_kept: float | None
+    default_power: ClassVar[float] = 0.9997
+    """Share of the power kept by truncation if nothing is given."""
+
+    def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return the density at wave vectors of length k (rad/m), up to a factor."""
+        raise NotImplementedError
+
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the share of the power at wave vectors shorter than `wavenumber` (rad/m)."""
+        raise NotImplementedError
+
+    def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber (rad/m) below which a share of the power lies."""
+        raise NotImplementedError
+
+    def untruncated_correlation(self, lag: Array) -> Array:
+        """Return the correlation that z would have at `lag` (m) without truncation, on a line."""
+        raise NotImplementedError
+
+    def _edges(self, end: float) -> Array:
+        """Wavenumbers (rad/m) from 0 to `end` between which the density is smooth."""
+        raise NotImplementedError
+
+    def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber above which the spectrum is truncated, rad/m."""
+        share = self.default_power if self.power_kept is None else self.power_kept
+        return self.quantile(share, dimensions)
+
+    def density_at(self, wavenumber: float) -> float:
+        """Return the density on a line at one wavenumber, rad/m, up to a factor."""
+        return float(self.density(np.array([wavenumber]))[0])
+
+    def correlation(self, lag: Array) -> Array:
+        """Return the correlation of z at `lag` (m), truncation included, on a line."""
+        return self._correlation(lag, *_truncated(self))
+
+    def _correlation(self, lag: Array, edges: Array, power: float) -> Array:
+        found = [
+            float(integrate(self.density_at, edges, float(one), power).sum())
+            for one in np.abs(np.ravel(lag))
+        ]
+        return np.reshape(found, np.shape(lag)) / power
+
+    @property
+    def power_kept_by_truncation(self) -> float:
+        """Share of the power that truncation keeps, on a line."""
+        return self.power_within(self.cutoff())
+
+    @property
+    def efolding_length(self) -> float:
+        """Distance at which the correlation of z first falls to 1/e, m, on a line."""
+        return lag_of_correlation(self, math.exp(-1.0))
+
+
+def integrate(
+    density: Callable[[float], float], edges: Array, lag: float = 0.0, within: float = math.inf
+) -> Array:
+    """Integrate a density times cos(k lag) over each interval between `edges`.
+
+    Parameters
+    ----------
+    density : callable
+    edges : (intervals + 1,) array
+        rad/m.
+    lag : float
+        m; however many periods an interval holds (QUADPACK's QAWO).
+    within : float
+        Error that is small enough, in units of the integral, besides 1e-12 of each part.
+
+    Returns
+    -------
+    (intervals,) array
+
+    Raises
+    ------
+    InputError
+        If an integral does not settle.
+    """
+    options: dict[str, Any] = {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
+    options["epsabs"] = ACCURACY * within if math.isfinite(within) else 0.0
+    if lag > 0.0:
+        options |= {"weight": "cos", "wvar": lag}
+    parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
+    found, errors = np.array(parts).T
+    size = min(within, float(np.abs(found).sum()))
+    if not np.all(np.isfinite(found)) or errors.sum() > LARGEST_ERROR * size:
+        raise InputError(
+            "function: its integral over wavenumbers does not settle; name the wavenumbers at which"
+            " it jumps or peaks in break_points"
+        )
+    result: Array = found
+    return result
+
+
+@lru_cache(maxsize=256)
+def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
+    """Edges of intervals up to the cutoff, rad/m, and the power below it, up to a factor."""
+    edges = spectrum._edges(spectrum.cutoff())
+    return edges, float(integrate(spectrum.density_at, edges).sum())
+
+
+@lru_cache(maxsize=256)
+def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
+    """Return the first lag at which the correlation of z on a line falls to `target`, m."""
+    edges, power = _truncated(spectrum)
+    first, second = (
+        float(integrate(lambda k, m=m: spectrum.density_at(k) * k**m, edges).sum()) for m in (1, 2)
+    )
+    slope, step = first / power, 0.25 * math.sqrt(power / second)
+    before = lag = 0.0
+    excess = 1.0 - target
+    while excess > 0.0:
+        # The correlation falls no faster than by the mean wavenumber, and is nearly straight
+        # between lags that are close against the root mean square of the wavelengths.
+        before, lag = lag, lag + max(excess / slope, step)
+        excess = float(spectrum.correlation(np.array(lag))) - target
+        step *= 1.005  # for spectra whose power sits far below their truncation
+        if not math.isfinite(lag):
+            raise InputError("spectrum: its correlation does not fall to 1/e at any distance")
+    root: float = brentq(
+        lambda ratio: float(spectrum.correlation(np.array(ratio * lag))) - target,
+        before / lag, 1.0, xtol=1e-15, rtol=1e-14,
+    )  # fmt: skip
+    return root * lag
 
 
 @model
-class PowerLawSpectrum(ScaledSpectrum):
+class ScaledSpectrum(SpectralDensity):
+    """Spectra known by one length: g depends on k times it only."""
+
+    correlation_length: Positive
+    truncation: Positive | None = None
+    power_kept: Share | None = None
+
+    @model_validator(mode="after")
+    def _truncated_once(self) -> Any:
+        if self.truncation is not None and self.power_kept is not None:
+            raise InputError("give truncation or power_kept, not both")
+        return self
+
+    @property
+    def scale(self) -> float:
+        """Wavenumber in units of which the density is one function, rad/m."""
+        return 1.0 / self.correlation_length
+
+    def _edges(self, end: float) -> Array:
+        octaves = self.scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / self.scale))))
+        return np.concatenate(([0.0], octaves[octaves < end], [end]))
+
+    def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber above which the spectrum is truncated, rad/m."""
+        if self.truncation is not None:
+            return self.truncation * 2.0 * math.pi / self.correlation_length
+        return super().cutoff(dimensions)
+
+    @property
+    def efolding_length(self) -> float:
+        """Distance at which the correlation of z first falls to 1/e, m, on a line."""
+        # Searched for once a shape: a sweep may hold a hundred thousand lengths.
+        unit = self.with_correlation_length(1.0)
+        return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
+
+    def with_correlation_length(self, correlation_length: float) -> Any:
+        """Return the same spectrum with another `correlation_length` (m)."""
+        return dataclasses.replace(self, correlation_length=correlation_length)
+
+    def with_efolding_length(self, length: float) -> Any:
+        """Return the same shape of spectrum whose correlation of z falls to 1/e at `length` (m)."""
+        return self.with_correlation_length(self.correlation_length * length / self.efolding_length)
+
+
+class _PowerOfWavenumber(ScaledSpectrum):
+    """Density (1 + (k/scale)^2)^-(p + (D - 1)/2)."""
+
+    @property
+    def _power(self) -> float:
+        """p."""
+        raise NotImplementedError
+
+    def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return the density at wave vectors of length k (rad/m), relative to that at zero."""
+        ratio = np.asarray(wavenumber) / self.scale
+        result: Array = (1.0 + ratio * ratio) ** -(self._power + 0.5 * (dimensions - 1))
+        return result
+
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the share of the power below `wavenumber`: an incomplete beta function."""
+        ratio = (wavenumber / self.scale) ** 2
+        return float(betainc(0.5 * dimensions, self._power - 0.5, ratio / (1.0 + ratio)))
+
+    def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber (rad/m) below which a share of the power lies."""
+        # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
+        rest = float(betaincinv(self._power - 0.5, 0.5 * dimensions, 1.0 - share))
+        return self.scale * math.sqrt((1.0 - rest) / rest)
+
+
+@model
+class PowerLawSpectrum(_PowerOfWavenumber):
     """g(k) ~ (k^2 + lambda^2)^-exponent, lambda = 2 pi/correlation_length.
 
     Parameters
@@ -56,64 +275,25 @@ class PowerLawSpectrum(ScaledSpectrum):
     power_kept: Share | None = None
     type: Literal["power_law"] = "power_law"
 
-    @model_validator(mode="after")
-    def _truncated_once(self) -> PowerLawSpectrum:
-        one_truncation(self.truncation, self.power_kept)
-        return self
-
     @property
-    def cutoff(self) -> float:
-        """Wavenumber above which the spectrum is truncated, rad/m."""
-        if self.power_kept is not None:
-            return self._power_quantile(self.power_kept)
-        return (2.5 if self.truncation is None else self.truncation) * self.cutoff_wavenumber
-
-    @property
-    def plane_cutoff(self) -> float:
-        """Length of wave vector above which the spectrum of a plane is truncated, rad/m."""
-        return self.cutoff if self.power_kept is None else self._plane_quantile(self.power_kept)
-
-    @property
-    def cutoff_wavenumber(self) -> float:
+    def scale(self) -> float:
         """lambda = 2 pi/xi_0, rad/m: the density falls as a power law above it."""
         return 2.0 * math.pi / self.correlation_length
 
-    def density(self, wavenumber: Array) -> Array:
-        """g(k)/g(0) at k in rad/m."""
-        ratio = np.asarray(wavenumber) / self.cutoff_wavenumber
-        result: Array = (1.0 + ratio * ratio) ** -self.exponent
-        return result
+    @property
+    def _power(self) -> float:
+        return self.exponent
 
-    def power_within(self, wavenumber: float) -> float:
-        """Share of the power below `wavenumber`: an incomplete beta function."""
-        ratio = (wavenumber / self.cutoff_wavenumber) ** 2
-        return float(betainc(0.5, self.exponent - 0.5, ratio / (1.0 + ratio)))
-
-    def _power_quantile(self, share: float) -> float:
-        # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
-        rest = float(betaincinv(self.exponent - 0.5, 0.5, 1.0 - share))
-        return self.cutoff_wavenumber * math.sqrt((1.0 - rest) / rest)
-
-    def plane_density(self, wavenumber: Array) -> Array:
-        """(1 + (k/lambda)^2)^-(exponent + 1/2)."""
-        ratio = np.asarray(wavenumber) / self.cutoff_wavenumber
-        result: Array = (1.0 + ratio * ratio) ** -(self.exponent + 0.5)
-        return result
-
-    def plane_power_within(self, wavenumber: float) -> float:
-        """Share of the power at wave vectors shorter than `wavenumber`."""
-        ratio = wavenumber / self.cutoff_wavenumber
-        return -math.expm1((0.5 - self.exponent) * math.log1p(ratio * ratio))
-
-    def _plane_quantile(self, share: float) -> float:
-        return self.cutoff_wavenumber * math.sqrt(
-            math.expm1(math.log1p(-share) / (0.5 - self.exponent))
-        )
+    def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber above which the spectrum is truncated, rad/m."""
+        if self.truncation is None and self.power_kept is None:
+            return 2.5 * self.scale
+        return super().cutoff(dimensions)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """Matern correlation at `lag` (m), on an infinite line."""
+        """Return the Matern correlation at `lag` (m), on a line."""
         smoothness = self.exponent - 0.5
-        a = np.abs(np.asarray(lag, dtype=np.float64)) * self.cutoff_wavenumber
+        a = np.abs(np.asarray(lag, dtype=np.float64)) * self.scale
         with np.errstate(divide="ignore", invalid="ignore"):
             log_value = (
                 (1.0 - smoothness) * math.log(2.0)
@@ -147,47 +327,31 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     1.0
     """
 
-    correlation_length: Positive
-    truncation: Positive | None = None
-    power_kept: Share | None = None
     type: Literal["squared_exponential"] = "squared_exponential"
 
-    @model_validator(mode="after")
-    def _truncated_once(self) -> SquaredExponentialSpectrum:
-        one_truncation(self.truncation, self.power_kept)
-        return self
-
-    def density(self, wavenumber: Array) -> Array:
-        """g(k)/g(0) at k in rad/m."""
+    def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return exp(-(k xi_0/2)^2) at k in rad/m."""
         result: Array = np.exp(-((np.asarray(wavenumber) * self.correlation_length / 2.0) ** 2))
         return result
 
-    def power_within(self, wavenumber: float) -> float:
-        """Share of the power below `wavenumber`."""
-        return float(erf(wavenumber * self.correlation_length / 2.0))
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the share of the power below `wavenumber`: an incomplete gamma function."""
+        half = wavenumber * self.correlation_length / 2.0
+        return float(gammainc(0.5 * dimensions, half * half))
 
-    def _power_quantile(self, share: float) -> float:
-        return 2.0 / self.correlation_length * float(erfinv(share))
-
-    def plane_density(self, wavenumber: Array) -> Array:
-        """The same as on a line."""
-        return self.density(wavenumber)
-
-    def plane_power_within(self, wavenumber: float) -> float:
-        """Share of the power at wave vectors shorter than `wavenumber`."""
-        return -math.expm1(-((wavenumber * self.correlation_length / 2.0) ** 2))
-
-    def _plane_quantile(self, share: float) -> float:
-        return 2.0 / self.correlation_length * math.sqrt(-math.log1p(-share))
+    def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber (rad/m) below which a share of the power lies."""
+        square = float(gammainccinv(0.5 * dimensions, 1.0 - share))
+        return 2.0 / self.correlation_length * math.sqrt(square)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """exp(-(lag/xi_0)^2)."""
+        """Return exp(-(lag/xi_0)^2)."""
         result: Array = np.exp(-((np.asarray(lag) / self.correlation_length) ** 2))
         return result
 
 
 @model
-class ExponentialSpectrum(ScaledSpectrum):
+class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
     Parameters
@@ -208,62 +372,190 @@ class ExponentialSpectrum(ScaledSpectrum):
     1.0
     """
 
-    correlation_length: Positive
-    truncation: Positive | None = None
-    power_kept: Share | None = None
     type: Literal["exponential"] = "exponential"
 
-    _default_power: ClassVar[float] = 0.99
-
-    @model_validator(mode="after")
-    def _truncated_once(self) -> ExponentialSpectrum:
-        one_truncation(self.truncation, self.power_kept)
-        return self
-
-    def density(self, wavenumber: Array) -> Array:
-        """g(k)/g(0) at k in rad/m."""
-        result: Array = 1.0 / (1.0 + (np.asarray(wavenumber) * self.correlation_length) ** 2)
-        return result
-
-    def power_within(self, wavenumber: float) -> float:
-        """Share of the power below `wavenumber`."""
-        return 2.0 / math.pi * math.atan(wavenumber * self.correlation_length)
-
-    def _power_quantile(self, share: float) -> float:
-        return math.tan(share * math.pi / 2.0) / self.correlation_length
-
-    def plane_density(self, wavenumber: Array) -> Array:
-        """(1 + (k xi_0)^2)^(-3/2)."""
-        ratio = np.asarray(wavenumber) * self.correlation_length
-        result: Array = (1.0 + ratio * ratio) ** -1.5
-        return result
-
-    def plane_power_within(self, wavenumber: float) -> float:
-        """Share of the power at wave vectors shorter than `wavenumber`."""
-        return 1.0 - 1.0 / math.hypot(1.0, wavenumber * self.correlation_length)
-
-    def _plane_quantile(self, share: float) -> float:
-        return math.sqrt((1.0 - share) ** -2 - 1.0) / self.correlation_length
+    default_power: ClassVar[float] = 0.99
+    _power: ClassVar[float] = 1.0
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """exp(-|lag|/xi_0)."""
+        """Return exp(-|lag|/xi_0)."""
         result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
         return result
 
 
-def _as_spectrum(value: Any) -> Any:
+LONGEST, SHORTEST = 1e-6, 1e12
+"""Wavenumbers between which a spectrum of one's own is integrated octave by octave, rad/m."""
+
+
+def _refuse_to_write(function: Any) -> Any:
+    name = getattr(function, "__name__", repr(function))
+    raise ValueError(f"spectrum.function is the Python function {name!r}; use a named spectrum")
+
+
+@model
+class CustomSpectrum(SpectralDensity):
+    """A spectrum of your own: any g(k), up to a factor.
+
+    Parameters
+    ----------
+    function : callable
+        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative, integrable.
+        On a plane it is the density there, at wave vectors of length k, so that g(k) k must be
+        integrable; a line cut through the plane then has another spectrum than g.
+    max_wavenumber : float, optional
+        Truncation, rad/m; by `power_kept` if left out.
+    power_kept : float, optional
+        Share of the power kept by truncation; 0.9997 if neither is given.
+    break_points : sequence of float
+        Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than a tenth
+        of an octave needs its two ends here, or it may be missed.
+
+    Raises
+    ------
+    InputError
+        If the function is not a density, or its integral does not settle.
+
+    Notes
+    -----
+    For Python only: a study with a function of your own cannot be written to a file. Integrals are
+    by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
+    """
+
+    function: Annotated[
+        Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})
+    ]
+    max_wavenumber: Positive | None = None
+    power_kept: Share | None = None
+    break_points: tuple[Positive, ...] = ()
+    type: Literal["custom"] = "custom"
+
+    @model_validator(mode="after")
+    def _is_a_density(self) -> CustomSpectrum:
+        if self.max_wavenumber is not None and self.power_kept is not None:
+            raise InputError("give max_wavenumber or power_kept, not both")
+        probe = np.geomspace(1e-3, 1e6, 64)
+        try:
+            values = np.asarray(self.function(probe), dtype=np.float64)
+        except Exception as error:
+            raise InputError(f"function: fails on an array of wavenumbers: {error!r}") from None
+        if values.shape != probe.shape or not np.all(np.isfinite(values)) or values.min() < 0.0:
+            raise InputError("function: must map (m,) wavenumbers to (m,) finite values >= 0")
+        self._check_power(1)
+        return self
+
+    def _check_power(self, dimensions: int) -> None:
+        total = self.power_integral(SHORTEST, dimensions)
+        if not 0.0 < total < np.inf:
+            raise InputError("function: its integral over wavenumbers must be positive and finite")
+        last = 1.0 - self.power_within(1e-3 * SHORTEST, dimensions)
+        if self.max_wavenumber is None and last > 1e-3:
+            what = (
+                "its integral" if dimensions == 1 else "on a plane, where it is that of g(k) k, it"
+            )
+            raise InputError(
+                f"function: {100.0 * last:.2g} % of its power lie above {1e-3 * SHORTEST:g} rad/m:"
+                f" {what} does not converge; give max_wavenumber"
+            )
+
+    def _edges(self, end: float) -> Array:
+        octaves = np.exp2(np.arange(math.log2(LONGEST), math.log2(SHORTEST)))
+        return np.unique([0.0, *(k for k in (*octaves, *self.break_points) if k < end), end])
+
+    def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return g(k) at k in rad/m, up to a factor: the density of what it is used for."""
+        return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
+
+    def power_integral(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Integrate g, on a plane g(k) k, from 0 to `wavenumber` or to `max_wavenumber`."""
+        edges, sums = _cumulative(self, dimensions)
+        end = min(wavenumber, float(edges[-1]))
+        before = int(np.searchsorted(edges, end))
+        if edges[before] == end:
+            return float(sums[before])
+        part = integrate(_moment(self, dimensions), np.array([edges[before - 1], end]))
+        return float(sums[before - 1] + part[0])
+
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the share of the power below `wavenumber`, of that below `max_wavenumber`."""
+        whole = _cumulative(self, dimensions)[1][-1]
+        return min(self.power_integral(wavenumber, dimensions) / float(whole), 1.0)
+
+    def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber (rad/m) below which a share of the power lies."""
+        return _quantile(self, share, dimensions)
+
+    def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber above which the spectrum is truncated, rad/m."""
+        if self.max_wavenumber is not None:
+            return self.max_wavenumber
+        return super().cutoff(dimensions)
+
+    def untruncated_correlation(self, lag: Array) -> Array:
+        """Return the correlation of the whole spectrum at `lag` (m), up to `max_wavenumber`."""
+        edges, sums = _cumulative(self, 1)
+        return self._correlation(lag, edges, float(sums[-1]))
+
+
+def _moment(spectrum: CustomSpectrum, dimensions: int) -> Callable[[float], float]:
+    """Power per wavenumber, whose integral is the power, up to a factor."""
+
+    def moment(k: float) -> float:
+        return spectrum.density_at(k) * k ** (dimensions - 1)
+
+    return moment
+
+
+@lru_cache(maxsize=64)
+def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array]:
+    """Edges of octaves, rad/m, and the power below each, up to a factor."""
+    edges = spectrum._edges(spectrum.max_wavenumber or SHORTEST)
+    parts = integrate(_moment(spectrum, dimensions), edges)
+    return edges, np.concatenate(([0.0], np.cumsum(parts)))
+
+
+@lru_cache(maxsize=64)
+def _quantile(spectrum: CustomSpectrum, share: float, dimensions: int) -> float:
+    spectrum._check_power(dimensions)
+    edges, sums = _cumulative(spectrum, dimensions)
+    above = int(np.searchsorted(sums, share * sums[-1]))
+
+    def excess(wavenumber: float) -> float:
+        return spectrum.power_within(wavenumber, dimensions) - share
+
+    root: float = brentq(excess, edges[above - 1], edges[above], xtol=1e-300)
+    return root
+
+
+SPECTRA: dict[str, Any] = {
+    "power_law": PowerLawSpectrum,
+    "squared_exponential": SquaredExponentialSpectrum,
+    "exponential": ExponentialSpectrum,
+}
+"""By their names in study files."""
+
+
+def spectrum_of(value: Any) -> SpectralDensity:
+    """Return the spectrum of one, of a table {type, ...}, or of a function g(k).
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    if isinstance(value, SpectralDensity):
+        return value
+    if isinstance(value, dict):
+        found: SpectralDensity = from_table(SPECTRA, value)
+        return found
     if isinstance(value, type):
         raise InputError(f"must be a spectrum such as st.{value.__name__}(...), got the class")
-    if callable(value) and not isinstance(value, SpectralDensity):
+    if callable(value):
         return CustomSpectrum(function=value)
-    return value
+    raise InputError(
+        "must be a spectrum such as st.PowerLawSpectrum(...) or a function g(k), got"
+        f" {describe(value)}"
+    )
 
 
-Spectrum: TypeAlias = Annotated[
-    Annotated[
-        PowerLawSpectrum | SquaredExponentialSpectrum | ExponentialSpectrum | CustomSpectrum,
-        Field(discriminator="type"),
-    ],
-    BeforeValidator(_as_spectrum),
-]
+Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of)]
 """Any of the spectra above, or a function g(k)."""

@@ -1,86 +1,138 @@
-"""From draws to profiles: one inverse transform and one table look-up a sample."""
+"""From (seed, sample, mode) to standard normal draws, and from draws to the Gaussian field.
+
+A generator for each sample of a line would cost more than the sample, so samples come in blocks of
+256, with one generator a block; inside a block the draws run mode after mode, so that a spectrum
+with more modes extends the same field. A sample of a plane has so many modes that it has a
+generator, a block of its own.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiction.arrays import Array, inverse_transform
+from stiction.arrays import Array
 from stiction.jit import jit
 
+BLOCK = 256
 
-@jit
-def gaussian_rows(draws: Array, sigma: Array, has_mean: bool, nodes: int, out: Array) -> None:
-    """z(x_i) = sum_j sigma_j (A_j cos k_j x_i + B_j sin k_j x_i), one row a sample.
 
-    Modes that the grid does not resolve are folded onto those that it does: at the nodes, mode j
-    and mode n - j differ by the sign of the sine only, so the values are exact whatever the grid.
-    Row by row, so that the numbers do not depend on the batch.
+def block_of(dimensions: int) -> int:
+    """Return how many samples share a generator on a line (1) or a plane (2)."""
+    return BLOCK if dimensions == 1 else 1
+
+
+def _block(seed: int, stream: int, block: int, modes: int, size: int) -> Array:
+    """Draws A_j, B_j of modes 0..modes for one block, shape (2 (modes + 1), size)."""
+    place = (stream, block) if size == BLOCK else (stream, block, size)
+    key = np.random.SeedSequence(entropy=seed, spawn_key=place)
+    generator = np.random.Generator(np.random.PCG64DXSM(key))
+    return generator.standard_normal((2 * (modes + 1), size))
+
+
+def standard_normal(
+    seed: int,
+    samples: int,
+    ranks: NDArray[np.int64],
+    *,
+    first: int = 0,
+    stream: int = 0,
+    mean_mode: bool = False,
+    block: int = BLOCK,
+) -> Array:
+    """Draw samples number `first`, `first` + 1, ...
+
+    Parameters
+    ----------
+    seed, samples, first, stream : int
+    ranks : (modes,) array
+        Which modes, rising: those of rank 1, 2, ... where none is left out.
+    mean_mode : bool
+    block : int
+        Samples that share a generator.
+
+    Returns
+    -------
+    (samples, dimension) array
+        A, B of one mode after the other, with A_0 in front if `mean_mode`.
     """
-    half = nodes // 2
-    spectrum = np.empty(half + 1, dtype=np.complex128)
-    start = 1 if has_mean else 0
-    for row in range(draws.shape[0]):
-        spectrum[:] = 0.0
-        for j in range(1 - start, sigma.size):
-            if j == 0:
-                spectrum[0] += nodes * sigma[0] * draws[row, 0]
-                continue
-            a = sigma[j] * draws[row, start + 2 * (j - 1)]
-            b = sigma[j] * draws[row, start + 2 * (j - 1) + 1]
-            m = j if j < nodes else j % nodes
-            if m == 0 or m == half:
-                spectrum[m] += nodes * a  # the sine vanishes at every node
-            elif m < half:
-                spectrum[m] += 0.5 * nodes * complex(a, -b)
-            else:
-                spectrum[nodes - m] += 0.5 * nodes * complex(a, b)
-        out[row] = np.fft.irfft(spectrum, nodes)
+    samples, first = int(samples), int(first)  # small numpy integers would overflow
+    modes = int(ranks[-1]) if ranks.size else 0
+    start = 0 if mean_mode else 1
+    kept: slice | NDArray[np.int64] = slice(2, None)
+    if mean_mode or ranks.size < modes:
+        pairs = (2 * ranks[:, None] + np.arange(2)).ravel()
+        kept = np.concatenate(([0], pairs)) if mean_mode else pairs
+    draws = np.empty((samples, 2 * ranks.size + 1 - start))
+    done = 0
+    while done < samples:
+        number, offset = divmod(first + done, block)
+        count = min(block - offset, samples - done)
+        rows = _block(seed, stream, number, modes, block)
+        draws[done : done + count] = rows[kept, offset : offset + count].T
+        done += count
+    return draws
 
 
 @jit
-def _plane_spectrum(
-    draws: Array, sigma: Array, numbers: Array, has_mean: bool, columns: int, out: Array
+def _synthesise(
+    draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
-    """Real Fourier transform of one sample of a plane with `columns` nodes along y.
+    """Fill `out`, (samples, rows, columns); a line is a plane of one row.
 
     Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k. Of both, those
     in the half of wave vectors that a real transform holds are added; in its first and last
-    column it holds both. Modes that the grid does not resolve are folded.
+    column it holds both. Modes that the grid does not resolve are folded onto those that it does,
+    so the values at the nodes are exact whatever the grid.
     """
-    nx, half = out.shape[0], columns // 2
-    scale = 0.5 * nx * columns
-    out[:] = 0.0
+    samples, rows, columns = out.shape
+    half = columns // 2
+    scale = 0.5 * rows * columns
     start = 1 if has_mean else 0
-    if has_mean:
-        out[0, 0] = 2.0 * scale * sigma[0] * draws[0]
-    for m in range(1, sigma.size):
-        a = scale * sigma[m] * draws[start + 2 * (m - 1)]
-        b = scale * sigma[m] * draws[start + 2 * (m - 1) + 1]
-        p, q = numbers[0, m] % nx, numbers[1, m] % columns
-        if q <= half:
-            out[p, q] += complex(a, -b)
-        if q == 0 or q >= half:
-            out[-p % nx, -q % columns] += complex(a, b)
+    spectrum = np.empty((rows, half + 1), dtype=np.complex128)
+    for i in range(samples):
+        spectrum[:] = 0.0
+        if has_mean:
+            spectrum[0, 0] = 2.0 * scale * (sigma[0] * draws[i, 0])
+        for m in range(1, sigma.size):
+            a = scale * (sigma[m] * draws[i, start + 2 * (m - 1)])
+            b = scale * (sigma[m] * draws[i, start + 2 * (m - 1) + 1])
+            p, q = numbers[0, m] % rows, numbers[1, m]
+            if q >= columns:
+                q %= columns
+            if q <= half:
+                spectrum[p, q] += complex(a, -b)
+            if q == 0 or q >= half:
+                spectrum[-p % rows, -q % columns] += complex(a, b)
+        if rows == 1:
+            out[i, 0] = np.fft.irfft(spectrum[0], columns)
+        else:
+            out[i] = np.fft.irfft2(spectrum, (rows, columns))
 
 
-def gaussian_planes(
-    draws: Array, sigma: Array, numbers: Array, has_mean: bool, shape: tuple[int, ...]
+def gaussian(
+    draws: Array,
+    sigma: Array,
+    numbers: NDArray[np.int64],
+    has_mean: bool,
+    shape: tuple[int, ...],
 ) -> Array:
-    """z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
+    """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
+
+    One inverse transform a sample, so that the numbers do not depend on the batch.
 
     Parameters
     ----------
     draws : (samples, dimension) array
     sigma : (modes + 1,) array
-    numbers : (2, modes + 1) array of int
+    numbers : (dimensions, modes + 1) array of int
         Wave vectors in units of 2 pi/length.
     has_mean : bool
-    shape : (int, int)
-        Nodes along x and y.
+    shape : tuple of int
+        Nodes in each direction.
     """
-    spectrum = np.empty((shape[0], shape[1] // 2 + 1), dtype=np.complex128)
     z = np.empty((draws.shape[0], *shape))
-    for one, row in zip(z, draws, strict=True):
-        _plane_spectrum(row, sigma, numbers, has_mean, shape[1], spectrum)
-        one[:] = inverse_transform(spectrum, shape)
+    if len(shape) == 1:
+        numbers = np.concatenate([np.zeros_like(numbers), numbers])
+    _synthesise(draws, sigma, numbers, has_mean, z.reshape(z.shape[0], -1, shape[-1]))
     return z

@@ -19,7 +19,7 @@ from stiction.arrays import Array
 from stiction.criterion.nucleation import multiplier_of
 from stiction.criterion.plane import windows_of
 from stiction.problem import Problem
-from stiction.random.quantile_table import from_normal
+from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
 SIZES = (1.0, 1.15)

@@ -22,13 +22,13 @@ from stiction.friction.law import SCALES
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions, TimeUp
-from stiction.random.coefficients import (
+from stiction.random.checks import check_residual, warn_if_unresolved
+from stiction.random.pressure import (
     coefficients_of,
     mean_in_stress,
     profiles_in_stress,
     support_in_stress,
 )
-from stiction.random.overlap import check_residual
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 
@@ -218,7 +218,7 @@ class LimitState:
         """Why a shifted sample would not slide at the same stress, or None if it would."""
         if len(self.random.names) > 1:
             return "more than the strength is random"
-        if coefficients_of(self.random):
+        if coefficients_of(self.random) and np.ndim(self.problem.load.normal_pressure) > 0:
             return "the normal pressure, and so the strength, varies along the interface"
         load, friction = self.problem.load, self.problem.friction
         parts = {
@@ -345,4 +345,5 @@ def make_limit_state(
     state.random.warn_if_inaccurate(problem.interface)
     problem.warn_of_units(mean_in_stress(problem, state.random.properties, "strength"))
     check_residual(problem, state.random.properties)
+    warn_if_unresolved(problem, state.random)
     return replace(state, workers=usable_cores() if workers is None else int(workers), meter=meter)

@@ -18,11 +18,10 @@ from stiction.interface import Interface
 from stiction.methods import Method
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
-from stiction.random.coefficients import in_stress
-from stiction.random.custom_spectrum import CustomSpectrum
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.spectra import CustomSpectrum
 from stiction.reliability.curve import failure_curve
 from stiction.reliability.limit_state import Event
 
@@ -160,7 +159,7 @@ def tail_study(
     InputError
         If something varies along the interface, or the spectrum has no correlation length.
     """
-    random = in_stress(problem, as_random_interface(random))
+    random = as_random_interface(random)
     strength = random.strength
     if isinstance(strength.spectrum, CustomSpectrum):
         raise InputError("strength.spectrum: a spectrum of your own has no correlation length")

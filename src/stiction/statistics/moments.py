@@ -18,7 +18,7 @@ from stiction.criterion.nucleation import Weights, check_aspect, multiplier_of, 
 from stiction.criterion.plane import middle_aspect, too_small, window_of
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.random.random_field import RandomField
 from stiction.statistics.plane_moments import plane_infinite_ratio, plane_longest_ratio
 

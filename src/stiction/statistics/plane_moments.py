@@ -10,9 +10,9 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.problem import Problem
-from stiction.random.custom_spectrum import CustomSpectrum
-from stiction.random.hermite import correlation_of_mapped, hermite_coefficients
+from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.random.random_field import RandomField
+from stiction.random.spectra import CustomSpectrum
 
 
 def plane_infinite_ratio(interface: Interface, strength: RandomField, weight: Array) -> float:

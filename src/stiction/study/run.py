@@ -23,7 +23,7 @@ from stiction.ensemble.table import Failure
 from stiction.errors import InputError, StoreError, warn_user
 from stiction.model import brief, describe
 from stiction.progress import Show
-from stiction.random.draws import BLOCK
+from stiction.random.synthesis import BLOCK
 from stiction.study.export import check_suffix, export
 
 FEWEST_BLOCKS = 8
