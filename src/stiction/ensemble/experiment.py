@@ -167,7 +167,6 @@ class Experiment:
         self.problem.warn_of_units(self.mean("strength"))
         check_residual(self.problem, self.random.properties)
         warn_if_unresolved(self.problem, self.random)
-        warn_if_unresolved(self.problem, self.random)
 
     def draws(self, seed: int, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.
