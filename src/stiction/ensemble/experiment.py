@@ -23,14 +23,8 @@ from stiction.random.pressure import (
     profiles_in_stress,
     support_in_stress,
 )
-<<<<<<< HEAD
-from stiction.random.synthesis import block_of
-from stiction.random.checks import check_residual
 from stiction.random.random_interface import as_random_interface
-=======
-from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.synthesis import block_of
->>>>>>> e64bc73 (Spectra, modes, draws and synthesis once for any dimension; a marginal says what shifts and scales it)
 from stiction.results import Variable, along
 from stiction.sample import PROFILES, Sample
 

@@ -30,10 +30,9 @@ from stiction.methods import Method
 from stiction.model import describe, names_to_keep, to_plain
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, check_time_limit
-from stiction.random.checks import check_residual
+from stiction.random.checks import check_residual, warn_if_unresolved
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.random.resolution import warn_if_inaccurate
 
 KEEP_LIMIT = 2.0**30
 FEW = 4
@@ -135,11 +134,12 @@ def check_fields(points: Sequence[Experiment]) -> None:
     meter = Meter("checking the fields", len(pairs) + len(points), unit="fields")
     with collect_warnings() as caught, meter:
         for field, interface in pairs:
-            warn_if_inaccurate(field, interface)
+            field.warn_if_inaccurate(interface)
             meter.advance()
         for point in points:
             point.problem.warn_of_units(point.mean("strength"))
             check_residual(point.problem, point.random.properties)
+            warn_if_unresolved(point.problem, point.random)
             meter.advance()
     found = list(dict.fromkeys(caught))
     for text, category in found[:FEW]:
