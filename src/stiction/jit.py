@@ -6,6 +6,7 @@ import hashlib
 import logging
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,52 +46,62 @@ class _FirstCompilation(event.Listener):
 event.register("numba:compile", _FirstCompilation())
 
 
-def _digest_of_sources() -> str:
-    """Digest of every file with a kernel and of what such files import, directly or not.
+_IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
-    Files that refuse input hold no part of a kernel: an edited message recompiles nothing.
+
+@cache
+def _kernel_sources() -> dict[str, bytes]:
+    """Return the text of every file that may hold a part of a kernel, by module.
+
+    Files that refuse input hold no part of a kernel, unless they hold one themselves: an edited
+    message recompiles nothing.
     """
     package = Path(__file__).parent
     texts = {
         ".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes()
         for path in sorted(package.rglob("*.py"))
     }
-    texts = {name.removesuffix(".__init__"): text for name, text in texts.items()}
-    imported = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
-    reached = {
-        name
+    return {
+        name.removesuffix(".__init__"): text
         for name, text in texts.items()
-        if b"stiction.jit import" in text or b"stiction.jit import" in text
+        if b"stiction.jit import" in text or b"InputError" not in text
     }
+
+
+@cache
+def _folder(module: str) -> Path:
+    """Return the folder of the compiled kernels of a module.
+
+    numba takes a compiled kernel for current as long as the kernel's own file is: it does not
+    notice that a function or a constant of another file has changed. So every state of the files
+    that a module imports, directly or not, has a folder of its own. Friction laws are resolved by
+    type inside kernels and belong to every state.
+    """
+    texts = _kernel_sources()
+    reached = {name for name in texts if name.startswith("stiction.friction")}
+    reached |= {module} & texts.keys()
     waiting = list(reached)
     while waiting:
-        for module, member in imported.findall(texts[waiting.pop()]):
-            names = {module.decode(), f"{module.decode()}.{member.decode()}"}
-            new = {
-                name for name in names & texts.keys() - reached if b"InputError" not in texts[name]
-            }
+        for source, member in _IMPORT.findall(texts[waiting.pop()]):
+            names = {source.decode(), f"{source.decode()}.{member.decode()}"}
+            new = (names & texts.keys()) - reached
             waiting += new
             reached |= new
-    digest = hashlib.sha256()
-    for name in sorted(reached):
-        digest.update(texts[name])
-    return digest.hexdigest()[:16]
+    digest = hashlib.sha256(b"".join(texts[name] for name in sorted(reached))).hexdigest()[:16]
+    if _KEPT:
+        return private_folder(Path(_KEPT), digest)
+    return private_folder(cache_folder(), "compiled", digest)
 
 
-# numba takes a compiled kernel for current as long as the kernel's own file is: it does not notice
-# that a function or a constant of another file has changed. So every state of the files that hold
-# kernels has a folder of its own.
-_FOLDER = (
-    private_folder(Path(numba.config.CACHE_DIR), _digest_of_sources())
-    if numba.config.CACHE_DIR
-    else private_folder(cache_folder(), "compiled", _digest_of_sources())
-)
+_KEPT = numba.config.CACHE_DIR
 
 
 def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
     """Compile on first call, cached on disk where that is possible."""
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_FOLDER)  # read by numba when it decorates, and only then
+    numba.config.CACHE_DIR = str(
+        _folder(function.__module__)
+    )  # read by numba when it decorates, and only then
     try:
         compiled: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # numba finds no folder in which it may write

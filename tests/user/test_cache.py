@@ -28,17 +28,26 @@ def run(code, source, cache):
     return done.stdout.strip()
 
 
-def test_an_edit_of_any_file_is_another_folder(tmp_path):
+def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path):
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
-    code = "import stiction.jit as j; print(j._FOLDER)"
+    code = (
+        "import stiction.jit as j;"
+        "print(*(j._folder('stiction.' + m) for m in ('dynamics.explicit', 'random.synthesis')))"
+    )
     copy = tmp_path / "src"
     shutil.copytree(SOURCES / "stiction", copy / "stiction")
-    before = Path(run(code, copy, tmp_path / "cache"))
-    with (copy / "stiction" / "errors.py").open("a") as file:
-        file.write("\n# edited\n")
-    after = Path(run(code, copy, tmp_path / "cache"))
-    assert before.parent == after.parent == tmp_path / "cache" / "compiled"
-    assert before != after
+    folders = []
+    for edited in (None, "errors.py", "dynamics/explicit.py", "friction/__init__.py"):
+        if edited:
+            with (copy / "stiction" / edited).open("a") as file:
+                file.write("\n# edited\n")
+        folders.append(run(code, copy, tmp_path / "cache").split())
+    before, message, own, law = folders
+    assert Path(before[0]).parent == tmp_path / "cache" / "compiled"
+    assert message == before
+    assert own[0] != before[0]
+    assert own[1] == before[1]
+    assert not set(law) & set(own)
 
 
 @pytest.mark.parametrize("writable", [True, False])
