@@ -4,7 +4,7 @@ Prints, for each algorithm, the mean over repeated runs against a precise refere
 coefficient of variation beside the reported one, and how often the 95 % interval held the
 reference. Takes about ten minutes on one core.
 
-Run: ``python benchmarks/reliability_validation.py``
+Run: ``python validation/reliability.py``
 """
 
 import math

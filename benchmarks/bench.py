@@ -1,0 +1,411 @@
+"""Times of the package beside plain references, all in one process.
+
+    python benchmarks/bench.py                list the cases
+    python benchmarks/bench.py CASE [...]     run some, or `all`
+
+Every row prints our time, the time of a reference that was written to be plain, and their ratio,
+which means something on any machine. Times are processor times of one core. To compare two states
+of the package, run the same case with each of them on PYTHONPATH, one after the other.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from functools import partial
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, circulant, eigh
+from scipy.optimize import linprog
+from scipy.special import ndtr
+
+import stiction as st
+
+RATIOS = (0.25, 0.5, 1.0, 2.0)
+"""xi_0/h_n of Albertini et al. (2020)."""
+CASES = {}
+
+
+def case(function):
+    """Register a case under the name of its function."""
+    CASES[function.__name__] = function
+    return function
+
+
+def timed(function, repeats=7):
+    """Return the median processor time of a call, s, after one call to warm up."""
+    function()
+    spent = []
+    for _ in range(repeats):
+        start = time.process_time()
+        function()
+        spent.append(time.process_time() - start)
+    return statistics.median(spent)
+
+
+def row(label, ours, references=(), note=""):
+    """Print our time and the ratios of references to it."""
+    unit, factor = ("s", 1.0) if ours >= 0.1 else ("ms", 1e3) if ours >= 1e-4 else ("us", 1e6)
+    text = "".join(f"; {name} {other / ours:,.1f} times as long" for name, other in references)
+    print(f"  {label:32s} {ours * factor:9.3f} {unit}{text}{note and '; ' + note}", flush=True)
+
+
+def line(nodes=1024, **friction):
+    """Return the paper's interface in plane strain."""
+    friction = friction or {"weakening_rate": 0.5e12}
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
+    return st.Problem(
+        solid, st.Interface(0.1 * nodes / 1024, nodes), st.LinearWeakening(**friction)
+    )
+
+
+def plane(nodes):
+    """Return a square plane of 8 h_n and the paper's strength at xi_0/h_n = 0.5."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
+    law = st.LinearWeakening(weakening_rate=0.5e12)
+    h_n = line().nucleation_length
+    problem = st.Problem(solid, st.Interface((8 * h_n, 8 * h_n), (nodes, nodes)), law)
+    return problem, field(0.5 * h_n)
+
+
+def field(correlation_length, marginal=None):
+    """Return the paper's strength, or one with another marginal."""
+    marginal = marginal or st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length=correlation_length))
+
+
+def solver_time(problem, method, tau_p, repeats=5):
+    """Return the time of a sample and what the solver gives, without the checks of `onset`."""
+    solver, rows = method.prepare(problem), problem.sample(tau_p)
+    return timed(lambda: solver(rows), repeats) / len(tau_p), solver(rows)
+
+
+def stiffness(problem):
+    """Return K - W on a line as a dense matrix in units of W, from its symbol."""
+    n = problem.interface.size
+    symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
+    return circulant(np.fft.irfft(symbol, n)) / problem.friction.weakening_rate - np.eye(n)
+
+
+@case
+def fields():
+    """Random fields, beside the sum of cosines with scipy's quantile."""
+    problem = line()
+    for ratio in RATIOS:
+        strength = field(ratio * problem.nucleation_length)
+        ours = timed(lambda s=strength: s.sample(problem.interface, samples=512, seed=0)) / 512
+        draws = strength.draws(problem.interface, 16, seed=0)
+        sigma = strength.modes(problem.interface).sigma[1:]
+        phase = 2 * np.pi * np.outer(np.arange(1, sigma.size + 1), np.arange(1024) / 1024)
+
+        def plain(strength=strength, draws=draws, sigma=sigma, phase=phase):
+            z = (draws[:, ::2] * sigma) @ np.cos(phase) + (draws[:, 1::2] * sigma) @ np.sin(phase)
+            return strength.marginal.distribution.ppf(ndtr(z))
+
+        row(f"xi_0/h_n = {ratio}", ours, [("sum of cosines", timed(plain, 3) / 16)])
+
+
+@case
+def local():
+    """The local criterion, beside quadrature of the moving average, and with its fields."""
+    problem = line()
+    modes = np.arange(1, 41)  # Uenishi and Rice (2003): v = sum a_k sin(k t), s = cos t
+
+    def integral(m):
+        return np.where(m % 2 == 0, 2.0 / (1.0 - m.astype(float) ** 2), 0.0)
+
+    weight = 0.5 * (integral(modes[:, None] - modes) - integral(modes[:, None] + modes))
+    _, vectors = eigh(np.diag(np.pi * modes / 4), weight)
+    t = (np.arange(64) + 0.5) * np.pi / 64
+    v = np.sin(np.outer(t, modes)) @ vectors[:, 0] * np.sin(t)
+    x, shift = problem.interface.x, 0.5 * problem.nucleation_length * np.cos(t)
+
+    def plain(tau_p):
+        length = problem.interface.length
+        shifted = [np.interp(x + one, x, tau_p, period=length) for one in shift]
+        return (v @ np.array(shifted) / v.sum()).min()
+
+    for ratio in RATIOS:
+        strength = field(ratio * problem.nucleation_length)
+        tau_p = strength.sample(problem.interface, samples=512, seed=0)
+        ours, found = solver_time(problem, st.LocalCriterion(), tau_p)
+        apart = abs(found["critical_load"][0] / plain(tau_p[0]) - 1.0)
+        slow = timed(partial(plain, tau_p[0]), 5)
+        row(f"xi_0/h_n = {ratio}", ours, [("quadrature", slow)], f"{apart:.0e} apart")
+
+        def ensemble(strength=strength):
+            options = {"samples": 4096, "workers": 1, "progress": False}
+            st.monte_carlo(problem, strength, method=st.LocalCriterion(), **options)
+
+        row("  with its field, stored", timed(ensemble, 3) / 4096)
+
+
+def by_highs(matrix, strength):
+    """Return the onset, MPa, by the dual simplex method of HiGHS."""
+    n = len(matrix)
+    found = linprog(
+        np.r_[np.zeros(n), -1.0],
+        A_ub=np.c_[-matrix, np.ones(n)],
+        b_ub=strength / 1e6,
+        bounds=[(0, None)] * n + [(None, None)],
+        method="highs-ds",
+    )
+    return found.x[-1]
+
+
+def by_bisection(matrix, strength, tolerance=1e-9):
+    """Return the onset, MPa: at each load the slipping set grows with a new factor every time."""
+    strength = strength / 1e6
+    low, high = strength.min(), strength.mean()
+    while high - low > tolerance * high:
+        load = 0.5 * (low + high)
+        slipping, stable = strength < load, True
+        while stable:
+            nodes = np.flatnonzero(slipping)
+            slip = np.zeros(len(matrix))
+            try:
+                factor = cho_factor(matrix[np.ix_(nodes, nodes)])
+            except LinAlgError:
+                stable = False
+                break
+            slip[nodes] = cho_solve(factor, load - strength[nodes])
+            more = (matrix @ slip + strength - load < -1e-12) & ~slipping
+            if not more.any():
+                break
+            slipping |= more
+        low, high = (load, high) if stable else (low, load)
+    return low
+
+
+@case
+def equilibrium():
+    """Exact onsets on lines, beside HiGHS and bisection with dense solves."""
+    problem = line()
+    matrix = stiffness(problem)
+    for ratio in RATIOS:
+        tau_p = field(ratio * problem.nucleation_length).sample(problem.interface, 256, seed=0)
+        ours, found = solver_time(problem, st.Equilibrium(), tau_p)
+        gap = np.max(found["certificate_gap"] / found["critical_load"])
+        exact = found["first_instability"][0] / 1e6
+        plain = [
+            ("HiGHS", timed(lambda p=tau_p[0]: by_highs(matrix, p), 1)),
+            ("bisection", timed(lambda p=tau_p[0]: by_bisection(matrix, p), 1)),
+        ]
+        apart = abs(by_highs(matrix, tau_p[0]) / exact - 1.0)
+        row(f"xi_0/h_n = {ratio}", ours, plain, f"gap {gap:.0e}, HiGHS {apart:.0e} apart")
+
+
+@case
+def long_lines():
+    """Exact onsets of a thousand nucleation lengths, beside one dense factor of what slips."""
+    problem = line(32_768)
+    for ratio in (2.0, 0.5, 0.25):
+        strength = field(ratio * problem.nucleation_length)
+        tau_p = strength.sample(problem.interface, samples=2, seed=0)
+        ours, found = solver_time(problem, st.Equilibrium(slip=True), tau_p, 3)
+        nodes = np.flatnonzero(found["slip"][0] > 0.0)
+        symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
+        column = np.fft.irfft(symbol, problem.interface.size)
+        column[0] -= problem.friction.weakening_rate
+        factor = timed(lambda n=nodes, c=column: np.linalg.cholesky(c[abs(n[:, None] - n)]), 1)
+        row(f"xi_0/h_n = {ratio}, {nodes.size} slip", ours, [("dense factor", factor)])
+
+
+@case
+def residual_strength():
+    """Exact onsets where nodes reach their residual strength, and where events are arrested."""
+    marginal = st.Lognormal(mean=1e6, cv=0.3)
+    cases = {
+        "uniform d_c": ({"critical_slip": 2e-6, "residual_strength": 0.3e6}, marginal),
+        "tau_r = 0.5 MPa": ({"weakening_rate": 0.5e12, "residual_strength": 0.5e6}, None),
+        "tau_r = 0.6 MPa": ({"weakening_rate": 0.5e12, "residual_strength": 0.6e6}, None),
+    }
+    for name, (law, own) in cases.items():
+        problem = line(2048, **law)
+        tau_p = field(1.7e-3, own).sample(problem.interface, samples=16, seed=0)
+        tau_p = np.maximum(tau_p, 1.001 * law["residual_strength"])
+        ours, found = solver_time(problem, st.Equilibrium(), tau_p, 3)
+        free = line(2048)
+        plain, _ = solver_time(free, st.Equilibrium(), tau_p, 3)
+        arrested = int(np.sum(found["arrested_events"] > 0))
+        note = f"{arrested} of 16 with arrested events; without residual strength"
+        row(name, ours, (), f"{note} {plain * 1e3:.2f} ms")
+
+
+@case
+def planes():
+    """The local criterion and exact onsets on planes, beside numpy and HiGHS."""
+    problem, strength = plane(24)
+    tau_p = strength.sample(problem.interface, samples=1, seed=0)
+    ours, found = solver_time(problem, st.Equilibrium(), tau_p)
+    k, share = problem.interface.wavenumbers, problem.interface.in_plane_share
+    modulus = problem.effective_modulus * share + problem.solid.shear_modulus * (1.0 - share)
+    column = np.fft.irfft2(0.5 * k * modulus, problem.interface.shape)
+    places = np.ndindex(*problem.interface.shape)
+    matrix = np.array([np.roll(column, place, (0, 1)).ravel() for place in places])
+    matrix = matrix / problem.friction.weakening_rate - np.eye(problem.interface.size)
+    plain = timed(lambda: by_highs(matrix, tau_p[0].ravel()), 1)
+    apart = abs(by_highs(matrix, tau_p[0].ravel()) / found["first_instability"][0] * 1e6 - 1.0)
+    row("24 x 24, equilibrium", ours, [("HiGHS", plain)], f"{apart:.0e} apart")
+    for nodes in (128, 256, 512):
+        problem, strength = plane(nodes)
+        sample = partial(strength.sample, problem.interface, samples=1, seed=1)
+        row(f"{nodes} x {nodes}, field", timed(sample))
+        ours, _ = solver_time(problem, st.LocalCriterion(), sample())
+        values = sample()[0]
+        plain = 5 * timed(lambda v=values: np.fft.ifft2(np.fft.fft2(v)))
+        row("  local criterion", ours, [("five plain convolutions", plain)])
+        row("  equilibrium", solver_time(problem, st.Equilibrium(), sample(), 3)[0])
+
+
+@case
+def rupture_step():
+    """An explicit step, beside a direct convolution over the last 1,000 steps."""
+    method = st.Rupture(loading_rate=1e9, implicit=False, start="rest")
+    for nodes in (512, 1024, 2048, 4096):
+        problem = line(nodes)
+        tau_p = field(0.5 * problem.nucleation_length).sample(problem.interface, 1, seed=1)
+        total, found = solver_time(problem, method, tau_p, 1)
+        step = total / found["explicit_steps"][0]
+        past = np.zeros((1000, nodes // 2 + 1), dtype=complex)
+        weights, values = past.real.copy(), np.zeros(nodes)
+
+        def plain(past=past, weights=weights, values=values):
+            np.einsum("mk,mk->k", weights, past)
+            for _ in range(2):
+                np.fft.irfft(np.fft.rfft(values))
+
+        row(f"{nodes} nodes", step, [("convolution", timed(plain))])
+
+
+@case
+def rupture_onset():
+    """Onsets by elastodynamics at several loading rates, and from just below the onset."""
+    problem = st.paper.problem(nodes=1024)
+    for ratio in (0.25, 0.5, 2.0):
+        strength = st.paper.strength(problem, correlation_ratio=ratio)
+        tau_p = strength.sample(problem.interface, samples=6, seed=1)
+        for rate in (1e5, 2e7, 1e9):
+            rest, first = solver_time(
+                problem, st.Rupture(loading_rate=rate, start="rest"), tau_p, 1
+            )
+            method = st.Rupture(loading_rate=rate, stop="runaway")
+            ours, found = solver_time(problem, method, tau_p, 1)
+            apart = np.abs(found["critical_stress"] / first["critical_stress"] - 1.0).max()
+            label = f"xi_0/h_n = {ratio}, {rate:.0e} Pa/s"
+            row(label, ours, [("from rest", rest)], f"{apart:.0e} apart")
+
+
+@case
+def reliability():
+    """Failure probabilities to a cv of 0.3, beside counting and OpenTURNS."""
+    import openturns as ot
+
+    problem = st.paper.problem(nodes=1024)
+    strength = st.paper.strength(problem, correlation_ratio=0.5)
+    options = {"target_cv": 0.3, "workers": 1, "progress": False}
+    for method in (st.LocalCriterion(), st.Equilibrium()):
+        tau_p = strength.sample(problem.interface, samples=256, seed=0)
+        each, _ = solver_time(problem, method, tau_p)
+        for stress in (661.6e3, 660.3e3):
+            estimate = partial(
+                st.failure_probability, problem, strength, stress, method=method, **options
+            )
+            ours, found = timed(estimate, 1), estimate()
+            counting = each / (found.probability * 0.09)
+            row(
+                f"{method.type}, {stress / 1e3:g} kPa", ours, [("counting", counting)],
+                f"P = {found.probability:.1e}, {found.algorithm}, {found.evaluations} onsets",
+            )  # fmt: skip
+    state = st.external.limit_state(problem, strength, method=st.LocalCriterion())
+    function = ot.PythonFunction(
+        state.dimension, 1, func_sample=lambda z: np.asarray(state(np.asarray(z)))[:, None]
+    )
+    vector = ot.CompositeRandomVector(function, ot.RandomVector(ot.Normal(state.dimension)))
+    subset = ot.SubsetSampling(ot.ThresholdEvent(vector, ot.Less(), 661.6e3))
+    subset.setMaximumOuterSampling(20)
+    subset.setBlockSize(100)
+    spent = timed(subset.run, 1)
+    result = subset.getResult()
+    cv = result.getCoefficientOfVariation()
+    row(
+        "OpenTURNS, local, 661.6 kPa",
+        spent,
+        (),
+        f"P = {result.getProbabilityEstimate():.1e} ({cv:.2f})",
+    )
+
+
+@case
+def store():
+    """A stored run, beside the same samples in memory and beside the bare solver."""
+    problem = st.paper.problem(nodes=1024)
+    strength = st.paper.strength(problem, correlation_ratio=0.5)
+    study = st.Study(
+        problem=problem,
+        random=strength,
+        method=st.Equilibrium(),
+        ensemble=st.Ensemble(samples=4000),
+    )
+    tau_p = strength.sample(problem.interface, samples=4000, seed=0)
+    solver, rows = st.Equilibrium().prepare(problem), problem.sample(tau_p)
+    plain = timed(lambda: solver(rows), 3) + timed(
+        lambda: strength.sample(problem.interface, samples=4000, seed=0), 3
+    )
+
+    def stored():
+        with tempfile.TemporaryDirectory() as folder:
+            study.run(out=os.path.join(folder, "run"), workers=1, progress=False)
+
+    memory = timed(lambda: study.run(workers=1, progress=False), 3)
+    ours = timed(stored, 3)
+    row("4,000 samples, stored", ours, [("in memory", memory), ("bare solver", plain)])
+
+
+@case
+def first_use():
+    """The first call on an empty cache of compiled kernels, beside the second."""
+    begin = "import stiction as st; p = st.paper.problem(nodes=256);"
+    field = "t = st.paper.strength(p).sample(p.interface);"
+    calls = {
+        "Problem": begin,
+        "local criterion": begin + field + "st.onset(p, t, method=st.LocalCriterion())",
+        "equilibrium": begin + field + "st.onset(p, t, method=st.Equilibrium())",
+        "rupture": begin + field + "st.onset(p, t, method=st.Rupture(loading_rate=2e7))",
+    }
+    for name, code in calls.items():
+        with tempfile.TemporaryDirectory() as folder:
+            environment = {**os.environ, "STICTION_CACHE_DIR": folder, "OMP_NUM_THREADS": "1"}
+            environment.pop("NUMBA_CACHE_DIR", None)
+            spent = []
+            for _ in range(2):
+                before = os.times()
+                subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+                after = os.times()
+                spent.append(
+                    after.children_user + after.children_system
+                    - before.children_user - before.children_system
+                )  # fmt: skip
+        row(name, spent[0], [("second use", spent[1])])
+
+
+def main(names):
+    """Run the named cases."""
+    warnings.simplefilter("ignore")
+    unknown = [name for name in names if name not in CASES and name != "all"]
+    if not names or unknown:
+        for name, function in CASES.items():
+            print(f"{name:18s} {function.__doc__}")
+        sys.exit(f"unknown: {', '.join(unknown)}" if unknown else 0)
+    for name in CASES if "all" in names else names:
+        print(f"{name}: {CASES[name].__doc__}")
+        CASES[name]()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
