@@ -283,7 +283,7 @@ class Cached:
         if self._one is None or self._one[0] != key:
             tau_p = strength.sample(problem.interface, samples=1, first=sample, seed=0)[0]
             exact = st.onset(problem, tau_p, method=st.Equilibrium(), progress=False)
-            self._one = key, (tau_p, st.nucleation_stress(problem, tau_p), exact)
+            self._one = key, (tau_p, st.theory.nucleation_stress(problem, tau_p), exact)
         return self._one[1]
 
 

@@ -68,7 +68,7 @@ def monte_carlo(
         for i, ratio in enumerate(RATIOS):
             style = {"color": color(i), "linewidth": 1.0}
             tau_p = profiles[ratio] * 1e-6
-            tau_n = st.nucleation_stress(problem, profiles[ratio]) * 1e-6
+            tau_n = st.theory.nucleation_stress(problem, profiles[ratio]) * 1e-6
             above.plot(x, tau_p[0], **style)
             below.plot(x, tau_n[0], **style)
             lowest = int(tau_n[0].argmin())

@@ -14,7 +14,7 @@ import warnings
 import numpy as np
 
 import stiction as st
-from stiction.criterion.method import LocalCriterion
+from stiction.criterion.local import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state

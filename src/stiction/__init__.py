@@ -29,10 +29,7 @@ _HOMES = {
     "SquaredExponentialSpectrum": "random.spectra",
     "ExponentialSpectrum": "random.spectra",
     "CustomSpectrum": "random.spectra",
-    "LocalCriterion": "criterion.method",
-    "nucleation_stress": "criterion.nucleation",
-    "energy_release_rate": "criterion.griffith",
-    "griffith_length": "criterion.griffith",
+    "LocalCriterion": "criterion.local",
     "Equilibrium": "equilibrium.method",
     "equilibrium_events": "equilibrium.events",
     "equilibrium_path": "equilibrium.path",
@@ -44,15 +41,12 @@ _HOMES = {
     "read_profile": "profiles",
     "onset": "methods",
     "monte_carlo": "ensemble.monte_carlo",
-    "nucleation_statistics": "statistics.moments",
-    "nucleation_limits": "statistics.moments",
     "combined_mean": "statistics.control_variates",
     "density": "statistics.densities",
     "quantiles": "statistics.quantiles",
     "FieldFit": "inference.field_fit",
     "fit_field": "inference.fit",
     "quantile_distance": "statistics.quantiles",
-    "rice_distribution": "statistics.rice",
     "failure_probability": "reliability.estimate",
     "FailureProbability": "reliability.result",
     "DesignStress": "reliability.design",
@@ -73,7 +67,7 @@ _HOMES = {
     "AccuracyWarning": "errors",
     "UnitWarning": "errors",
 }
-_MODULES = {"paper": "paper", "plot": "plot"}
+_MODULES = {"paper": "paper", "plot": "plot", "theory": "theory"}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 

@@ -3,10 +3,8 @@
 
 from stiction import paper as paper
 from stiction import plot as plot
-from stiction.criterion.griffith import energy_release_rate as energy_release_rate
-from stiction.criterion.griffith import griffith_length as griffith_length
-from stiction.criterion.method import LocalCriterion as LocalCriterion
-from stiction.criterion.nucleation import nucleation_stress as nucleation_stress
+from stiction import theory as theory
+from stiction.criterion.local import LocalCriterion as LocalCriterion
 from stiction.dynamics.compared import RuptureMisfit as RuptureMisfit
 from stiction.dynamics.method import Rupture as Rupture
 from stiction.dynamics.misfit import misfit as misfit
@@ -86,15 +84,8 @@ from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
 from stiction.statistics.control_variates import combined_mean as combined_mean
 from stiction.statistics.densities import density as density
-from stiction.statistics.moments import (
-    nucleation_limits as nucleation_limits,
-)
-from stiction.statistics.moments import (
-    nucleation_statistics as nucleation_statistics,
-)
 from stiction.statistics.quantiles import quantile_distance as quantile_distance
 from stiction.statistics.quantiles import quantiles as quantiles
-from stiction.statistics.rice import rice_distribution as rice_distribution
 from stiction.study.study import Ensemble as Ensemble
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run

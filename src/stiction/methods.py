@@ -43,7 +43,7 @@ ENTRY_POINTS = "stiction.methods"
 """Group of entry points by which other packages offer methods."""
 
 _OWN = {
-    "local_criterion": "criterion.method:LocalCriterion",
+    "local_criterion": "criterion.local:LocalCriterion",
     "equilibrium": "equilibrium.method:Equilibrium",
     "rupture": "dynamics.method:Rupture",
     "rupture_misfit": "dynamics.compared:RuptureMisfit",
@@ -56,7 +56,8 @@ class Method(Protocol):
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
     package that names it under the entry points "stiction.methods" offers it in study files too;
     its `type` is then a ``Literal`` with a default.
-    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
+    Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
+    solver returned; `accepts`, of "barriers" and "overstress" (see
     `Problem.sample`), and `first_stage`, the type of a cheaper method whose onsets lie close to
     its own, by which rare failures are found first.
     """
@@ -201,6 +202,12 @@ def _check_values(
         raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
 
 
+def warn_of(problem: Problem, method: Method, sample: Sample, values: Values) -> None:
+    """Let a method that can judge its own results warn of them, once for all samples."""
+    if hasattr(method, "warn_of"):
+        method.warn_of(problem, sample, values)
+
+
 def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
     """All samples, some at a time: the numbers of one do not depend on those beside it."""
     solver = prepared(problem, method)
@@ -309,6 +316,7 @@ def onset(
     sample = problem.sample(profiles, accept=accepted(method))
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
+    warn_of(problem, method, sample, values)
     numbers = np.arange(sample.samples) if numbers is None else numbers
     result = label(problem, method, values, numbers, attributes)
     return result if measured is None else with_gaps(problem, result, measured)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.eigenproblem import exact_weight
+from stiction.criterion.windows import exact_weight
 from stiction.equilibrium.method import Equilibrium
 
 DEPTH = 0.4e6

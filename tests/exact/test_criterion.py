@@ -2,17 +2,26 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
+from scipy.special import eval_jacobi, gammaln
 
 import stiction as st
-from stiction.criterion.assumptions import excess_of
-from stiction.criterion.eigenproblem import (
+from stiction.criterion.local import SLIP, excess_of
+from stiction.criterion.windows import (
     eigenvalues_and_vector,
     exact_weight,
+    grid_weights,
+    odd_bessel,
     rounded_weight,
+    transform,
+    windows_of,
 )
-from stiction.criterion.grid_weights import grid_weights, transform
-from stiction.criterion.nucleation import multiplier_of
 from stiction.problem import SMALLEST_EIGENVALUE
+
+
+def multiplier_of(problem):
+    """What the moving average does to each wave of a line."""
+    return windows_of(problem, problem.uniform_rate)[0].spectrum
 
 
 def test_smallest_eigenvalue_and_its_vector():
@@ -117,7 +126,7 @@ def test_cosine_strength_has_its_minimum_between_the_nodes(problem):
     k = 2.0 * np.pi * mode / 0.1
     tau_p = 1e6 - 2e5 * np.cos(k * (x - shift))
     result = st.onset(problem, tau_p, method=st.LocalCriterion())
-    amplitude = multiplier_of(problem, problem.nucleation_length)[mode]
+    amplitude = multiplier_of(problem)[mode]
     exact = exact_weight().multiplier(np.array([k * problem.nucleation_length / 2.0]))[0]
     # |k| h_n/2 = 1 at 9 nodes in h_n: within the error of the weights on this grid.
     assert amplitude == pytest.approx(exact, abs=2e-5)
@@ -140,7 +149,7 @@ def test_load_profile_and_initial_stress(solid):
     )
     problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
     result = st.onset(problem, np.full(256, 1e6), method=st.LocalCriterion())
-    amplitude = multiplier_of(problem, problem.nucleation_length)[1]
+    amplitude = multiplier_of(problem)[1]
     load_factor = (1e6 - 2e5 - 1e5 * amplitude) / 2.0
     assert float(result.critical_load[0]) == pytest.approx(load_factor, rel=1e-12)
     assert float(result.critical_position[0]) == pytest.approx(0.0, abs=1e-8)
@@ -189,13 +198,13 @@ def test_load_that_varies_along_the_interface(solid, nodes):
     load = st.Load(profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=x + 1.0)
     problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
-    one, two = multiplier_of(problem, problem.nucleation_length)[[3, 2]]
+    one, two = multiplier_of(problem)[[3, 2]]
 
     def tau_n(at):
         strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))
         return strength / (1.0 + 0.6 * two * np.cos(2.0 * k * (at - 0.013)))
 
-    found = st.nucleation_stress(problem, tau_p)
+    found = st.theory.nucleation_stress(problem, tau_p)
     np.testing.assert_allclose(found, tau_n(x), rtol=1e-12)
     result = st.onset(problem, tau_p, method=st.LocalCriterion())
     fine = np.linspace(0.0, 0.1, 2_000_001)
@@ -219,7 +228,7 @@ def test_a_load_that_jumps_keeps_the_ratio_between_its_bounds(solid):
     result = st.onset(problem, np.full(128, 1e6), method=st.LocalCriterion())
     # Twenty nodes hold several patches of 4.4 nodes that see the unit load only.
     assert float(result.critical_load[0]) == pytest.approx(1e6, rel=1e-12)
-    tau_n = st.nucleation_stress(problem, np.full(128, 1e6))
+    tau_n = st.theory.nucleation_stress(problem, np.full(128, 1e6))
     assert tau_n.min() >= 1e6
     assert tau_n.max() <= 1e9
 
@@ -280,9 +289,41 @@ def test_units_and_names(problem):
 def test_odd_bessel_functions_by_recurrence():
     from scipy.special import jv
 
-    from stiction.criterion.eigenproblem import odd_bessel
-
     z = np.concatenate([np.geomspace(1e-9, 2e3, 2000), [1.0, 79.9999, 80.0]])
     # Absolute, as the sum over orders needs it.
     expected = jv(np.arange(1, 80, 2)[:, None], z)
     np.testing.assert_allclose(odd_bessel(z, 40), expected, atol=2e-13)
+
+
+@pytest.mark.parametrize(("dimension", "eigenvalue"), [(1, 0.5788869), (2, 2.0061 / 2.0)])
+def test_slip_of_a_critical_patch_of_parabolic_strength(dimension, eigenvalue):
+    """(K - W) slip = tau_0 - r^2 on the unit ball by Galerkin's method, without a singular rim.
+
+    The functions (1 - r^2)^(1/2) P_n^(1/2, d/2 - 1)(2 r^2 - 1) are mapped to multiples of the
+    polynomials by the square root of the Laplacian (Dyda, Kuznetsov and Kwasnicki, 2017).
+    """
+    n, half = np.arange(24), 0.5 * dimension
+    factors = 2.0 * np.exp(
+        gammaln(1.5 + n) + gammaln(0.5 + half + n) - gammaln(n + 1) - gammaln(half + n)
+    )
+    t, measure = np.polynomial.legendre.leggauss(300)
+    r = np.sin((t + 1.0) * np.pi / 4.0)
+    root = np.sqrt(1.0 - r * r)
+    measure = measure * np.pi / 4.0 * root * r ** (dimension - 1)
+    poly = np.array([eval_jacobi(k, 0.5, half - 1.0, 2.0 * r * r - 1.0) for k in n])
+    stiffness = (poly * measure * root) @ (poly * factors[:, None]).T
+    mass = (poly * measure * root**2) @ poly.T
+    inverse = scipy.linalg.eigh(mass, 0.5 * (stiffness + stiffness.T), eigvals_only=True)[-1]
+    assert 0.5 / inverse == pytest.approx(eigenvalue, rel=2e-5)
+    uniform, parabola = ((poly * measure * root) @ values for values in (np.ones_like(r), r * r))
+    rim = np.array([eval_jacobi(k, 0.5, half - 1.0, 1.0) for k in n])
+    system = np.block([[stiffness * inverse - mass, -uniform[:, None]], [rim[None], 0.0]])
+    found = np.linalg.solve(system, np.append(-parabola, 0.0))[:-1]  # W slip
+
+    def slip(at):
+        values = [eval_jacobi(k, 0.5, half - 1.0, 2.0 * at * at - 1.0) for k in n]
+        return np.sqrt(1.0 - at * at) * (found @ values)
+
+    assert slip(0.0) == pytest.approx(SLIP[dimension], rel=1e-4)
+    for at in (0.3, 0.6, 0.8):
+        assert slip(at) == pytest.approx(SLIP[dimension] * (1.0 - at * at) ** 1.6, rel=0.1)

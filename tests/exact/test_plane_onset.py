@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.ellipse_windows import ellipse_window
+from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.transform_operator import make_operator, product, stiffness_symbol
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.plane_onset import Plane, doubled, halved, plane_onset

@@ -20,27 +20,29 @@ def test_design_point_of_a_gaussian_strength_is_exact(system, mean_mode):
         scipy.stats.norm(1e6, 5e4), st.paper.strength(system).spectrum, mean_mode
     )
     profiles = field.sample(system.interface, samples=20_000, seed=3)
-    deviation = st.nucleation_stress(system, profiles).std()
+    deviation = st.theory.nucleation_stress(system, profiles).std()
     point = design_point(system, field, 0.9e6)
     assert point.converged
     # The variance of 20,000 profiles of some thirty independent lengths is good to 0.3 %.
     assert point.index == pytest.approx(1e5 / deviation, rel=0.005)
     profile = field.profiles(system.interface, point.draws[None])
     # The iteration stops at 1e-6 of the way from the mean.
-    assert st.nucleation_stress(system, profile)[0, 0] == pytest.approx(0.9e6, abs=0.2)
+    assert st.theory.nucleation_stress(system, profile)[0, 0] == pytest.approx(0.9e6, abs=0.2)
 
 
 def test_design_point_lies_on_the_limit_and_nowhere_nearer(system):
     field = st.paper.strength(system, 0.5)
     point = design_point(system, field, 0.67e6)
-    tau = st.nucleation_stress(system, field.profiles(system.interface, point.draws[None]))[0]
+    tau = st.theory.nucleation_stress(system, field.profiles(system.interface, point.draws[None]))[
+        0
+    ]
     assert tau[0] == pytest.approx(0.67e6, abs=1.0)
     assert np.argmin(tau) == 0
     # Random neighbours at a distance closer to the origin do not fail at x = 0.
     rng = np.random.default_rng(0)
     near = point.draws + 0.5 * rng.standard_normal((2000, point.draws.size)) / np.sqrt(50.0)
     near *= 0.995 * point.index / np.linalg.norm(near, axis=1, keepdims=True)
-    there = st.nucleation_stress(system, field.profiles(system.interface, near))[:, 0]
+    there = st.theory.nucleation_stress(system, field.profiles(system.interface, near))[:, 0]
     assert there.min() > 0.67e6
 
 

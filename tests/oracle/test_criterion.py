@@ -1,10 +1,14 @@
 """The local criterion against its definition and against theory."""
 
+import dataclasses
+import warnings
+
 import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.eigenproblem import exact_weight
+from stiction.criterion.local import beyond_residual
+from stiction.criterion.windows import exact_weight
 
 
 # With the error of the weights on the grid, a tenth of the strength's own variation at most.
@@ -21,7 +25,7 @@ def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes,
     spectrum = np.fft.rfft(tau_p, axis=1) / nodes
     spectrum[:, 1:-1] *= 2.0
     k = problem.interface.wavenumbers
-    found = st.nucleation_stress(problem, tau_p)
+    found = st.theory.nucleation_stress(problem, tau_p)
     for node in (0, 100, 201):
         x = problem.interface.x[node] + half * s
         values = (spectrum @ np.exp(1j * np.outer(k, x))).real
@@ -40,7 +44,7 @@ def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, la
         solid, st.Interface(length=0.1, nodes=nodes), st.LinearWeakening(weakening_rate=0.5e12)
     )
     tau_p = make_strength(0.25).sample(problem.interface, samples=512, seed=2)
-    tau_n = st.nucleation_stress(problem, tau_p)
+    tau_n = st.theory.nucleation_stress(problem, tau_p)
     result = st.onset(problem, tau_p, method=st.LocalCriterion())
     spectrum = np.fft.rfft(tau_n, axis=1)
     spectrum[:, -1] *= 0.5  # the Nyquist mode is shared between both of its signs
@@ -77,7 +81,7 @@ def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(solid, contrast):
         assert float(found.critical_load[0]) == pytest.approx(
             float(without.critical_load[0]), rel=1e-9
         )
-        tau_n = st.nucleation_stress(problem, barred)
+        tau_n = st.theory.nucleation_stress(problem, barred)
         assert weak.min() <= tau_n.min()
         assert tau_n.max() <= barred.max()
 
@@ -89,7 +93,7 @@ def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength):
     samples = 4096
     for ratio in (0.25, 0.5, 1.0, 2.0):
         strength = make_strength(ratio)
-        tau_n = st.nucleation_stress(
+        tau_n = st.theory.nucleation_stress(
             problem, strength.sample(problem.interface, samples=samples, seed=3)
         )
         spectrum = np.fft.fft(strength.correlation(problem.interface)).real / 256.0
@@ -108,3 +112,51 @@ def test_critical_position_is_uniform(problem, make_strength):
         problem, make_strength(0.5), method=st.LocalCriterion(), samples=20_000, seed=5
     )
     assert kstest(result.critical_position.values / 0.1, "uniform").pvalue > 1e-3
+
+
+def warned(problem, tau_p):
+    """The onsets, and what was warned of."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        local = st.onset(problem, tau_p, method=st.LocalCriterion(), progress=False)
+    return local, [str(one.message) for one in found if "upper bound" in str(one.message)]
+
+
+def test_it_is_said_where_residual_strength_ends_the_upper_bound(solid):
+    """Exact onsets tell in which samples it is one; nothing was said of a fifth of them."""
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3)
+    weak = st.Problem(solid, st.Interface(0.0144, 128), friction)  # 30 nodes in h_n
+    xi = 0.5 * weak.nucleation_length
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.3), st.PowerLawSpectrum(xi), True)
+    tau_p = field.sample(weak.interface, samples=200, seed=11)
+    local, texts = warned(weak, tau_p)
+    exact = st.onset(weak, tau_p, method=st.Equilibrium(), progress=False)
+    above = (local.critical_stress / exact.first_instability - 1.0).values
+    reached, missing = beyond_residual(weak, weak.sample(tau_p), dict(local))
+    assert np.mean(above < -1e-3) > 0.05
+    assert reached[above < -1e-3].mean() > 0.8
+    assert exact.residual_reached.values[reached].mean() > 0.7
+    assert 0.5 < missing[above < -1e-3].mean() / -above[above < -1e-3].mean() < 2.0
+    assert len(texts) == 1
+    assert f"{100.0 * reached.mean():.2g} %" in texts[0]
+    # With a strength that varies little it is one, and nothing is said.
+    calm = dataclasses.replace(field, marginal=st.Lognormal(mean=1e6, cv=0.05))
+    assert warned(weak, calm.sample(weak.interface, samples=100, seed=11))[1] == []
+
+
+def test_residual_strength_within_the_critical_patch_of_a_plane():
+    plane = st.Problem(
+        st.Solid(1e9, 0.33, 1170.0),
+        st.Interface((0.012, 0.012), (32, 32)),
+        st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.75),
+    )
+    xi = 0.3 * plane.nucleation_length
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.3), st.PowerLawSpectrum(xi), True)
+    tau_p = field.sample(plane.interface, samples=10, seed=1)
+    local, texts = warned(plane, tau_p)
+    exact = st.onset(plane, tau_p, method=st.Equilibrium(), progress=False)
+    above = (local.critical_stress / exact.first_instability - 1.0).values
+    reached = beyond_residual(plane, plane.sample(tau_p), dict(local))[0]
+    assert np.any(above < -1e-3)
+    assert reached[above < -1e-3].all()
+    assert len(texts) == 1

@@ -72,7 +72,9 @@ def test_crossings_are_those_of_the_profiles(problem, make_strength):
     """Counted one by one at a few levels, on a grid four times finer."""
     strength = make_strength(1.0)
     found = rice_distribution(problem, strength, profiles=32, seed=4)
-    tau_n = st.nucleation_stress(problem, strength.sample(problem.interface, samples=32, seed=4))
+    tau_n = st.theory.nucleation_stress(
+        problem, strength.sample(problem.interface, samples=32, seed=4)
+    )
     # 256 nodes have nearly 9 in h_n; at least 32 are wanted.
     factor = int(np.ceil(32 * problem.interface.spacing / problem.nucleation_length))
     assert factor == 4

@@ -11,7 +11,8 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import beta
 
-from stiction.criterion.ellipse_windows import ellipse_window, local_onset
+from stiction.criterion.average import local_onset
+from stiction.criterion.windows import ellipse_window
 from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of
 
 RATE = 0.5e12

@@ -81,6 +81,6 @@ def test_lies_between_the_least_and_the_greatest_strength_whatever_the_jumps(lev
     tau_p = np.repeat(10.0 ** np.array(levels), 11)[: 128 - 1]
     tau_p = np.append(tau_p, np.full(128 - tau_p.size, tau_p[-1])) * rng.uniform(0.9, 1.1, 128)
     load, _ = onset(tau_p)
-    tau_n = st.nucleation_stress(PROBLEM, tau_p)
+    tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)
     assert tau_p.min() <= load <= tau_n.min()
     assert tau_n.max() <= tau_p.max()

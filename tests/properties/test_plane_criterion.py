@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.plane import STRETCHES, middle_aspect, windows_of
+from stiction.criterion.windows import STRETCHES, middle_aspect, windows_of
 
 RATE = 0.5e12
 NUCLEATION = 2.0 * 0.5788869418506 * 1e9 / 0.67 / RATE
@@ -33,7 +33,7 @@ def test_what_is_returned(plane):
     assert found.critical_position.dims == ("sample", "direction")
     assert list(found.direction.values) == ["x", "y"]
     assert (found.critical_position < np.array(plane.interface.lengths)).all()
-    averages = st.nucleation_stress(plane, strength)
+    averages = st.theory.nucleation_stress(plane, strength)
     assert averages.shape == strength.shape
     np.testing.assert_allclose(found.critical_load, averages.min(axis=(1, 2)), rtol=1e-13)
     aspects = middle_aspect(plane) * np.array(STRETCHES)
@@ -42,7 +42,7 @@ def test_what_is_returned(plane):
         direction="y"
     )
     np.testing.assert_allclose(ratio, found.critical_aspect, rtol=1e-12)
-    each = [st.nucleation_stress(plane, strength[0], aspect=a).min() for a in aspects]
+    each = [st.theory.nucleation_stress(plane, strength[0], aspect=a).min() for a in aspects]
     assert aspects[int(np.argmin(each))] == found.critical_aspect.values[0]
     # Of an ellipse of these extents, as far as whole nodes make one.
     area = 0.25 * np.pi * found.critical_patch_extent.prod("direction")
@@ -81,7 +81,7 @@ def test_translations_and_reflections_change_nothing(plane, change):
 def test_between_least_and_greatest_strength(plane):
     interface = plane.interface
     strength = np.where(np.random.default_rng(0).random((2, *interface.shape)) < 0.5, 0.7e6, 1.6e6)
-    averages = st.nucleation_stress(plane, strength)
+    averages = st.theory.nucleation_stress(plane, strength)
     assert averages.min() >= 0.7e6
     assert averages.max() <= 1.6e6
     uniform = st.onset(plane, np.full(interface.shape, 1e6), method=METHOD)
@@ -100,8 +100,8 @@ def test_sample_i_is_the_same_whatever_batch_and_workers(plane):
 def test_variance_of_the_nucleation_stress_is_that_of_theory(plane, mean_mode):
     field = field_of(1.0, mean_mode=mean_mode, anisotropy=1.4)
     aspect = 1.3
-    theory = st.nucleation_statistics(plane, field, aspect=aspect)
-    tau_n = st.nucleation_stress(
+    theory = st.theory.nucleation_statistics(plane, field, aspect=aspect)
+    tau_n = st.theory.nucleation_stress(
         plane, field.sample(plane.interface, samples=400, seed=2), aspect=aspect
     )
     each = ((tau_n - theory.mean) ** 2).mean(axis=(1, 2))
@@ -109,28 +109,6 @@ def test_variance_of_the_nucleation_stress_is_that_of_theory(plane, mean_mode):
     assert abs(each.mean() - theory.variance) < 4.0 * each.std() / 20.0
     means = tau_n.mean(axis=(1, 2))
     assert abs(means.mean() - theory.mean) < 4.0 * means.std() / 20.0
-
-
-def test_variance_ratios_on_an_infinite_plane_and_their_limits(plane):
-    long = dataclasses.replace(plane, interface=st.Interface(length=(0.05, 0.05), nodes=(256, 256)))
-    field = field_of(1.0, mean_mode=True)
-    own, infinite = (st.nucleation_statistics(long, field, infinite=i) for i in (False, True))
-    # What truncation leaves out, 1e-3 of the power.
-    assert own.variance_ratio == pytest.approx(infinite.variance_ratio, rel=3e-3)
-    fine = dataclasses.replace(plane, interface=st.Interface((0.01, 0.01), (192, 192)))
-    short = field_of(0.1, mean_mode=True, anisotropy=1.5)
-    limits = st.nucleation_limits(fine, short)
-    ratio = st.nucleation_statistics(fine, short, infinite=True).variance_ratio
-    # The next order in xi_0/h_n is of the square of it.
-    assert ratio == pytest.approx(limits.short_slope * 0.1**2, rel=0.05)
-    assert limits.long_ratio_fixed_length == 1.0
-    square = dataclasses.replace(plane, interface=st.Interface((0.02, 0.02), (48, 48)))
-    # The longest correlation at which truncation leaves the first waves.
-    xi = 2.499 * 0.02 / NUCLEATION
-    assert field_of(xi).modes(square.interface).count == 2
-    longest = st.nucleation_statistics(square, field_of(xi)).variance_ratio
-    limit = st.nucleation_limits(square, field_of(xi)).long_ratio_fixed_length
-    assert longest == pytest.approx(limit, rel=1e-9)
 
 
 def test_failure_probability_is_that_of_counting(plane):
@@ -157,7 +135,7 @@ def test_failure_probability_is_that_of_counting(plane):
 def test_dips_count_the_onsets_that_are_low(plane):
     """Euler characteristic against onsets of other samples, where it says it can."""
     field = field_of(1.0)
-    rice = st.rice_distribution(plane, field, profiles=1000, seed=3)
+    rice = st.theory.rice_distribution(plane, field, profiles=1000, seed=3)
     onsets = st.monte_carlo(
         plane, field, method=METHOD, samples=1500, seed=4, progress=False
     ).critical_stress.values
@@ -170,7 +148,9 @@ def test_dips_count_the_onsets_that_are_low(plane):
         assert abs(chance - share) < 4.0 * error + 0.5 * share**2
         seen += share > 0.03
     assert seen >= 3
-    together = st.rice_distribution(plane, field_of(3.0, mean_mode=True), profiles=300, seed=3)
+    together = st.theory.rice_distribution(
+        plane, field_of(3.0, mean_mode=True), profiles=300, seed=3
+    )
     assert (together.probability[together.trusted] <= 0.1).all()
 
 
@@ -191,7 +171,7 @@ def test_refusals_name_what_is_wrong(plane):
     with pytest.raises(st.InputError, match="rounded.*line"):
         st.monte_carlo(plane, field, method=rounded, samples=2, progress=False)
     with pytest.raises(st.InputError, match="rounded.*line"):
-        st.nucleation_stress(plane, np.full((48, 48), 1e6), weights="rounded")
+        st.theory.nucleation_stress(plane, np.full((48, 48), 1e6), weights="rounded")
     wide = dataclasses.replace(plane, interface=st.Interface((0.02, 0.014), (64, 48)))
     with pytest.raises(st.InputError, match="changed places: the first axis of a profile is x"):
         st.onset(wide, np.full((48, 64), 1e6), method=METHOD)
@@ -202,7 +182,7 @@ def test_refusals_name_what_is_wrong(plane):
         st.monte_carlo(uneven, field, method=METHOD, samples=2, progress=False)
     line = st.Problem(plane.solid, st.Interface(0.1, 512), plane.friction)
     with pytest.raises(st.InputError, match="aspect: must be left out on a line"):
-        st.nucleation_stress(line, np.full(512, 1e6), aspect=1.0)
+        st.theory.nucleation_stress(line, np.full(512, 1e6), aspect=1.0)
 
 
 def test_coarse_directions_are_named(plane):

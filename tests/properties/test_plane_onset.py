@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiction.criterion.ellipse_windows import ellipse_window, local_onset
+from stiction.criterion.average import local_onset
+from stiction.criterion.windows import ellipse_window
 from stiction.equilibrium.follow_plane import plane_slip_at
 from stiction.equilibrium.least_equilibrium import BALANCED, SLIDING, PlaneSample
 from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of

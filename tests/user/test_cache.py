@@ -54,8 +54,9 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path):
 def test_kernels_are_kept_where_that_is_possible(tmp_path, writable):
     cache = tmp_path / "cache" if writable else Path(os.devnull) / "cache"
     code = (
-        "import numpy as np; from stiction.criterion.moving_average import average_rows as f;"
-        "out = np.empty((1, 8)); f(np.ones((1, 8)), np.ones(5), out); print(out.sum())"
+        "import numpy as np; from stiction.criterion.average import minimum_rows as f;"
+        "out = np.empty(1); f(np.ones((1, 8)), np.ones(8), np.ones(5), 2, out, out.copy());"
+        "print(8.0 * out.sum())"
     )
     copy = tmp_path / "src"
     shutil.copytree(SOURCES / "stiction", copy / "stiction")

@@ -76,10 +76,10 @@ def test_local_criterion_speaks_of_other_laws(with_law, tau_p):
         with pytest.warns(st.AccuracyWarning, match="weakening rate at zero slip"):
             st.onset(with_law(law), tau_p, method=st.LocalCriterion())
         with pytest.warns(st.AccuracyWarning, match="weakening rate at zero slip"):
-            st.nucleation_stress(with_law(law), tau_p)
+            st.theory.nucleation_stress(with_law(law), tau_p)
     for call in (
         lambda problem: st.onset(problem, tau_p, method=st.LocalCriterion()),
-        lambda problem: st.nucleation_stress(problem, tau_p),
+        lambda problem: st.theory.nucleation_stress(problem, tau_p),
     ):
         with pytest.raises(st.InputError, match=r"up to 2.33 times as steeply"):
             call(with_law(STEEPENING))

@@ -92,7 +92,7 @@ def test_mistakes(make, text):
 def test_statistics_want_a_uniform_load():
     problem = loaded(st.EdgeLoad(excess=1.0, decay=0.01))
     with pytest.raises(st.InputError, match=r"load\.profile"):
-        st.nucleation_statistics(problem, st.paper.strength(PLAIN))
+        st.theory.nucleation_statistics(problem, st.paper.strength(PLAIN))
 
 
 def test_quantile_distance():

@@ -101,7 +101,7 @@ def _lengths(problems: Sequence[Any], fields: Sequence[Any]) -> Lines:
 
 def _methods(experiment: Any) -> Lines:
     """Which methods take the first point, and how far the local criterion is from the exact one."""
-    from stiction.criterion.method import LocalCriterion
+    from stiction.criterion.local import LocalCriterion
     from stiction.dynamics.method import Rupture
     from stiction.ensemble.pilot import ON_A_LINE, ON_A_PLANE, compare
     from stiction.equilibrium.method import Equilibrium

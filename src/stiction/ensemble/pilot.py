@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.criterion.method import LocalCriterion
+from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.equilibrium.method import Equilibrium

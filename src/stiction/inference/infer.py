@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction._checks import check_choice, check_count, check_progress, is_finite
 from stiction.arrays import Array
-from stiction.criterion.method import LocalCriterion
+from stiction.criterion.local import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.agreement import check_agreement, check_reach, piled_up
 from stiction.inference.ensemble_sampler import by_walkers

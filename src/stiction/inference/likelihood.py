@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.criterion.method import LocalCriterion
+from stiction.criterion.local import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.affine import Affine, find_affine, not_affine
 from stiction.inference.density import Densities, log_likelihoods, tabulate

@@ -14,7 +14,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from stiction.criterion.nucleation import nucleation_stress
+from stiction.criterion.local import nucleation_stress
 from stiction.equilibrium.plane_patches import critical_patch
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from stiction.arrays import Array
-from stiction.criterion.nucleation import multiplier_of
-from stiction.criterion.plane import windows_of
+from stiction.criterion.windows import windows_of
 from stiction.problem import Problem
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
@@ -123,9 +122,6 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
 
 def _critical_weight(problem: Problem) -> Array:
     """Weight of the critical patch around the first node, (*shape)."""
-    if not problem.interface.is_plane:
-        multiplier = multiplier_of(problem, problem.nucleation_length)
-        return problem.interface.inverse_transform(multiplier)
     windows = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
     return windows[len(windows) // 2].weight
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from stiction._checks import is_whole, numbers
 from stiction.arrays import Array
-from stiction.criterion.plane import windows_of
+from stiction.criterion.windows import windows_of
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction._checks import check_count, numbers, too_many_samples
-from stiction.criterion.nucleation import nucleation_stress
+from stiction.criterion.local import nucleation_stress
 from stiction.errors import InputError
 from stiction.jit import jit
 from stiction.model import brief
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
-from stiction.statistics.moments import _uniform_load
+from stiction.statistics.moments import stationary as _uniform_load
 
 Array = NDArray[np.float64]
 

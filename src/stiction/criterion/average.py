@@ -1,20 +1,15 @@
-"""The moving average and its minimum between the nodes, row by row."""
+"""The least moving average over places and windows."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.criterion.windows import Window
 from stiction.jit import jit
-
-
-@jit
-def average_rows(profiles: Array, multiplier: Array, out: Array) -> None:
-    """Periodic moving average of every row, as a product in Fourier space."""
-    nodes = profiles.shape[1]
-    for row in range(profiles.shape[0]):
-        out[row] = np.fft.irfft(np.fft.rfft(profiles[row]) * multiplier, nodes)
-
 
 STENCIL = 10
 # Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
@@ -170,3 +165,41 @@ def minimum_rows(
         for i in range(nodes):
             values[i] = max(values[i], least)
         minimum[row], place[row] = refine_minimum(values, ratio, reach)
+
+
+class LocalOnset(NamedTuple):
+    """Least moving average (Pa), the node it is at, the window, and the average, (nx, ny)."""
+
+    load: float
+    node: tuple[int, int]
+    window: int
+    average: Array
+
+
+def local_onset(windows: Sequence[Window], excess: Array, profile: Array) -> LocalOnset:
+    """Find the least <s, y>/<p, y> over places and windows y of a plane.
+
+    Parameters
+    ----------
+    windows : sequence of Window
+    excess, profile : (nx, ny) arrays
+        Strength less initial stress (Pa), and the load profile.
+    """
+    strength = np.fft.rfft2(excess)
+    uniform = bool((profile == profile[0, 0]).all())
+    load = None if uniform else np.fft.rfft2(profile)
+    best: LocalOnset | None = None
+    for number, window in enumerate(windows):
+        average = np.fft.irfft2(strength * window.spectrum, excess.shape)
+        if load is None:
+            average /= profile[0, 0]
+        else:
+            average /= np.fft.irfft2(load * window.spectrum, excess.shape)
+        place = int(average.argmin())
+        if best is None or average.flat[place] < best.load:
+            ny = excess.shape[1]
+            best = LocalOnset(
+                float(average.flat[place]), (place // ny, place % ny), number, average
+            )
+    assert best is not None
+    return best
