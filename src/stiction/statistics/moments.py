@@ -13,7 +13,7 @@ from stiction.criterion.local import check_law, check_window
 from stiction.criterion.windows import Weights, middle_aspect, windows_of
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.random.coefficients import coefficients_of, in_stress
+from stiction.random.pressure import coefficients_of, in_stress
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import as_random_interface
 
