@@ -13,9 +13,7 @@ from stiction.criterion.local import check_law, check_window
 from stiction.criterion.windows import Weights, middle_aspect, windows_of
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.random.pressure import coefficients_of, in_stress
 from stiction.random.random_field import RandomField
-from stiction.random.random_interface import as_random_interface
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def nucleation_statistics(
     >>> bool(0.0 < found.variance_ratio < 1.0)  # averaging lowers the variance
     True
     """
-    strength, load, initial = stationary(problem, strength)
+    scale, load, initial = stationary(problem, strength)
     check_window(problem, weights, aspect)
     if problem.interface.is_plane and aspect is None:
         aspect = middle_aspect(problem)
@@ -107,11 +105,11 @@ def nucleation_statistics(
     assert rate is not None
     window = windows_of(problem, rate, weights, aspect)[0]
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
-    variance = strength.standard_deviation**2
+    mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
     return NucleationStatistics(
-        mean=(strength.mean - initial) * window.total / load,
+        mean=(mean - initial) * window.total / load,
         variance=float(np.sum(power)) * variance / load**2,
-        strength_mean=strength.mean,
+        strength_mean=mean,
         strength_variance=variance,
     )
 
@@ -124,8 +122,10 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
     return np.maximum(power, 0.0)
 
 
-def stationary(problem: Problem, strength: RandomField) -> tuple[RandomField, float, float]:
-    """Return the strength in Pa, load profile and initial stress of a uniform problem.
+def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
+    """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
+
+    The unit of friction coefficients is the normal pressure.
 
     Raises
     ------
@@ -146,10 +146,12 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[RandomField, fl
     ]
     if problem.uniform_rate is None:
         problems.append(f"friction.weakening_rate: varies or follows from the strength, {sampled}")
-    random = in_stress(problem, as_random_interface(strength))
-    if coefficients_of(random):
+    pressure = 1.0 if strength.of is None else problem.load.normal_pressure
+    if pressure is None:
+        problems.append("load.normal_pressure: is missing, and strength is in friction coefficients")
+    elif np.ptp(pressure) > 0.0:
         problems.append(f"load.normal_pressure: varies and strength is in coefficients, {sampled}")
     if problems:
         raise InputError(problems)
     load, initial = problem.load_profile, problem.load.initial_stress
-    return random.strength, float(np.max(load)), float(np.max(initial))
+    return float(np.max(pressure)), float(np.max(load)), float(np.max(initial))

@@ -143,7 +143,7 @@ def rice_distribution(
         If the problem has no nucleation stress, its load is not uniform, the profiles are few or
         the levels do not rise.
     """
-    _uniform_load(problem, strength)
+    scale, _, _ = _uniform_load(problem, strength)
     profiles = check_count("profiles", profiles, 16)
     too_many = too_many_samples(profiles, 0)
     if too_many:
@@ -161,7 +161,7 @@ def rice_distribution(
         for first in range(0, profiles, together):
             count = min(together, profiles - first)
             tau_p = strength.sample(problem.interface, samples=count, seed=seed, first=first)
-            tau_n = nucleation_stress(problem, tau_p)
+            tau_n = nucleation_stress(problem, scale * tau_p)
             yield tau_n if factor == 1 else _refined(tau_n, points)
 
     if stress is None:
