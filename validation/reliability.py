@@ -7,6 +7,7 @@ reference. Takes about ten minutes on one core.
 Run: ``python validation/reliability.py``
 """
 
+import dataclasses
 import math
 import time
 import warnings
@@ -18,10 +19,15 @@ from stiction.criterion.local import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.tails import longer
 
 MILLION = 1_000_000
 REPEATS = 50
+
+
+def longer(problem, times):
+    """The same problem on a line that is so many times longer."""
+    interface = st.Interface(times * problem.interface.extent, times * problem.interface.size)
+    return dataclasses.replace(problem, interface=interface)
 
 
 def repetition(problem, field, stress, reference, method, algorithm, target):

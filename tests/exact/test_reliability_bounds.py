@@ -13,7 +13,6 @@ from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
 from stiction.reliability.plain_monte_carlo import Count, count_failures, tally
 from stiction.reliability.pooling import Tail
-from stiction.reliability.tails import weakest_link
 from stiction.reliability.uncertainty import (
     ancestral_variance,
     binomial_interval,
@@ -235,9 +234,3 @@ def test_runs_are_pooled_by_their_size():
     # Standard errors of the parts: 0.2 * 1e-3 * 0.2 and 0.6 * 2e-3 * 0.1; nothing seen adds none.
     error = math.hypot(0.4e-4, 1.2e-4)
     assert tail.coefficient_of_variation(1.0) == pytest.approx(error / 1.4e-3)
-
-
-def test_weakest_link():
-    # Two pieces: 1 - (1 - p)^2, kept for p far below round-off of 1 - p.
-    p = np.array([0.5, 1e-3, 1e-18])
-    np.testing.assert_allclose(weakest_link(p, 2.0), [0.75, 2e-3 - 1e-6, 2e-18], rtol=1e-12)

@@ -1,5 +1,6 @@
 """Failure probabilities by different algorithms, and by OpenTURNS, of the same limit states."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -11,10 +12,15 @@ from stiction.reliability.curve import failure_curve
 from stiction.reliability.design import design_stress
 from stiction.reliability.estimate import failure_probability
 from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.tails import longer
 from stiction.statistics.rice import rice_distribution
 
 LOCAL = st.LocalCriterion()
+
+
+def longer(problem, times):
+    """The same problem on a line that is so many times longer."""
+    interface = st.Interface(times * problem.interface.extent, times * problem.interface.size)
+    return dataclasses.replace(problem, interface=interface)
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,18 @@
 """What the paper's field, which has no mean mode, does to the lower tail."""
 
+import dataclasses
 import math
 
 import pytest
 
 import stiction as st
 from stiction.reliability.estimate import failure_probability
-from stiction.reliability.tails import longer
+
+
+def longer(problem, times):
+    """The same problem on a line that is so many times longer."""
+    interface = st.Interface(times * problem.interface.extent, times * problem.interface.size)
+    return dataclasses.replace(problem, interface=interface)
 
 
 def growth(mean_mode, stress):
