@@ -9,15 +9,15 @@ import pytest
 
 
 class Counting:
-    """Computes at once and keeps which samples, (first, how many), in `pieces`."""
+    """Computes at once and keeps which samples, as spans, in `spans`."""
 
     def __init__(self):
-        self.pieces = []
+        self.spans = []
 
-    def submit(self, function, plan, point, first, count, *marks):
-        self.pieces.append((first, count))
+    def submit(self, function, experiment, span, *marks):
+        self.spans.append(span)
         future = Future()
-        future.set_result(function(plan, point, first, count, *marks))
+        future.set_result(function(experiment, span, *marks))
         return future
 
 
@@ -35,9 +35,9 @@ class SlowFrom(ThreadPoolExecutor):
         super().__init__(2)
         self.sample, self.seconds = sample, seconds
 
-    def submit(self, function, plan, point, first, count, *marks):
+    def submit(self, function, experiment, span, *marks):
         def later():
-            time.sleep(self.seconds if first >= self.sample else 0.0)
-            return function(plan, point, first, count, *marks)
+            time.sleep(self.seconds if span.first >= self.sample else 0.0)
+            return function(experiment, span, *marks)
 
         return super().submit(later)

@@ -1,14 +1,18 @@
 """Runs on disk: they go on where they ended, however they ended, to the same bits."""
 
 import copy
+import errno
 import json
 import os
+import re
 import shutil
-import signal
 import subprocess
 import sys
 import threading
 import warnings
+from concurrent.futures import Future
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,31 +21,34 @@ from executors import Counting, Forbidding, SlowFrom
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.ensemble import resume, scheduler, work
-from stiction.ensemble.files import Lock
-from stiction.ensemble.manifest import write_manifest
+from stiction.ensemble import batches, store
+from stiction.ensemble.batches import Span, solve_spans
+from stiction.ensemble.experiment import Experiment
 from stiction.errors import StoreError, WorkerError
-from stiction.stored_run import StoredRun, folder_beside
-from stiction.study_run import run_into
+from stiction.study.run import Part, as_part
 
 STUDY = small_study(
-    ensemble={"samples": 900, "seed": 3, "keep": ["strength"], "keep_samples": [1, 700, 899]},
+    ensemble={"samples": 300, "seed": 3, "keep": ["strength"], "keep_samples": [1, 250, 299]},
     sweep=[*lengths(4e-3, 6e-3), {"problem.solid.poisson_ratio": [0.25, 0.33]}],
 )
+ALL = 4 * 300
 
 
-def make_study(samples=900, **changes):
+def make_study(samples=300, **changes):
     study = copy.deepcopy(STUDY)
     study["ensemble"]["samples"] = samples
+    if samples < 300:
+        study["ensemble"]["keep_samples"] = [1]
     return st.Study.from_dict(study | changes)
 
 
 @pytest.fixture
 def often(monkeypatch):
-    """Many chunks of a hundred samples instead of one a second."""
-    monkeypatch.setattr(resume, "FLUSH_SECONDS", 0.0)
+    """Many chunks of fifty samples instead of one a second, which are not joined at the end."""
+    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
+    monkeypatch.setattr(store.Store, "close", lambda self: None)
     monkeypatch.setattr(
-        scheduler.Sizer, "next", lambda sizer, plan, span, *rest: min(100, span.samples)
+        batches.Sizer, "next", lambda sizer, experiment, span, *rest: min(50, span.samples)
     )
 
 
@@ -50,233 +57,292 @@ def reference():
     return make_study().run(workers=1)
 
 
-def sizes(folder):
-    return {path.name: path.stat().st_mtime_ns for path in (folder / "chunks").iterdir()}
+@pytest.fixture
+def run(tmp_path, often):
+    make_study().run(out=tmp_path / "run", workers=1)
+    return tmp_path / "run"
 
 
-def test_a_stored_run_is_the_run_in_memory(tmp_path, often, reference):
-    for name in ("run", "result.nc"):
-        result = make_study().run(out=tmp_path / name, workers=2)
-        assert result.identical(reference)
-        assert StoredRun(tmp_path / name).study == make_study()
-    assert len(sizes(tmp_path / "run")) > 4
-    assert not folder_beside(tmp_path / "result.nc").exists()
+def chunks(folder):
+    return sorted((folder / "chunks").glob("*.npz"))
+
+
+def flip(path, chance):
+    """Change one bit somewhere."""
+    data = bytearray(path.read_bytes())
+    data[chance.integers(len(data))] ^= 1 << chance.integers(8)
+    path.write_bytes(data)
+
+
+def again(folder, words=None, executor=None):
+    """Run the study again, with a warning if words are given and none if not."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = make_study().run(out=folder, workers=1, executor=executor)
+    texts = "\n".join(str(w.message) for w in caught if w.category is UserWarning)
+    assert bool(texts) == bool(words), texts
+    assert all(word in texts for word in words or ()), texts
+    return result
+
+
+# -- what is stored is what is computed ----------------------------------------------------------
+
+
+def test_a_stored_run_is_the_run_in_memory(run, reference, tmp_path):
+    assert len(chunks(run)) > 4
+    stored = st.open_run(run)
+    assert stored.study == make_study()
+    assert stored.dataset().identical(reference)
+    stored.export(tmp_path / "result.nc")
     with xr.open_dataset(tmp_path / "result.nc") as written:
         assert written.load().identical(reference)
+    some = stored.dataset(only=["critical_stress"])
+    assert list(some.data_vars) == ["critical_stress"]
 
 
-def test_export_is_the_same_again(tmp_path, often, reference):
-    run_into(make_study(), tmp_path / "run")
-    StoredRun(tmp_path / "run").export(tmp_path / "exported.nc")
-    with xr.open_dataset(tmp_path / "exported.nc") as written:
-        assert written.load().identical(reference)
-
-
-@pytest.mark.parametrize("name", ["run", "result.nc"])
-def test_growing_computes_only_the_new_samples(tmp_path, often, reference, name):
-    make_study(samples=500).run(out=tmp_path / name)
+def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
+    study = copy.deepcopy(STUDY)
+    study["ensemble"]["samples"] = 200
+    st.Study.from_dict(study).run(out=tmp_path / "run")
     counting = Counting()
-    assert make_study().run(out=tmp_path / name, executor=counting).identical(reference)
-    assert min(first for first, _ in counting.pieces) == 500
-    assert sum(count for _, count in counting.pieces) == 4 * 400
-    assert make_study().run(out=tmp_path / name, executor=Forbidding()).identical(reference)
+    assert make_study().run(out=tmp_path / "run", executor=counting).identical(reference)
+    assert min(span.first for span in counting.spans) == 200
+    assert sum(span.samples for span in counting.spans) == 4 * 100
+    assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
+    with pytest.raises(StoreError, match=r"ensemble\.samples: 200 here, 300 there"):
+        st.Study.from_dict(study).run(out=tmp_path / "run")
 
 
-def test_a_run_does_not_shrink(tmp_path):
+def test_another_study_is_refused_with_the_difference(tmp_path):
     make_study(samples=50).run(out=tmp_path / "run")
-    with pytest.raises(StoreError, match=r"ensemble\.samples: 20 here, 50 there"):
-        make_study(samples=20).run(out=tmp_path / "run")
-
-
-@pytest.mark.parametrize("name", ["run", "result.nc"])
-def test_another_study_is_refused_with_the_difference(tmp_path, name):
-    make_study(samples=50).run(out=tmp_path / name)
     problem = copy.deepcopy(STUDY["problem"])
     problem["solid"]["density"] = 2000.0
     del problem["friction"]["weakening_rate"]
     problem["friction"]["critical_slip"] = 1e-6
     other = make_study(samples=50, problem=problem, sweep=STUDY["sweep"][:1])
     with pytest.raises(StoreError) as caught:
-        other.run(out=tmp_path / name)
+        other.run(out=tmp_path / "run")
     text = str(caught.value)
     assert "problem.solid.density: 2000.0 here, 1170.0 there" in text
     assert "problem.friction.critical_slip: 1e-06 here, nothing there" in text
     assert "sweep" in text
-    renamed = make_study(samples=50, title="another title", cluster={"jobs": 3})
-    renamed.run(out=tmp_path / name)
+    make_study(samples=50, title="another title").run(out=tmp_path / "run")
 
 
 def test_an_interrupted_run_is_readable_and_goes_on(tmp_path, often, reference):
     def interrupt(done, total):
-        if done > 1200:
+        if done > 400:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         make_study().run(out=tmp_path / "run", progress=interrupt, workers=2)
-    state = StoredRun(tmp_path / "run").status()
-    assert 1200 < state.done < 3600
-    assert not state.active
-    part = StoredRun(tmp_path / "run").dataset()
+    state = st.open_run(tmp_path / "run").status()
+    assert 400 < state.done < ALL
+    part = st.open_run(tmp_path / "run").dataset()
+    assert "samples are done" in part.attrs["cut_short"]
     stress = part["critical_stress"].values
     found = np.isfinite(stress)
     assert found.sum() == state.done
     np.testing.assert_array_equal(stress[found], reference["critical_stress"].values[found])
-    assert make_study().run(out=tmp_path / "run").identical(reference)
+    assert again(tmp_path / "run").identical(reference)
+
+
+# -- parts and several writers -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("points", [1, 7])
+@pytest.mark.parametrize("samples", [1, 1000, 5000])
+@pytest.mark.parametrize("of", [1, 3, 10])
+def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
+    masks = [Part(k, of).mask(points, samples) for k in range(1, of + 1)]
+    assert (np.sum(masks, axis=0) == 1).all()
+    sizes = [mask.sum() for mask in masks]
+    # Eight blocks a part or more: no part is longer than another by more than one.
+    assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
+
+
+def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
+    for number in (1, 3):
+        result = make_study().run(out=tmp_path / "run", part=(number, 3))
+    assert result["critical_stress"].isnull().sum() > 0
+    assert make_study().run(out=tmp_path / "run", part="2/3").identical(reference)
+    assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
+
+
+@pytest.mark.parametrize("value", ["0/3", "4/3", "3", "a/b", (1, 0), (1, 2, 3), 3, "1/1e9999", 1.5])
+def test_what_is_no_part_is_refused(value):
+    with pytest.raises(st.InputError, match="part: must be"):
+        as_part(value)
+
+
+def test_a_part_needs_a_place():
+    with pytest.raises(st.InputError, match="out="):
+        make_study().run(part=(1, 2))
+
+
+def test_two_writers_at_once_damage_nothing(tmp_path, reference):
+    """Each joins its chunks as if alone."""
+    code = (
+        "import sys, json; from stiction.ensemble import batches, store;"
+        "store.SAVE_SECONDS = 0.0; store.MANY = 3;"
+        "batches.Sizer.next = lambda sizer, experiment, span, *rest: min(20, span.samples);"
+        "from stiction.study.study import Study;"
+        "Study.from_dict(json.loads(sys.argv[1])).run(out=sys.argv[2], workers=1)"
+    )
+    command = [sys.executable, "-W", "ignore", "-c", code, json.dumps(STUDY), tmp_path / "run"]
+    both = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in both:
+        errors = process.communicate()[1]
+        assert process.returncode == 0, errors
+    assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
+    assert st.open_run(tmp_path / "run").status().damaged == ()
+
+
+def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often, monkeypatch):
+    monkeypatch.setattr(store, "MANY", 3)
+    thread = threading.Thread(
+        target=lambda: make_study().run(out=tmp_path / "run", workers=1), daemon=True
+    )
+    thread.start()
+    seen, done = 0, 0
+    while thread.is_alive():
+        if (tmp_path / "run" / "study.json").exists():
+            state = st.open_run(tmp_path / "run").status()
+            assert state.damaged == ()
+            assert state.done >= done  # joining loses nothing
+            seen, done = seen + 1, state.done
+    assert seen
+
+
+def test_small_chunks_are_joined(tmp_path, often, reference, monkeypatch):
+    monkeypatch.setattr(store, "MANY", 4)
+    monkeypatch.setattr(
+        batches.Sizer, "next", lambda sizer, experiment, span, *rest: min(7, span.samples)
+    )
+    assert make_study().run(out=tmp_path / "run", workers=1).identical(reference)
+    assert len(chunks(tmp_path / "run")) <= 4 * 4 < ALL / 7
+
+
+def test_a_writer_joins_its_chunks_at_the_end(tmp_path, reference, monkeypatch):
+    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
+    assert make_study().run(out=tmp_path / "run", workers=1).identical(reference)
+    assert len(chunks(tmp_path / "run")) == 1
+
+
+def test_killed_while_chunks_are_joined(run, reference, monkeypatch):
+    """Before the joined chunk is written, and before the small ones are removed."""
+    monkeypatch.setattr(store, "MANY", 2)
+
+    def die(*arguments):
+        raise KeyboardInterrupt
+
+    for where, name in ((store, "write_whole"), (store.Path, "unlink")):
+        with monkeypatch.context() as patch, suppress(KeyboardInterrupt):
+            patch.setattr(where, name, die)
+            make_study().run(out=run, executor=Forbidding())
+        assert st.open_run(run).status().complete
+    assert again(run, executor=Forbidding()).identical(reference)
+
+
+# -- damage --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     "damage",
     [
         lambda path: path.write_bytes(path.read_bytes()[:-100]),
-        lambda path: path.write_bytes(path.read_bytes().replace(b"\x00", b"\x01", 1)),
         lambda path: path.write_bytes(b""),
         lambda path: path.unlink(),
+        lambda path: path.write_bytes(path.with_name(chunks(path.parents[1])[0].name).read_bytes()),
     ],
-    ids=["truncated", "one byte", "empty", "gone"],
+    ids=["truncated", "empty", "gone", "another chunk"],
 )
-def test_damaged_chunks_are_found_and_computed_again(tmp_path, often, reference, damage):
-    run_into(make_study(), tmp_path / "run", workers=1)
-    before = sizes(tmp_path / "run")
-    victim = sorted((tmp_path / "run" / "chunks").iterdir())[1]
+def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
+    before = {path: path.stat().st_mtime_ns for path in chunks(run)}
+    victim = chunks(run)[1]
     damage(victim)
-    state = StoredRun(tmp_path / "run").status()
-    assert [text.split()[0] for text in state.damaged] == [f"chunks/{victim.name}"]
-    assert state.done < state.samples
-    with pytest.warns(UserWarning, match=f"{victim.name}: (is gone|fails its checksum).*missing"):
-        part = StoredRun(tmp_path / "run").dataset()
-    assert int(part["critical_stress"].isnull().sum()) == state.samples - state.done
-    with pytest.warns(
-        UserWarning, match=f"{victim.name}: (is gone|fails its checksum).*computed again"
-    ):
-        result = make_study().run(out=tmp_path / "run", workers=1)
-    assert result.identical(reference)
-    after = sizes(tmp_path / "run")
-    kept = [name for name in before if name != victim.name]
-    assert {name: after[name] for name in kept} == {name: before[name] for name in kept}
+    gone = not victim.exists()
+    state = st.open_run(run).status()
+    assert [victim.name in text for text in state.damaged] == ([] if gone else [True])
+    assert state.done == ALL - 50
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        part = st.open_run(run).dataset()
+    assert any("samples are missing" in str(w.message) for w in caught) != gone
+    assert int(part["critical_stress"].isnull().sum()) == 50
+    assert again(run, None if gone else ["its samples are computed again"]).identical(reference)
+    after = {path: path.stat().st_mtime_ns for path in chunks(run)}
+    kept = [path for path in before if path != victim]
+    assert {path: after[path] for path in kept} == {path: before[path] for path in kept}
 
 
-def test_a_torn_list_and_files_aside_do_no_harm(tmp_path, often, reference):
-    run_into(make_study(), tmp_path / "run", workers=1)
-    listed = tmp_path / "run" / "chunks.jsonl"
-    lines = listed.read_bytes()
-    listed.write_bytes(lines[: len(lines) - 37])
-    (tmp_path / "run" / "chunks" / "000777-0123abcd.nc.part").write_bytes(b"half a chunk")
-    (tmp_path / "run" / "chunks.jsonl.part").write_bytes(b"half a list")
-    assert make_study().run(out=tmp_path / "run").identical(reference)
-    assert not list((tmp_path / "run" / "chunks").glob("*.part"))
+@pytest.mark.parametrize("name", ["study.json", "pilot.json", "chunks"])
+def test_one_bit_anywhere_is_found_and_mended(run, reference, name):
+    for seed in range(8):
+        chance = np.random.default_rng(seed)
+        victim = chunks(run)[chance.integers(len(chunks(run)))] if name == "chunks" else run / name
+        flip(victim, chance)
+        if name == "study.json":
+            with pytest.raises(StoreError, match="damaged"):
+                st.open_run(run)
+        if name == "chunks":
+            assert len(st.open_run(run).status().damaged) == 1
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            assert make_study().run(out=run, workers=1).identical(reference)
+        assert st.open_run(run).status().damaged == ()
+        assert again(run).identical(reference)
 
 
-def test_two_runs_at_once_in_one_process(tmp_path, often):
-    begun, go_on = threading.Event(), threading.Event()
-
-    def wait(done, total):
-        begun.set()
-        go_on.wait(20.0)
-
-    thread = threading.Thread(
-        target=lambda: make_study().run(out=tmp_path / "run", progress=wait, workers=1)
-    )
-    thread.start()
-    assert begun.wait(20.0)
-    assert StoredRun(tmp_path / "run").status().active
-    with pytest.raises(StoreError, match="is writing to it"):
-        make_study().run(out=tmp_path / "run")
-    go_on.set()
-    thread.join()
-    assert StoredRun(tmp_path / "run").status().complete
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_text("{")])
+def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference, damage):
+    damage(run / "study.json")
+    with pytest.raises(StoreError, match="chunks belong to another study"):
+        make_study(ensemble={"samples": 300, "seed": 4}).run(out=run)
+    assert again(run, ["made anew"]).identical(reference)
+    assert again(run).identical(reference)
 
 
-HOLD = """
-import sys, time
-from pathlib import Path
-from stiction.ensemble.files import Lock
-from stiction.ensemble.manifest import write_manifest
-with Lock(Path(sys.argv[1])):
-    print("locked", flush=True)
-    time.sleep(60.0)
-"""
+def test_a_chunk_damaged_while_the_run_goes_on(tmp_path, often, reference):
+    def damage(done, total):
+        if done == total:
+            chunks(tmp_path / "run")[0].unlink()
+
+    with pytest.raises(StoreError, match="1150 of 1200 samples are stored.*computes them again"):
+        make_study().run(out=tmp_path / "run", workers=1, progress=damage, pilot=False)
+    assert again(tmp_path / "run").identical(reference)
 
 
-def test_the_lock_ends_with_its_process_however_it_ends(tmp_path):
-    path = tmp_path / "lock"
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE, text=True
-    ) as holder:
-        assert holder.stdout.readline() == "locked\n"
-        with pytest.raises(StoreError, match=f"process {holder.pid} on"), Lock(path):
-            pass
-        holder.send_signal(signal.SIGKILL)
-    with Lock(path):
-        pass
+@pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
+def test_what_cannot_be_read_is_not_damaged(run, monkeypatch, number):
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    for victim in (run / "study.json", chunks(run)[0]):
+
+        def fail(path, read=Path.read_bytes, victim=victim):
+            if path.name == victim.name:
+                raise OSError(number, os.strerror(number))
+            return read(path)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "read_bytes", fail)
+            with pytest.raises(StoreError, match="cannot be read"):
+                make_study().run(out=run)
+            with pytest.raises(StoreError, match="cannot be read"):
+                st.open_run(run).status()
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
-def failing(samples):
-    original = work.compute
-
-    def compute(plan, first, count):
-        if any(first <= sample < first + count for sample in samples):
-            raise FloatingPointError("the slip rate became non-finite")
-        return original(plan, first, count)
-
-    return compute
-
-
-def test_failed_samples_are_named_listed_and_retried(tmp_path, often, reference, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(work, "compute", failing({17, 850}))
-        with pytest.raises(RuntimeError, match=r"sample 17 \(seed 3\): FloatingPointError"):
-            make_study(sweep=[]).run(workers=1)
-        for name in ("run", "result.nc"):
-            result = make_study().run(out=tmp_path / name, workers=2)
-            run = StoredRun(tmp_path / name)
-            assert {(f.point, f.sample, f.seed) for f in run.failures} == {
-                (point, sample, 3) for point in range(4) for sample in (17, 850)
-            }
-            assert run.status().done == 4 * 898
-            rest = [sample for sample in range(900) if sample not in (17, 850)]
-            assert result["critical_stress"].isnull().sum() == 8
-            np.testing.assert_array_equal(
-                result["critical_stress"].sel(sample=rest),
-                reference["critical_stress"].sel(sample=rest),
-            )
-            assert len(json.loads(result.attrs["failed_samples"])) == 8
-    for name in ("run", "result.nc"):
-        again = make_study().run(out=tmp_path / name)  # without being asked: not tried again
-        assert len(StoredRun(tmp_path / name).failures) == 8
-        assert again["critical_stress"].isnull().sum() == 8
-        assert make_study().run(out=tmp_path / name, retry=True).identical(reference)
-        assert StoredRun(tmp_path / name).failures == ()
-
-
-def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):
-    monkeypatch.setattr(work, "compute", failing(set(range(1000))))
-    with pytest.raises(st.InputError, match="samples of point 0 all failed.*seed 3"):
-        make_study().run(out=tmp_path / "run", workers=1)
-
-
-class DyingExecutor:
-    """Loses its third piece of work."""
-
-    def __init__(self):
-        self.pieces = 0
-
-    def submit(self, function, *arguments):
-        from concurrent.futures import Future
-
-        self.pieces += 1
-        future = Future()
-        if self.pieces == 3:
-            future.set_exception(OSError("the machine is gone"))
-        else:
-            future.set_result(function(*arguments))
-        return future
-
-
-def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
-    with pytest.raises(WorkerError, match=r"samples \d+ to \d+ of point 0 \(seed 3\).*is gone"):
-        make_study().run(out=tmp_path / "run", executor=DyingExecutor(), workers=1)
-    assert 0 < StoredRun(tmp_path / "run").status().done < 3600
-    assert make_study().run(out=tmp_path / "run").identical(reference)
+def test_files_of_others_stay(run, reference):
+    foreign = ["note.txt", "note.npz", "000001-mine.npz.part"]
+    for name in foreign:
+        (run / "chunks" / name).write_text("mine")
+    (run / "chunks" / "sub").mkdir()
+    aside = run / "chunks" / ("0" * 32 + ".npz.1-2.part")
+    aside.write_bytes(b"half a chunk")
+    os.utime(aside, (0, 0))
+    assert again(run, executor=Forbidding()).identical(reference)
+    assert {path.name for path in (run / "chunks").iterdir()} >= {*foreign, "sub"}
+    assert not aside.exists()  # a killed writer left it long ago
 
 
 @pytest.mark.parametrize(
@@ -285,33 +351,23 @@ def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
         (lambda path: path.write_text("text"), "is a file"),
         (lambda path: (path.mkdir(), (path / "thesis.tex").write_text("text")), "thesis.tex"),
         (
-            lambda path: (path.mkdir(), (path / "manifest.json").write_text('{"format": 99}')),
-            "format 99",
+            lambda path: (path.mkdir(), (path / "manifest.json").write_text("{}")),
+            "an earlier version",
         ),
+        (lambda path: shutil.rmtree(path.parent), "does not exist"),
     ],
-    ids=["a file", "other files", "a later format"],
+    ids=["a file", "other files", "an earlier format", "no folder"],
 )
 def test_unusable_folders_are_refused_before_any_work(tmp_path, prepare, words):
-    prepare(tmp_path / "run")
+    (tmp_path / "here").mkdir()
+    prepare(tmp_path / "here" / "run")
     with pytest.raises(StoreError, match=words):
-        make_study().run(out=tmp_path / "run", executor=Forbidding())
-
-
-def test_unusable_places_are_refused_before_any_work(tmp_path):
-    with pytest.raises(StoreError, match="does not exist"):
-        make_study().run(out=tmp_path / "nowhere" / "run", executor=Forbidding())
-    (tmp_path / "folder.nc").mkdir()
-    with pytest.raises(StoreError, match="is a folder"):
-        make_study().run(out=tmp_path / "folder.nc", executor=Forbidding())
-    (tmp_path / "notes.nc").write_text("not NetCDF")
-    with pytest.raises(StoreError, match=r"notes\.nc"):
-        make_study().run(out=tmp_path / "notes.nc", executor=Forbidding())
+        make_study().run(out=tmp_path / "here" / "run", executor=Forbidding())
 
 
 def test_a_folder_that_vanishes(tmp_path, often):
     def vanish(done, total):
-        if (tmp_path / "run").exists():
-            shutil.rmtree(tmp_path / "run")
+        shutil.rmtree(tmp_path / "run", ignore_errors=True)
 
     with pytest.raises(StoreError, match="the folder is gone"):
         make_study().run(out=tmp_path / "run", progress=vanish, workers=1)
@@ -333,98 +389,161 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "--lazy", str(place)], check=True)
 
 
-def test_a_full_disk(small_disk, often, reference, monkeypatch):
+def test_a_full_disk(small_disk, often, reference):
     ballast = small_disk / "ballast"
-    ballast.write_bytes(b"\x00" * (900 << 10))  # a chunk of a hundred samples takes some 8 kB
+    ballast.write_bytes(b"\x00" * (920 << 10))
+    for _ in range(2):
+        with pytest.raises(StoreError, match="the disk is full"):
+            make_study().run(out=small_disk / "run", workers=1)
+        state = st.open_run(small_disk / "run").status()
+        assert 0 < state.done < state.samples
+        assert state.damaged == ()
+        assert not list((small_disk / "run" / "chunks").glob("*.part"))
     with pytest.raises(StoreError, match="the disk is full"):
-        make_study().run(out=small_disk / "run", workers=1)
-    state = StoredRun(small_disk / "run").status()
-    assert 0 < state.done < state.samples
-    assert state.damaged == ()
-    assert not list((small_disk / "run" / "chunks").glob("*.part"))
-    with pytest.raises(StoreError, match="the disk is full"):
-        StoredRun(small_disk / "run").export(small_disk / "result.nc")
+        st.open_run(small_disk / "run").export(small_disk / "result.nc")
     assert not (small_disk / "result.nc").exists()
-    with pytest.raises(StoreError, match="the disk is full"):
-        make_study().run(out=small_disk / "run", workers=1)
     ballast.unlink()
-    # What is left goes into larger chunks: each takes at least 10 kB.
-    monkeypatch.setattr(resume, "FLUSH_SECONDS", 10.0)
     assert make_study().run(out=small_disk / "run").identical(reference)
-
-
-def test_a_read_only_disk(small_disk):
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    for name in ("run", "result.nc"):
-        with pytest.raises(StoreError, match="read-only"):
-            make_study().run(out=small_disk / name, executor=Forbidding())
+    with pytest.raises(StoreError, match="read-only"):
+        make_study().run(out=small_disk / "other", executor=Forbidding())
 
 
-def test_a_version_that_differs_is_said(tmp_path, often):
-    study = make_study(samples=40)
-    study.run(out=tmp_path / "run")
-    write_manifest(tmp_path / "run", study.to_dict(), ["stiction 99.0, numpy 1.0, numba 0.1"])
+# -- failures ------------------------------------------------------------------------------------
+
+
+def failing(samples):
+    original = Experiment.results
+
+    def results(self, seed, first, count):
+        if any(first <= sample < first + count for sample in samples):
+            raise FloatingPointError("the slip rate became non-finite")
+        return original(self, seed, first, count)
+
+    return results
+
+
+def test_failed_samples_are_nan_listed_and_retried(tmp_path, often, reference, monkeypatch):
+    words = r"8 of 1200 samples could not be solved.*sample 17 \(seed 3\): FloatingPointError"
+    with monkeypatch.context() as patch:
+        patch.setattr(Experiment, "results", failing({17, 250}))
+        with pytest.warns(st.AccuracyWarning, match=words):
+            memory = make_study().run(workers=1, pilot=False)
+        with pytest.warns(st.AccuracyWarning, match=words):
+            stored = make_study().run(out=tmp_path / "run", workers=2, pilot=False)
+    assert stored.identical(memory)
+    assert memory["critical_stress"].isnull().sum() == 8
+    rest = [sample for sample in range(300) if sample not in (17, 250)]
+    for name in ("critical_stress", "critical_position"):
+        np.testing.assert_array_equal(
+            stored[name].sel(sample=rest), reference[name].sel(sample=rest)
+        )
+    state = st.open_run(tmp_path / "run").status()
+    assert {(f.point, f.sample, f.seed) for f in state.failures} == {
+        (point, sample, 3) for point in range(4) for sample in (17, 250)
+    }
+    assert len(json.loads(stored.attrs["failed_samples"])) == 8
+    with pytest.warns(st.AccuracyWarning, match="could not be solved"):  # not tried again
+        make_study().run(out=tmp_path / "run", executor=Forbidding(), pilot=False)
+    assert make_study().run(out=tmp_path / "run", retry=True).identical(reference)
+    assert st.open_run(tmp_path / "run").status().failures == ()
+
+
+def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):
+    monkeypatch.setattr(Experiment, "results", failing(set(range(1000))))
+    for out in (None, tmp_path / "run"):
+        with pytest.raises(RuntimeError, match=r"sample 15 \(seed 3\): FloatingPointError"):
+            make_study().run(out=out, workers=1)
+
+
+class Dying:
+    """Loses its third piece of work."""
+
+    def __init__(self):
+        self.pieces = 0
+
+    def submit(self, function, *arguments):
+        self.pieces += 1
+        future = Future()
+        if self.pieces == 3:
+            future.set_exception(OSError("the machine is gone"))
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
+    with pytest.raises(WorkerError, match=r"samples \d+ to \d+ of point 0 \(seed 3\).*is gone"):
+        make_study().run(out=tmp_path / "run", executor=Dying(), workers=1)
+    assert 0 < st.open_run(tmp_path / "run").status().done < ALL
+    assert again(tmp_path / "run").identical(reference)
+
+
+def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
+        make_study(samples=40).run(out=tmp_path / "run")
     with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, this is stiction"):
         make_study(samples=60).run(out=tmp_path / "run")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        make_study(samples=80).run(out=tmp_path / "run")
+    point = make_study(samples=40).experiments[0]
+    with pytest.raises(WorkerError, match="install the same versions"):
+        batches.solve_span(point, Span(0, 0, 1), "", "stiction 99.0")
+
+
+# -- size and time -------------------------------------------------------------------------------
 
 
 def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     """Only so many pieces are handed out, and each is only so big, whatever the study."""
-    monkeypatch.setattr(scheduler, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(batches, "MOST_BYTES", 2**20)
     alive, most = set(), 0
 
-    class Counting:
-        def submit(self, function, plan, point, first, count, *marks):
+    class Watching:
+        def submit(self, function, experiment, span, *marks):
             nonlocal most
-            from concurrent.futures import Future
-
             future = Future()
-            alive.add((first, count))
+            alive.add(span)
             most = max(most, len(alive))
-            work = (future, function, plan, point, first, count)
-            threading.Timer(0.002, self.finish, work).start()
+            threading.Timer(0.002, self.finish, (future, function, experiment, span)).start()
             return future
 
-        def finish(self, future, function, plan, point, first, count):
-            outcome = function(plan, point, first, count)
-            alive.discard((first, count))
-            future.set_result(outcome)
+        def finish(self, future, function, experiment, span):
+            table = function(experiment, span)
+            alive.discard(span)
+            future.set_result(table)
 
-    plan = make_study(
-        sweep=[], ensemble={"samples": 20000, "keep": ["strength"], "keep_limit": 1e9}
-    ).plans[0]
-    spans = [scheduler.Span(0, 0, 20000)]
-    largest = 0
-    for outcome in scheduler.share_out([plan], spans, executor=Counting(), workers=3, seconds=1e6):
-        largest = max(largest, outcome.nbytes if outcome else 0)
+    keep = {"samples": 20000, "keep": ["strength"], "keep_limit": 1e9}
+    points = make_study(sweep=[], ensemble=keep).experiments
+    spans, largest = [Span(0, 0, 20000)], 0
+    for table in solve_spans(points, spans, executor=Watching(), workers=3, seconds=1e6):
+        largest = max(largest, table.nbytes if table else 0)
     assert most <= 6  # two a worker
     # 128 nodes and four more numbers a sample make 1056 bytes: a fair share would be 3.5 MB.
     assert 2**18 < largest < 1.1 * 2**20
 
 
-@pytest.mark.slow
-def test_killed_at_random_moments(tmp_path, monkeypatch):
-    """Ten times kill -9, resumed each time; the campaign does a hundred."""
-    from importlib.util import module_from_spec, spec_from_file_location
-    from pathlib import Path
-
-    path = Path(__file__).parents[2] / "campaigns" / "kill.py"
-    spec = spec_from_file_location("kill", path)
-    kill = module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "kill", kill)
-    spec.loader.exec_module(kill)
-    counts = kill.campaign(10, tmp_path, seed=1)
-    assert counts.kills == 10
-    assert counts.different == 0
-    assert counts.in_the_middle > 0
+def test_a_hundred_thousand_points(tmp_path):
+    study = make_study(samples=1, ensemble={"samples": 1, "seed": 3}, sweep=[
+        {"problem.load.initial_stress": {"start": 0.0, "stop": 1e5, "count": 100}},
+        {"ensemble.seed": list(range(1000))},
+    ])  # fmt: skip
+    result = study.run(out=tmp_path / "run", time_limit=0.5, pilot=False)
+    assert result["critical_stress"].shape == (100, 1000, 1)
 
 
-def test_time_between_chunks_is_about_a_second(tmp_path):
+def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
     """A sample that takes long does not keep finished ones from being stored."""
+    monkeypatch.setattr(store.Store, "close", lambda self: None)
     with SlowFrom(256, seconds=1.6) as executor:
-        study = make_study(samples=300, sweep=[])
-        study.run(out=tmp_path / "run", executor=executor, workers=2)
-    assert StoredRun(tmp_path / "run").status().chunks >= 2
+        make_study(sweep=[]).run(out=tmp_path / "run", executor=executor, workers=2)
+    assert st.open_run(tmp_path / "run").status().chunks >= 2
+
+
+def test_the_page_on_clusters(tmp_path, monkeypatch):
+    """Its job array in Python runs."""
+    monkeypatch.chdir(tmp_path)
+    make_study(samples=40).to_toml("study.toml")
+    page = (Path(__file__).parents[2] / "docs" / "clusters.md").read_text("utf-8")
+    first = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0]
+    exec(compile(first, "clusters.md", "exec"), {})
+    assert 0 < st.open_run("RUN").status().done < 160
