@@ -139,7 +139,7 @@ def local():
         row(f"xi_0/h_n = {ratio}", ours, [("quadrature", slow)], f"{apart:.0e} apart")
 
         def ensemble(strength=strength):
-            options = {"samples": 4096, "workers": 1, "progress": False}
+            options = {"samples": 4096, "workers": 1, "progress": False, "pilot": False}
             st.monte_carlo(problem, strength, method=st.LocalCriterion(), **options)
 
         row("  with its field, stored", timed(ensemble, 3) / 4096)
