@@ -11,9 +11,9 @@ __version__ = "0.1.0"
 _HOMES = {
     "Solid": "solid",
     "Interface": "interface",
-    "LinearWeakening": "friction.linear",
-    "ExponentialWeakening": "friction.exponential",
-    "PiecewiseWeakening": "friction.piecewise",
+    "LinearWeakening": "friction",
+    "ExponentialWeakening": "friction",
+    "PiecewiseWeakening": "friction",
     "Load": "load",
     "GradientLoad": "load",
     "EdgeLoad": "load",

@@ -29,9 +29,9 @@ from stiction.errors import (
 from stiction.errors import (
     UnitWarning as UnitWarning,
 )
-from stiction.friction.exponential import ExponentialWeakening as ExponentialWeakening
-from stiction.friction.linear import LinearWeakening as LinearWeakening
-from stiction.friction.piecewise import PiecewiseWeakening as PiecewiseWeakening
+from stiction.friction import ExponentialWeakening as ExponentialWeakening
+from stiction.friction import LinearWeakening as LinearWeakening
+from stiction.friction import PiecewiseWeakening as PiecewiseWeakening
 from stiction.inference.design import design_of_tests as design_of_tests
 from stiction.inference.field_fit import FieldFit as FieldFit
 from stiction.inference.fit import fit_field as fit_field

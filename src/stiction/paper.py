@@ -6,7 +6,7 @@ from typing import Literal
 
 from stiction._checks import check_instance, is_finite
 from stiction.errors import InputError
-from stiction.friction.linear import LinearWeakening
+from stiction.friction import LinearWeakening
 from stiction.interface import Interface
 from stiction.model import describe
 from stiction.problem import Problem

@@ -11,8 +11,7 @@ from pydantic import model_validator
 
 from stiction._checks import as_names, is_real
 from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
-from stiction.friction import Friction
-from stiction.friction.law import SCALES
+from stiction.friction import SCALES, Friction, contradictions
 from stiction.interface import Interface
 from stiction.load import Load
 from stiction.model import Mode, describe, is_unplaced, model
@@ -107,6 +106,7 @@ class Problem:
                     "mode: on an interface of two dimensions load and slip are along x, which is"
                     f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
                 )
+        problems += [f"friction: {text}" for text in contradictions(friction)]
         rate = friction.weakening_rate
         if rate is not None and not problems:
             problems += self._too_few_nodes(float(np.max(rate)))

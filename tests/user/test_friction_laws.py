@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import stiction as st
+from stiction.friction import FrictionLaw
 from stiction.friction.kernels import register
-from stiction.friction.law import FrictionLaw
 from stiction.jit import jit
 from stiction.model import model
 
@@ -144,7 +144,7 @@ def test_law_that_is_misspelt(tmp_path, problem, make_strength):
 
 
 def test_polygon_along_a_law_says_what_is_wrong():
-    with pytest.raises(st.InputError, match=r"pieces: must be a whole number >= 2, got 1"):
+    with pytest.raises(st.InputError, match="pieces: must be greater than or equal to 2, got 1"):
         st.PiecewiseWeakening.from_law(EXPONENTIAL, 1)
     with pytest.raises(st.InputError, match=r"law: must be a FrictionLaw, got"):
         st.PiecewiseWeakening.from_law("exponential", 4)
@@ -221,12 +221,60 @@ def test_law_of_ones_own(with_law, tau_p):
 
 def test_law_without_a_compiled_strength_is_refused(with_law, tau_p):
     @model
-    class Sketch(FrictionLaw):
-        initial_slope = integral = 1.0
+    class Sketch(OwnLaw):
+        parameters = ()
 
     for method in (st.Equilibrium(), RUPTURE):
         with pytest.raises(st.InputError, match="Sketch"):
             st.onset(with_law(Sketch(weakening_rate=0.5e12)), tau_p, method=method)
+    with pytest.raises(TypeError, match=r"abstract.*fraction"):
+        FrictionLaw(weakening_rate=0.5e12)
+
+
+@model
+class Hump(OwnLaw):
+    """Rises by a tenth before it falls: no method of the package can follow it."""
+
+    def fraction(self, u):
+        u = np.asarray(u)
+        return np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0])
+
+    def slip_at(self, fraction):
+        return 1.0 - 0.8 * fraction / 1.1
+
+
+@model
+class Late(OwnLaw):
+    def fraction(self, u):
+        return 0.5 * np.exp(-np.asarray(u))
+
+
+@model
+class Steeper(OwnLaw):
+    """Its kernels are those of another law, and its slope is not that of its fraction."""
+
+    initial_slope = 2.0
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (Hump, "friction: Hump: strength must not rise with slip; fraction rises from 1 to 1.1"),
+        (Late, r"friction: Late.fraction\(0\) must be 1, got 0.5"),
+        (Steeper, r"Steeper: initial_slope is 2, but 1 by its fraction"),
+        (Steeper, r"Steeper: the strength of its kernels at u = 0.568 is"),
+    ],
+)
+def test_a_law_that_contradicts_itself_is_refused(with_law, law, words):
+    with pytest.raises(st.InputError, match=words):
+        with_law(law(weakening_rate=0.5e12))
+    with pytest.raises(st.InputError, match=words.replace("friction", "law", 1)):
+        st.PiecewiseWeakening.from_law(law(weakening_rate=0.5e12), 32)
+
+
+def test_what_is_no_law_is_refused(problem):
+    with pytest.raises(st.InputError, match=r"friction: must be a friction law such as .*got 0.2"):
+        dataclasses.replace(problem, friction=0.2)
 
 
 def test_schema_asks_for_the_type_of_a_law():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stiction.dynamics import monitor
 from stiction.dynamics.arrays import Fields, Grid, Nodes
-from stiction.friction.law import FrictionLaw
+from stiction.friction import FrictionLaw
 
 Floats = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from stiction.dynamics.memory_layout import (
     scale_memory,
 )
 from stiction.dynamics.scale import follow_scale
+from stiction.friction import FrictionLaw
 from stiction.friction.kernels import strengths
-from stiction.friction.law import FrictionLaw
 
 Floats = NDArray[np.float64]
 

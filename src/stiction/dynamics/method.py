@@ -27,7 +27,7 @@ from stiction.dynamics.scale import stress_scale
 from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
-from stiction.friction.law import FrictionLaw
+from stiction.friction import FrictionLaw
 from stiction.model import Count, Positive, _number, model
 from stiction.problem import SMALLEST_EIGENVALUE, Problem
 from stiction.results import Variable, onset_variables

@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.friction import FrictionLaw
 from stiction.friction.kernels import registered
-from stiction.friction.law import FrictionLaw
-from stiction.friction.linear import Linear
-from stiction.friction.piecewise import Polygon
+from stiction.friction.parameters import Linear, Polygon
 from stiction.jit import jit
 
 AT_CORNER = 1.0 - 1e-12

@@ -7,6 +7,7 @@ kernel is compiled, so a law costs nothing that it does not use, and another law
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -14,9 +15,8 @@ import numpy as np
 from numba.extending import overload
 
 from stiction.arrays import Array
+from stiction.friction.parameters import FUNCTIONS, Exponential, Linear, Polygon
 from stiction.jit import jit
-
-_FUNCTIONS: dict[type, tuple[Callable[..., Any], ...]] = {}
 
 
 def register(
@@ -25,7 +25,7 @@ def register(
     slope: Callable[..., float],
     line: Callable[..., tuple[float, float]] | None = None,
 ) -> None:
-    """Say how kernels evaluate the law whose parameters have this type.
+    """Register the functions by which kernels evaluate laws with parameters of this type.
 
     Parameters
     ----------
@@ -43,17 +43,17 @@ def register(
             there = strength(law, peak, residual, rate, slip + ahead)
             return there + falling * ahead, falling
 
-    _FUNCTIONS[parameters] = (strength, slope, line)
+    FUNCTIONS[parameters] = (strength, slope, line)
 
 
 def registered(law: NamedTuple) -> bool:
     """Whether kernels can evaluate the law with these parameters."""
-    return type(law) in _FUNCTIONS
+    return type(law) in FUNCTIONS
 
 
 def _registered(law: Any, which: int) -> Callable[..., Any] | None:
     kind = getattr(law, "instance_class", None)  # numba's types of NamedTuples have one
-    return _FUNCTIONS[kind][which] if kind in _FUNCTIONS else None
+    return FUNCTIONS[kind][which] if kind in FUNCTIONS else None
 
 
 def strength_at(law: NamedTuple, peak: float, residual: float, rate: float, slip: float) -> float:
@@ -66,13 +66,13 @@ def strength_at(law: NamedTuple, peak: float, residual: float, rate: float, slip
     peak, residual, rate, slip : float
         tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), slip (m).
     """
-    result: float = _FUNCTIONS[type(law)][0](law, peak, residual, rate, slip)
+    result: float = FUNCTIONS[type(law)][0](law, peak, residual, rate, slip)
     return result
 
 
 def slope_at(law: NamedTuple, peak: float, residual: float, rate: float, slip: float) -> float:
     """How fast the strength falls at a slip, -d tau_f / d slip >= 0, Pa/m; see `strength_at`."""
-    result: float = _FUNCTIONS[type(law)][1](law, peak, residual, rate, slip)
+    result: float = FUNCTIONS[type(law)][1](law, peak, residual, rate, slip)
     return result
 
 
@@ -87,7 +87,7 @@ def line_at(
         What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law
         it is the piece itself.
     """
-    result: tuple[float, float] = _FUNCTIONS[type(law)][2](law, peak, residual, rate, slip, ahead)
+    result: tuple[float, float] = FUNCTIONS[type(law)][2](law, peak, residual, rate, slip, ahead)
     return result
 
 
@@ -125,3 +125,86 @@ def strengths(law: NamedTuple, peak: Array, residual: Array, rate: Array, slip: 
     for i in range(slip.size):
         result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])
     return result
+
+
+@jit
+def _linear_strength(law: Linear, peak: float, residual: float, rate: float, slip: float) -> float:
+    return max(peak - rate * slip, residual)
+
+
+@jit
+def _linear_slope(law: Linear, peak: float, residual: float, rate: float, slip: float) -> float:
+    return rate if peak - rate * slip > residual else 0.0
+
+
+@jit
+def _linear_line(
+    law: Linear, peak: float, residual: float, rate: float, slip: float, ahead: float
+) -> tuple[float, float]:
+    if peak - rate * (slip + ahead) > residual:
+        return peak - rate * slip, rate
+    return residual, 0.0
+
+
+@jit
+def _exponential_strength(
+    law: Exponential, peak: float, residual: float, rate: float, slip: float
+) -> float:
+    drop = peak - residual
+    if drop <= 0.0:
+        return residual
+    return residual + drop * math.exp(-rate * slip / drop)
+
+
+@jit
+def _exponential_slope(
+    law: Exponential, peak: float, residual: float, rate: float, slip: float
+) -> float:
+    drop = peak - residual
+    return rate * math.exp(-rate * slip / drop) if drop > 0.0 else 0.0
+
+
+@jit
+def _piece(law: Polygon, u: float) -> int:
+    """The piece in which a slip lies; the number of pieces beyond the last corner."""
+    piece = 0
+    while piece < law.slip.shape[0] - 1 and u >= law.slip[piece + 1]:
+        piece += 1
+    return piece
+
+
+@jit
+def _steepness(law: Polygon, piece: int) -> float:
+    """-f' in a piece."""
+    fall = law.fraction[piece] - law.fraction[piece + 1]
+    return fall / (law.slip[piece + 1] - law.slip[piece])
+
+
+@jit
+def _polygon_strength(
+    law: Polygon, peak: float, residual: float, rate: float, slip: float
+) -> float:
+    drop = peak - residual
+    if drop <= 0.0:
+        return residual
+    u = rate * slip / (drop * _steepness(law, 0))
+    piece = _piece(law, u)
+    if piece == law.slip.shape[0] - 1:
+        return residual
+    f = law.fraction[piece] - _steepness(law, piece) * (u - law.slip[piece])
+    return residual + drop * f
+
+
+@jit
+def _polygon_slope(law: Polygon, peak: float, residual: float, rate: float, slip: float) -> float:
+    drop = peak - residual
+    if drop <= 0.0:
+        return 0.0
+    first = _steepness(law, 0)
+    piece = _piece(law, rate * slip / (drop * first))
+    return rate * _steepness(law, piece) / first if piece < law.slip.shape[0] - 1 else 0.0
+
+
+register(Linear, _linear_strength, _linear_slope, _linear_line)
+register(Exponential, _exponential_strength, _exponential_slope)
+register(Polygon, _polygon_strength, _polygon_slope)

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, PlainSerializer, model_validator
 from stiction._checks import check_memory
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.friction.law import SCALES
+from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.model import describe, model
 from stiction.random.modes import Modes

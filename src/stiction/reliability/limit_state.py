@@ -18,7 +18,7 @@ from stiction.criterion.windows import windows_of
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
-from stiction.friction.law import SCALES
+from stiction.friction import SCALES
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions, TimeUp

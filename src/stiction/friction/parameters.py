@@ -1,0 +1,27 @@
+"""What kernels are given of a friction law, and the table of the functions that evaluate it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from stiction.arrays import Array
+
+
+class Linear(NamedTuple):
+    """The linear law needs no numbers but those of the sample."""
+
+
+class Exponential(NamedTuple):
+    """The exponential law needs no numbers but those of the sample."""
+
+
+class Polygon(NamedTuple):
+    """Corners of f: slip u in units of d_c, from 0 to 1, and f there, from 1 to 0."""
+
+    slip: Array
+    fraction: Array
+
+
+FUNCTIONS: dict[type, tuple[Callable[..., Any], ...]] = {}
+"""Strength, slope and line by type of parameters; see `stiction.friction.kernels.register`."""
