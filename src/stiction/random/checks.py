@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
-from stiction.friction.law import SCALES
+from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.problem import FEWEST_NODES, Problem
 from stiction.random.mapping import from_normal

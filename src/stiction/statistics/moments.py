@@ -148,9 +148,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
         problems.append(f"friction.weakening_rate: varies or follows from the strength, {sampled}")
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
     if pressure is None:
-        problems.append(
-            "load.normal_pressure: is missing, and strength is in coefficients"
-        )
+        problems.append("load.normal_pressure: is missing, and strength is in coefficients")
     elif np.ptp(pressure) > 0.0:
         problems.append(f"load.normal_pressure: varies and strength is in coefficients, {sampled}")
     if problems:
