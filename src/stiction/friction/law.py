@@ -1,0 +1,5 @@
+import sys
+
+import stiction.friction.laws
+
+sys.modules[__name__] = stiction.friction.laws
