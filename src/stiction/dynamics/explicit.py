@@ -177,7 +177,7 @@ def explicit_steps(
         if control[monitor.EVENT_STOP] > 0.0 and fall > watch[monitor.EVENT_DROP]:
             return taken + 1, monitor.DROPPED
         if _calm(watch, setting, done, impedance, rise):
-            monitor.settle(watch, watch[monitor.MEAN_STRESS], radiated)
+            monitor.settle(watch, control, watch[monitor.MEAN_STRESS], radiated)
             if control[monitor.REST_STOP] > 0.0 and watch[monitor.FIRST_STRESS] > -np.inf:
                 return taken + 1, monitor.AT_REST
             if not control[monitor.EXPLICIT_ONLY] > 0.0:

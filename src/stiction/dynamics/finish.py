@@ -43,7 +43,9 @@ def finish_step(fields: Fields, setting: Setting, record: Array, row: int, step:
     watch[monitor.WORK] += step.work
     watch[monitor.STEP] = step.size
     follow_scale(watch, setting.control, setting.scale_loads, setting.scales, step.load)
-    fall = monitor.observe(watch, step.time, step.load, mean_stress, step.radiated, step.node)
+    fall = monitor.observe(
+        watch, setting.control, step.time, step.load, mean_stress, step.radiated, step.node
+    )
     if step.slid >= setting.control[monitor.BREAKABLE] and watch[monitor.KINETIC] == -np.inf:
         watch[monitor.KINETIC] = mean_stress
     if record.shape[0] > 0:

@@ -40,6 +40,9 @@ _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300.0
 _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
 _STEADY_STRESS = 1e-2  # Z V of creep, likewise
+# Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
+# those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
+_UNSTABLE_STRESS = 0.075
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
@@ -119,6 +122,10 @@ class Rupture:
     factor that carries it statically, `applied_load` the one applied at that moment, somewhat
     higher; the difference is radiated. An instability begins when the mean stress has fallen by
     `event_drop` below its last maximum, not counting what the load itself goes down.
+    `arrested_events` counts those in which a node slips so fast that Z V, Z = G/(2 c_s), exceeds
+    7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all is calm:
+    the waves after an event, and the creep that they modulate, stay slower at any loading rate.
+    `Equilibrium` also counts jumps too small to reach that slip rate.
     The stress scale is the mean over nodes of tau_p - tau_r, no node counting for more than three
     times the drop tau_0 p + tau_i - tau_r that the largest load so far provides there: barriers
     that nothing breaks do not count.
@@ -272,6 +279,8 @@ def make_run(
     control[monitor.RESIDUAL] = 1e-9
     control[monitor.LARGEST_STEP], control[monitor.END_TIME] = SLOWEST, np.inf
     control[monitor.EVENT_DROP_SIZE] = method.event_drop
+    typical = np.median((nodes.strength - nodes.residual)[finite.ravel()])
+    control[monitor.UNSTABLE_RATE] = _UNSTABLE_STRESS * typical / medium.impedance
     control[monitor.PEAK_WIDTH_SIZE] = 1e-5
     control[monitor.NOTICED] = 1e-7
     control[monitor.GROWTH] = _GROWTH

@@ -21,7 +21,8 @@ PEAK_WIDTH = 25  # Pa, so close below its maximum the mean stress still is at it
 SCALE = 26  # Pa, stress scale of the largest load so far
 CALM_TOP = 27  # m/s, largest slip rate when the row of calm steps began
 START_LOAD, START_ERROR = 28, 29  # Pa, where the run began and what that may cost
-FIELDS = 30
+EVENT_RATE = 30  # m/s, largest slip rate in the event under way
+FIELDS = 31
 
 # Why a compiled phase returned.
 DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
@@ -56,31 +57,41 @@ COLUMNS = 7
     PEAK_WIDTH_SIZE,  # so close below its maximum the mean stress still is at it
     NEGLIGIBLE,  # rise of the load in a step for which that does not matter
     ARRIVAL,  # slip at which strength has lost half of its way, in units of that at the residual
+    UNSTABLE_RATE,  # slip rate (m/s) that only an instability reaches
     CURVED,  # 0 if strength is that of the linear law, whose pieces are met to the bit
-) = range(23)
-CONTROLS = 23
+) = range(24)
+CONTROLS = 24
 
 
 @jit
-def settle(watch: Array, mean_stress: float, radiated: float) -> None:
-    """An event that is under way is over and was arrested: everything is at rest, or creeps."""
+def settle(watch: Array, control: Array, mean_stress: float, radiated: float) -> None:
+    """End an event that is under way: the mean stress is as high as before, or all is calm."""
     if watch[IN_EVENT] > 0.0:
         watch[IN_EVENT] = 0.0
-        if watch[KINETIC] == -np.inf:  # after global sliding there is nothing left to arrest
+        # After global sliding there is nothing left to arrest.
+        if watch[KINETIC] == -np.inf and watch[EVENT_RATE] > control[UNSTABLE_RATE]:
             watch[ARRESTED] += 1.0
         watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
 
 
 @jit
 def observe(
-    watch: Array, time: float, load: float, mean_stress: float, radiated: float, node: int
+    watch: Array,
+    control: Array,
+    time: float,
+    load: float,
+    mean_stress: float,
+    radiated: float,
+    node: int,
 ) -> Any:
     """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
 
     The fall counts from the last local maximum, and only as far as waves carry it away: where the
     load itself goes down, nothing has become unstable. An event begins when the fall exceeds
-    EVENT_DROP; it was arrested if the stress radiated by slip, Z <V>, then falls below a tenth of
-    that or the mean stress rises above that maximum again before the whole interface slides.
+    EVENT_DROP, and ends when the mean stress rises above that maximum again or everything creeps.
+    It was an arrested instability if a node slipped faster than UNSTABLE_RATE in it: waves that an
+    earlier one has left behind, and creep that they modulate, also make the mean stress fall, but
+    stay slower.
 
     At slow loading all creeping patches are about equally slow at the maximum itself, so that
     the place of the onset is read just after it.
@@ -97,12 +108,13 @@ def observe(
     if watch[PEAK_STRESS] - mean_stress < watch[PEAK_WIDTH] and fall > 0.0:
         watch[PEAK_NODE] = node
     if watch[IN_EVENT] > 0.0:
-        if mean_stress > watch[LOCAL_STRESS] or radiated < 0.1 * watch[EVENT_DROP]:
-            settle(watch, mean_stress, radiated)
+        watch[EVENT_RATE] = max(watch[EVENT_RATE], watch[TOP_RATE])
+        if mean_stress > watch[LOCAL_STRESS]:
+            settle(watch, control, mean_stress, radiated)
     elif mean_stress > watch[LOCAL_STRESS]:
         watch[LOCAL_STRESS], watch[LOCAL_RADIATED] = mean_stress, radiated
     elif fall > watch[EVENT_DROP]:
-        watch[IN_EVENT] = 1.0
+        watch[IN_EVENT], watch[EVENT_RATE] = 1.0, watch[TOP_RATE]
         if watch[FIRST_STRESS] == -np.inf:
             watch[FIRST_STRESS] = watch[LOCAL_STRESS]
     return fall
