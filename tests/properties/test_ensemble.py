@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from stiction.ensemble.plan import chunks, compute
 
 import stiction as st
 from stiction.ensemble.monte_carlo import make_plan
-from stiction.ensemble.plan import chunks, compute
 
 SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
 
