@@ -4,10 +4,10 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from stiction.cli.rupture import _summary
 
 import stiction as st
 from stiction import InputError
-from stiction.cli.rupture import _summary
 from stiction.plot import films
 
 PROBLEM = st.Problem(

@@ -11,9 +11,9 @@ import pytest
 import tomli_w
 import xarray as xr
 from small_study import lengths, small_study
+from stiction.study.setup import read_setup
 
 import stiction as st
-from stiction.study.setup import read_setup
 
 STUDY = small_study(
     title="a small sweep",
