@@ -1,4 +1,4 @@
-"""Inference: affine scaling, densities and the posterior against what they stand for."""
+"""Inference: scaling, densities and the posterior against what they stand for."""
 
 import dataclasses
 
@@ -7,12 +7,12 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.inference.affine import find_affine
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import on_grid
-from stiction.inference.likelihood import make_likelihood, make_model
-from stiction.inference.onset_table import simulate
+from stiction.inference.likelihood import Likelihood, make_model
+from stiction.inference.onset_table import experiments_at, simulate
 from stiction.inference.prior import make_prior
+from stiction.inference.scaling import find_scaling
 from stiction.progress import SILENT
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -52,14 +52,20 @@ def model_of(prior, method=LOCAL, error=0.0, samples=400, **options):
 
 
 def onsets(prior, theta, method, samples=60):
-    found, _ = simulate(
-        prior, np.atleast_2d(theta), method=method, length=None, samples=samples, first=0, seed=3,
-        variable="critical_stress", meter=SILENT,
+    return simulate(
+        experiments_at(prior, np.atleast_2d(theta), method),
+        samples=samples, first=0, seed=3, variable="critical_stress", meter=SILENT,
     )  # fmt: skip
-    return found
 
 
-AFFINE = {
+PRESSED = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6))
+WAVE = 1.0 + 0.7 * np.cos(2.0 * np.pi * np.arange(256) / 256)
+UNEVEN = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6 * WAVE))
+COEFFICIENTS = st.RandomField(
+    st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6), STRENGTH.spectrum, of="friction_coefficient"
+)
+
+SCALING = {
     "bounds": (PROBLEM, STRENGTH, LOCAL, {"marginal.low": (0.4e6, 0.9e6)}, 1),
     "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
     "loc and scale": (
@@ -83,6 +89,14 @@ AFFINE = {
         THREE,
         2,
     ),
+    "coefficients": (PRESSED, COEFFICIENTS, LOCAL, {"marginal.low": (0.1, 0.3)}, 1),
+    "coefficients under a pressure that varies": (
+        UNEVEN,
+        dataclasses.replace(COEFFICIENTS, marginal=scipy.stats.weibull_min(4.0, scale=0.5)),
+        LOCAL,
+        {"marginal.scale": (0.2, 0.8)},
+        1,
+    ),
     "stretch by equilibrium": (
         with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
         with_marginal(scipy.stats.weibull_min(4.0, scale=1e6)),
@@ -93,23 +107,23 @@ AFFINE = {
 }
 
 
-@pytest.mark.parametrize("name", AFFINE)
-def test_affine_parameters_scale_every_onset(name):
-    problem, random, method, prior, count = AFFINE[name]
+@pytest.mark.parametrize("name", SCALING)
+def test_parameters_scale_every_onset(name):
+    problem, random, method, prior, count = SCALING[name]
     prior = make_prior(problem, random, prior)
-    affine = find_affine(prior, method)
-    assert len(affine.keys) == count
+    scaling = find_scaling(prior, method, "critical_stress")
+    assert len(scaling.keys) == count
     for u in (0.15, 0.85):
         theta = prior.theta(np.full((1, prior.dimension), u))
         base = theta.copy()
-        base[0, list(affine.keys)] = affine.reference[list(affine.keys)]
-        shift, stretch = affine.of(theta)
+        base[0, list(scaling.keys)] = scaling.reference[list(scaling.keys)]
+        shift, stretch = scaling.of(theta)
         expected = shift + stretch * onsets(prior, base, method)[0]
         # Round-off of the strength, 1e-9 by the quantile table, and of equilibrium's steps.
         np.testing.assert_allclose(onsets(prior, theta, method)[0], expected, rtol=3e-9)
 
 
-NOT_AFFINE = {
+NOT_SCALING = {
     "critical slip": (with_friction(critical_slip=2e-6), STRENGTH, EXACT, THREE),
     "fracture energy": (with_friction(fracture_energy=1.0), STRENGTH, EXACT, THREE),
     "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, {"marginal.low": (0.4e6, 0.9e6)}),
@@ -127,22 +141,40 @@ NOT_AFFINE = {
         LOCAL,
         {"marginal.low": (0.4e6, 0.9e6)},
     ),
+    "shift of coefficients under a pressure that varies": (
+        UNEVEN,
+        COEFFICIENTS,
+        LOCAL,
+        {"marginal.low": (0.1, 0.3)},
+    ),
+    "gradient load": (
+        dataclasses.replace(PROBLEM, load=st.Load(profile=st.GradientLoad(amplitude=0.4))),
+        STRENGTH,
+        LOCAL,
+        {"marginal.low": (0.4e6, 0.9e6)},
+    ),
+    "normal pressure": (
+        PRESSED,
+        COEFFICIENTS,
+        LOCAL,
+        {"marginal.low": (0.1, 0.3), "problem.load.normal_pressure": (1e6, 2e6)},
+    ),
     "shape": (PROBLEM, STRENGTH, LOCAL, {"marginal.alpha": (1.0, 3.0)}),
     "rounded weights": (PROBLEM, STRENGTH, st.LocalCriterion(weights="rounded"), THREE),
 }
 
 
-@pytest.mark.parametrize("name", NOT_AFFINE)
+@pytest.mark.parametrize("name", NOT_SCALING)
 def test_where_scaling_does_not_hold_it_is_not_used(name):
-    problem, random, method, prior = NOT_AFFINE[name]
-    affine = find_affine(make_prior(problem, random, prior), method)
-    assert affine.keys == ()
-    assert affine.reason
+    problem, random, method, prior = NOT_SCALING[name]
+    scaling = find_scaling(make_prior(problem, random, prior), method, "critical_stress")
+    assert scaling.keys == ()
+    assert scaling.reason
 
 
 def test_a_load_profile_really_breaks_the_scaling():
     """The test above would be met by never scaling: here a shift changes onsets otherwise."""
-    prior = make_prior(*NOT_AFFINE["load profile"][:2], {"marginal.low": (0.4e6, 0.6e6)})
+    prior = make_prior(*NOT_SCALING["load profile"][:2], {"marginal.low": (0.4e6, 0.6e6)})
     low, high = onsets(prior, [[0.4e6], [0.6e6]], LOCAL)
     stretch = (1.66e6 - 0.6e6) / (1.66e6 - 0.4e6)
     scaled = 0.6e6 + stretch * (low - 0.4e6)
@@ -214,9 +246,9 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
     peaks = 1e6 * np.linspace(0.66, 0.78, 7)
     for place in u:
         theta = prior.theta(place[None, :])
-        direct, _ = simulate(
-            prior, theta, method=LOCAL, length=None, samples=2000, first=0, seed=0,
-            variable="critical_stress", meter=SILENT,
+        direct = simulate(
+            experiments_at(prior, theta, LOCAL),
+            samples=2000, first=0, seed=0, variable="critical_stress", meter=SILENT,
         )  # fmt: skip
         exact = log_densities_at(direct[0], peaks, bound=theta[0, 1])
         found = model.log_densities(0, theta, peaks)[0]
@@ -228,7 +260,7 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
 
 def test_points_that_are_given_up_are_hopeless():
     prior = make_prior(PROBLEM, STRENGTH, THREE)
-    likelihood = make_likelihood(model_of(prior), [1e6 * np.linspace(0.68, 0.74, 9)], [None])
+    likelihood = Likelihood(model_of(prior), (1e6 * np.linspace(0.68, 0.74, 9),))
     u = np.random.default_rng(0).random((3000, 3))
     whole = likelihood(u)
     floor = whole.max() - 40.0
@@ -245,7 +277,7 @@ def test_grid_against_a_sum_by_hand():
     model = model_of(prior, error=2e4)
     rng = np.random.default_rng(1)
     peaks = onsets(prior, [[0.66e6]], LOCAL, 12)[0] + 2e4 * rng.standard_normal(12)
-    likelihood = make_likelihood(model, [peaks], [None])
+    likelihood = Likelihood(model, (peaks,))
     u = (np.arange(100_000) + 0.5) / 100_000
     values = likelihood(u[:, None])
     density = np.exp(values - values.max())

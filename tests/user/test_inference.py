@@ -48,7 +48,7 @@ def test_what_a_posterior_says(posterior):
     assert "nats" in str(posterior)
     assert max(posterior.monte_carlo_error.values()) < 0.25
     problem, random = posterior.at(0)
-    assert random.strength.marginal.low == posterior.draws["marginal.low"][0, 0]
+    assert random.strength.marginal.low == posterior.draws["marginal.low"][0]
     assert problem == PROBLEM
 
 
@@ -64,17 +64,6 @@ def test_units_and_labels_do_not_change_it():
         assert other.mean("marginal.low") == pytest.approx(plain.mean("marginal.low"), rel=1e-6)
 
 
-def test_walkers_find_what_the_grid_finds(posterior):
-    walkers = infer(prior=PRIOR, samples=1000, load_cell_error=5e3, sampler="emcee")
-    assert walkers.sampler == "emcee"
-    for name in PRIOR:
-        apart = scipy.stats.ks_2samp(posterior.draws[name].ravel(), walkers.draws[name].ravel())
-        # 32 walkers of 3000 steps and 35 steps of correlation: 3000 independent draws, 0.03.
-        assert apart.statistic < 0.06
-        found = walkers.information[name]
-        assert posterior.information[name] == pytest.approx(found, abs=0.1)
-
-
 def test_arviz(posterior):
     arviz = pytest.importorskip("arviz")
     found = posterior.to_arviz()
@@ -83,17 +72,9 @@ def test_arviz(posterior):
     assert found.log_likelihood.peak.dims[-1] == "test"
     assert found.observed_data.peak.size == PEAKS.size
     whole = found.log_likelihood.peak.sum("test").values
-    theta = np.stack([posterior.draws[name][0, :5] for name in PRIOR], axis=1)
+    theta = np.stack([posterior.draws[name][:5] for name in PRIOR], axis=1)
     np.testing.assert_allclose(posterior.log_likelihood(theta), whole[0, :5], rtol=1e-9)
     assert np.isfinite(arviz.loo(found).elpd_loo)
-
-
-def test_the_picture(posterior, tmp_path):
-    figure = st.plot.posterior(posterior)
-    figure.savefig(tmp_path / "posterior.png")
-    assert (tmp_path / "posterior.png").stat().st_size > 20_000
-    assert len(figure.subfigs[0].axes) == 9
-    assert figure.subfigs[1].axes[0].get_xlabel() == "peak (MPa)"
 
 
 def test_a_second_length_tells_more():
@@ -117,28 +98,6 @@ def test_equilibrium_after_the_local_criterion():
     assert 0.0 < shift < 0.4 * local.draws["marginal.low"].std()
 
 
-def test_positions_tell_where_the_load_varies():
-    x = np.arange(256) / 256
-    problem = dataclasses.replace(
-        PROBLEM, load=st.Load(profile=1.0 + 0.1 * np.cos(2.0 * np.pi * x))
-    )
-    prior = {"correlation_length": PRIOR["correlation_length"]}
-    found = st.monte_carlo(problem, STRENGTH, method=LOCAL, samples=40, seed=2, progress=False)
-    places = found.critical_position.values.copy()
-    places[::4] = np.nan
-    without = infer(found.critical_stress.values, problem, prior=prior, samples=1000)
-    seen = infer(found.critical_stress.values, problem, prior=prior, samples=1000, positions=places)
-    assert seen.log_evidence != pytest.approx(without.log_evidence, abs=1.0)
-    low, high = seen.interval("correlation_length", 0.98)
-    assert low < 0.6 * H_N < high
-
-
-@pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
-def test_positions_on_a_uniform_interface_are_said_to_tell_nothing():
-    with pytest.warns(st.AccuracyWarning, match="positions: say nothing here"):
-        infer(positions=np.full(PEAKS.size, 0.03))
-
-
 @pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
 def test_mixed_specimens_are_noticed():
     mixed = np.concatenate([PEAKS[:12], PEAKS[:12] + 0.15e6])
@@ -158,14 +117,14 @@ BAD = {
     "MPa taken for Pa": (lambda: infer(PEAKS / 1e6), ["below all that the prior", "unit = 'MPa'"]),
     "below the prior": (
         lambda: infer(np.append(PEAKS, 0.2e6)),
-        ["200000 lies below", "a lower marginal.low than 400000"],
+        ["200000 lies below", "lowest come from marginal.low = 400000"],
     ),
     "above the prior": (
         lambda: infer(PEAKS + 1e6, prior=PRIOR),
-        ["lies above", "a higher marginal.low than 900000"],
+        ["lies above", "highest come from", "marginal.low = 900000"],
     ),
     "two peaks": (lambda: infer(PEAKS[:2]), ["peaks: are 2", "at least 3"]),
-    "no peaks": (lambda: infer([]), ["peaks: are none"]),
+    "no peaks": (lambda: infer([]), ["peaks: are 0"]),
     "constant": (lambda: infer([0.7e6] * 5), ["are all 700000", "scatter"]),
     "nan": (lambda: infer([0.7e6, np.nan, 0.71e6]), ["number 1 is nan"]),
     "negative": (lambda: infer([0.7e6, -0.7e6, 0.71e6]), ["positive", "number 1"]),
@@ -185,7 +144,6 @@ BAD = {
         lambda: infer(PEAKS / 1e6, unit="MPa", load_cell_error=5e3),
         ["load_cell_error", "unit of the peaks"],
     ),
-    "position count": (lambda: infer(positions=[0.1]), ["positions", "each of the 30"]),
     "unknown parameter": (lambda: infer(prior={"corelation_length": (1.0, 2.0)}), ["corelation"]),
     "no parameter": (lambda: infer(prior={}), ["prior", "must map"]),
     "same twice": (
@@ -208,9 +166,8 @@ BAD = {
     ),
     "no mode there": (
         lambda: infer(prior={"correlation_length": (1e-3, 1.0)}),
-        ["prior: at correlation_length = 0.316", "no mode is left"],
+        ["prior: at correlation_length = 0.5005", "no mode is left"],
     ),
-    "sampler": (lambda: infer(sampler="nuts"), ["sampler", "'emcee'"]),
     "method": (lambda: infer(method="local"), ["method"]),
     "problem": (lambda: infer(problem=STRENGTH, random=PROBLEM), ["problem", "Problem"]),
     "too many to simulate": (
@@ -254,14 +211,10 @@ def written(tmp_path, text):
 
 
 def test_peaks_from_a_file(tmp_path):
-    text = (
-        "test; peak [MPa]; length [mm]; position [mm]\n1;0,71;100;\n2;0,69;50;12,5\n3;0,7;50;30\n"
-    )
+    text = "test; peak [MPa]; length [mm]; note [1]\n1;0,71;100;\n2;0,69;50;12,5\n3;0,7;50;30\n"
     found = st.read_peaks(written(tmp_path, text))
     assert found.lengths == (0.05, 0.1)
     np.testing.assert_allclose(found.values[0], [0.69e6, 0.7e6])
-    np.testing.assert_allclose(found.positions[0], [0.0125, 0.03])
-    assert found.positions[1] is None
     coefficients = st.read_peaks(written(tmp_path, "friction [-]\n0.31\n0.33\n0.35\n"))
     assert coefficients.coefficients
     assert coefficients.values[0][0] == 0.31

@@ -1,10 +1,10 @@
-"""Designs of tests: what would each be expected to tell, before any is made?"""
+"""Designs of tests: how much each is expected to tell, before any is made."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,7 @@ from stiction._checks import check_count, check_progress, is_finite, is_whole
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import Likelihood, Model, make_likelihood, make_model, varies
+from stiction.inference.likelihood import Likelihood, Model, make_model
 from stiction.inference.posterior import predicted
 from stiction.inference.prior import Prior, make_prior
 from stiction.methods import Method, check_method
@@ -24,34 +24,24 @@ from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, to_dataset
 
-OPTIONS = ("tests", "known", "positions", "load_cell_error")
-REPETITIONS = 60
+OPTIONS = ("tests", "known", "load_cell_error")
 POINTS = 8_000
 """Of the grid of each posterior."""
 UNIFORM = 12.0**-0.5
 """Standard deviation of u before any test."""
+VARIABLES = {
+    "information": "expected information about a parameter, nats",
+    "standard_error": "standard error of the information, nats",
+    "spread_left": "posterior over prior standard deviation, expected",
+}
 
 
-@dataclass(frozen=True)
-class Design:
-    """One way to spend the tests.
-
-    Attributes
-    ----------
-    tests : dict
-        Number of tests by length, m; None for the problem's own.
-    known : tuple of str
-        Parameters that would be known from elsewhere.
-    positions : bool
-        Whether it is seen where slip begins.
-    load_cell_error : float
-        Pa.
-    """
+class Design(NamedTuple):
+    """One way to spend the tests: their number by length (m), what is known, and the error, Pa."""
 
     tests: Mapping[float | None, int]
     known: tuple[str, ...]
-    positions: bool
-    load_cell_error: float
+    error: float
 
 
 def design_of_tests(
@@ -62,33 +52,33 @@ def design_of_tests(
     designs: Mapping[str, Any],
     method: Method,
     load_cell_error: float = 0.0,
-    repetitions: int = REPETITIONS,
+    repetitions: int = 60,
     samples: int | None = None,
     seed: int = 0,
     progress: Show = True,
 ) -> xr.Dataset:
-    """How much is each design of tests expected to tell of each parameter?
+    """Estimate how much each design of tests will tell of each parameter.
 
     Parameters
     ----------
     problem, random, prior, method, samples, seed, progress
         As in `infer`.
     designs : mapping
-        Of names to what would be done: a number of tests, a mapping of lengths (m) to numbers of
-        tests, or a table ``{"tests": ..., "known": [...], "positions": True,
-        "load_cell_error": ...}`` in which ``known`` lists parameters of the prior that would be
-        known from elsewhere, such as a marginal that was measured.
+        Of names to designs: a number of tests, a mapping of lengths (m) to numbers of tests, or a
+        table ``{"tests": ..., "known": [...], "load_cell_error": ...}`` in which ``known`` lists
+        parameters of the prior that are known from elsewhere, such as a marginal that was measured.
     load_cell_error : float
-        Pa, where a design does not say otherwise.
+        Pa, of designs that give none.
     repetitions : int
-        Imagined campaigns of each design.
+        Simulated campaigns of each design.
 
     Returns
     -------
     xarray.Dataset
         Over 'design' and 'parameter': `information`, the expected divergence of the posterior of
         a parameter from its prior (nats; NaN where it is known), `standard_error` of it, and
-        `spread_left`, the expected standard deviation of the posterior over that of the prior.
+        `spread_left`, the expected standard deviation of the posterior over that of the prior, in
+        units in which the prior is uniform.
 
     Raises
     ------
@@ -99,15 +89,14 @@ def design_of_tests(
     -----
     Expected information gain (Lindley, 1956) by nested Monte Carlo: parameters are drawn from the
     prior, peaks from the same onsets that serve the likelihood, and the posterior is that of
-    `infer` on a coarser grid. Known parameters are drawn and then held
-    at what was drawn.
+    `infer` on a coarser grid. Known parameters are drawn and then held at what was drawn.
 
     Examples
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
-    >>> told = st.design_of_tests(
+    >>> expected = st.design_of_tests(
     ...     problem,
     ...     strength,
     ...     prior={"marginal.low": (0.5e6, 0.8e6)},
@@ -115,7 +104,8 @@ def design_of_tests(
     ...     method=st.LocalCriterion(),
     ...     samples=200,
     ... )
-    >>> bool(told.information.sel(design="many") > told.information.sel(design="few"))
+    >>> information = expected.information
+    >>> bool(information.sel(design="many") > information.sel(design="few"))
     True
     """
     check_progress(progress)
@@ -127,28 +117,18 @@ def design_of_tests(
     lengths = list(dict.fromkeys(length for design in found.values() for length in design.tests))
     with Meter("design of tests", show=progress) as meter:
         model = make_model(
-            parameters,
-            method=method,
-            lengths=lengths,
-            error=0.0,
-            samples=samples,
-            seed=seed,
-            variable="critical_stress",
-            meter=meter,
-            scaling=not (varies(problem) and any(d.positions for d in found.values())),
-        )
-        meter.stage("imagined campaigns", repetitions * len(found))
-        told = [
-            _told(model, lengths, design, repetitions, seed, meter) for design in found.values()
-        ]
-    names = ("information", "standard_error", "spread_left")
-    values = dict(zip(names, np.stack(told, axis=1), strict=True))
+            parameters, method=method, lengths=lengths, error=0.0, samples=samples, seed=seed,
+            variable="critical_stress", meter=meter,
+        )  # fmt: skip
+        meter.stage("simulated campaigns", repetitions * len(found))
+        rows = []
+        for design in found.values():
+            specimens = tuple(model.specimens[lengths.index(one)] for one in design.tests)
+            own = replace(model, error=design.error, specimens=specimens)
+            rows.append(_expected(own, design, repetitions, seed, meter))
     dims = ("design", "parameter")
-    variables = {
-        "information": Variable("1", "expected information about a parameter, nats", dims),
-        "standard_error": Variable("1", "standard error of the information, nats", dims),
-        "spread_left": Variable("1", "posterior over prior standard deviation, expected", dims),
-    }
+    variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
+    values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
     coordinates = {
         "design": (np.array(list(found)), Variable("", "design of tests", ("design",))),
         "parameter": (np.array(parameters.names), Variable("", "parameter", ("parameter",))),
@@ -176,56 +156,45 @@ def _designs(given: Any, prior: Prior, error: Any) -> dict[str, Design]:
 
 def _design(given: Any, prior: Prior, error: Any) -> Design:
     table = given if isinstance(given, Mapping) and "tests" in given else {"tests": given}
-    unknown = [key for key in table if key not in OPTIONS]
-    if unknown:
-        raise InputError(f"unknown {unknown[0]!r} (valid: {', '.join(OPTIONS)})")
-    tests = table["tests"]
+    tests, known = table["tests"], table.get("known", ())
     tests = dict(tests) if isinstance(tests, Mapping) else {None: tests}
-    problems = [
-        f"tests: must be whole numbers >= 1, got {describe(count)}"
-        for count in tests.values()
-        if not is_whole(count, 1)
-    ]
-    problems += [
-        f"tests: lengths must be positive numbers in m, got {describe(length)}"
-        for length in tests
-        if length is not None and not (is_finite(length) and length > 0.0)
-    ]
-    known = table.get("known", ())
     known = (known,) if isinstance(known, str) else tuple(known)
-    problems += [
-        f"known: {name!r} is no parameter of the prior ({', '.join(prior.names)})"
-        for name in known
-        if name not in prior.names
-    ]
     error = table.get("load_cell_error", error)
+    problems = [f"unknown {key!r} (valid: {', '.join(OPTIONS)})" for key in table
+                if key not in OPTIONS]  # fmt: skip
+    for length, count in tests.items():
+        if not is_whole(count, 1):
+            problems.append(f"tests: must be whole numbers >= 1, got {describe(count)}")
+        if length is not None and not (is_finite(length) and length > 0.0):
+            problems.append(f"tests: lengths must be positive, in m, got {describe(length)}")
+    for name in known:
+        if name not in prior.names:
+            names = ", ".join(prior.names)
+            problems.append(f"known: {name!r} is no parameter of the prior ({names})")
+    if set(known) == set(prior.names):
+        problems.append("known: every parameter would be known")
     if not (is_finite(error) and error >= 0.0):
         problems.append(f"load_cell_error: must be a number >= 0 in Pa, got {describe(error)}")
-    if problems or len(set(known)) == prior.dimension:
-        raise InputError(problems or "known: every parameter would be known")
-    counts = {length: int(count) for length, count in tests.items()}
-    return Design(counts, known, bool(table.get("positions", False)), float(error))
+    if problems:
+        raise InputError(problems)
+    return Design({length: int(count) for length, count in tests.items()}, known, float(error))
 
 
-def _told(
-    model: Model,
-    lengths: list[float | None],
-    design: Design,
-    repetitions: int,
-    seed: int,
-    meter: Meter,
-) -> Array:
+def _expected(model: Model, design: Design, repetitions: int, seed: int, meter: Meter) -> Array:
     """Information, its standard error and the spread left, of every parameter, (3, parameters)."""
     prior = model.prior
     rng = np.random.default_rng([seed, 2])
-    specimens = tuple(model.specimens[lengths.index(length)] for length in design.tests)
-    own = replace(model, error=design.load_cell_error, specimens=specimens)
     free = [i for i, name in enumerate(prior.names) if name not in design.known]
     gains = np.full((repetitions, prior.dimension), np.nan)
-    left = np.full((repetitions, prior.dimension), np.nan)
-    for number in range(repetitions):
+    left = gains.copy()
+    for row in range(repetitions):
         truth = rng.random(prior.dimension)
-        likelihood = make_likelihood(own, *_campaign(own, design, truth, rng), quiet=True)
+        start = int(rng.integers(2**32))
+        peaks = tuple(
+            predicted(model, number, np.tile(truth, (count, 1)), start + number)
+            for number, count in enumerate(design.tests.values())
+        )
+        likelihood = Likelihood(model, peaks)
 
         def given_what_is_known(
             v: Array, floor: float, truth: Array = truth, likelihood: Likelihood = likelihood
@@ -234,24 +203,14 @@ def _told(
             u[:, free] = v
             return likelihood(u, floor)
 
-        grid = grid_of(given_what_is_known, own.low[free], own.high[free], SILENT, POINTS)
-        for place, i in enumerate(free):
-            gains[number, i] = grid.information(place)
-            left[number, i] = grid.spread(place) / UNIFORM
+        box = model.low[free], model.high[free], SILENT
+        # A posterior may fall between the points of a coarse grid.
+        grid = grid_of(given_what_is_known, *box, POINTS) or grid_of(
+            given_what_is_known, *box, 50 * POINTS
+        )
+        if grid is not None:
+            gains[row, free] = [grid.information(place) for place in range(len(free))]
+            left[row, free] = [grid.spread(place) / UNIFORM for place in range(len(free))]
         meter.advance()
     error = gains.std(axis=0) / np.sqrt(repetitions)
     return np.stack([gains.mean(axis=0), error, left.mean(axis=0)])
-
-
-def _campaign(
-    model: Model, design: Design, truth: Array, rng: np.random.Generator
-) -> tuple[list[Array], list[Array | None]]:
-    """Peaks of one imagined campaign, and positions where they would be seen."""
-    peaks: list[Array] = []
-    places: list[Array | None] = []
-    seed = int(rng.integers(2**32))
-    for number, count in enumerate(design.tests.values()):
-        own, where = predicted(model, number, np.tile(truth, (count, 1)), seed + number)
-        peaks.append(own)
-        places.append(where if design.positions else None)
-    return peaks, places

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.errors import InputError
 from stiction.inference.likelihood import Likelihood
 from stiction.progress import Meter
 
@@ -118,13 +117,13 @@ def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
     return new_low, new_high
 
 
-def on_grid(likelihood: Likelihood, meter: Meter, points: int = POINTS) -> Grid:
-    """The posterior of all parameters by sums over a grid of so many points."""
+def on_grid(likelihood: Likelihood, meter: Meter, points: int = POINTS) -> Grid | None:
+    """The posterior of all parameters by sums over a grid; None if it is zero everywhere."""
     return grid_of(likelihood, likelihood.model.low, likelihood.model.high, meter, points)
 
 
-def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: int) -> Grid:
-    """A density, given by its logarithm and a floor, between two corners.
+def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: int) -> Grid | None:
+    """A density, given by its logarithm and a floor, between two corners; None if it is zero.
 
     The first grid covers all of it; each next one the box that holds all but a millionth of the
     last, until it no longer shrinks by a tenth in any direction. The midpoint rule converges
@@ -136,10 +135,7 @@ def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: i
         values = _evaluated(function, low, high, along, meter)
         top = float(values.max())
         if top == -np.inf:
-            raise InputError(
-                "peaks: no point of the prior can produce all of them; widen the prior, or give"
-                " the load-cell error if they are not exact"
-            )
+            return None
         mass = np.exp(values - top)
         total = float(mass.sum())
         cell = float(np.prod((high - low) / along))

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from stiction._checks import check_choice, check_count, check_progress, is_finite
+from stiction._checks import check_count, check_progress, is_finite
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
-from stiction.inference.agreement import check_agreement, check_reach, piled_up
-from stiction.inference.ensemble_sampler import by_walkers
 from stiction.inference.grid import Grid, on_grid
-from stiction.inference.likelihood import (
-    Likelihood,
-    Model,
-    local_refused,
-    make_likelihood,
-    make_model,
-    varies,
-)
+from stiction.inference.likelihood import Likelihood, local_refused, make_model
+from stiction.inference.onset_table import experiments_at
 from stiction.inference.peaks import Peaks, make_peaks
-from stiction.inference.posterior import BINS, Posterior, monte_carlo_errors
+from stiction.inference.plausibility import (
+    check_agreement,
+    none_within_reach,
+    out_of_reach,
+    piled_up,
+)
+from stiction.inference.posterior import Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
 from stiction.methods import Method, check_method
 from stiction.model import describe
@@ -35,10 +33,13 @@ from stiction.units import factor_to
 
 DRAWS = 4000
 TOLERABLE = 0.25
-"""Monte Carlo error as a share of the posterior's standard deviation that goes without saying."""
-EDGE = 1e-4
+"""Monte Carlo error over the posterior's standard deviation above which it is reported."""
+LOST = 1e-4
 """Mass of the first stage that may be lost on either side of the second."""
 WIDEN = 0.3
+"""Width of the first posterior that is added to the box of the second on either side."""
+NEAR, HELD = 0.05, 1e-3
+"""Share of the box at either end, and mass of the posterior there above which the box grows."""
 
 
 def infer(
@@ -49,45 +50,38 @@ def infer(
     prior: Mapping[str, Any],
     method: Method,
     load_cell_error: float = 0.0,
-    positions: Any = None,
     unit: str = "Pa",
-    sampler: Literal["grid", "emcee"] = "grid",
     samples: int | None = None,
     seed: int = 0,
     progress: Show = True,
 ) -> Posterior:
-    """What do the peak stresses of repeated tests tell of the random strength?
+    """Infer parameters of the random strength from the peak stresses of repeated tests.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface or RandomField
-        What is random, with its known parameters; what it says of those in `prior` is not used.
+        What is random, with its known parameters; its values of those in `prior` are not used.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress at which each specimen slid, in `unit`; for specimens of several lengths
         a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``, with the node
         distance of the problem. Or from `read_peaks`.
     prior : mapping
-        Parameters and what was thought of each before: a frozen continuous `scipy.stats`
-        distribution, a range ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``;
-        they are independent. Keys are those of a sweep. Of the strength, ``"correlation_length"``
-        and ``"marginal.low"`` will do; others are ``"residual_strength.marginal.high"`` or
+        Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a range
+        ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``; they are independent.
+        Keys are those of a sweep. Of the strength, ``"correlation_length"`` and
+        ``"marginal.low"`` will do; others are ``"residual_strength.marginal.high"`` or
         ``"problem.friction.weakening_rate"``.
     method : LocalCriterion, Equilibrium or any other
         How the onset is found. For all but the local criterion that one, where it holds, first
-        finds the part of the prior that matters.
+        finds the part of the prior that matters, which grows until it holds the posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
         coefficient.
-    positions : array or mapping of arrays, optional
-        Where slip began in each test, m; NaN where it was not seen. It tells something only where
-        load or friction vary along the interface.
     unit : str
         Of peaks and load-cell error: that of a stress, or "1" for coefficients of friction, which
         need ``Load(normal_pressure=...)``.
-    sampler : {"grid", "emcee"}
-        Sums on a grid that closes in, for up to four parameters or so; or emcee's walkers.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
         equilibrium.
@@ -99,7 +93,8 @@ def infer(
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval`, `information` (nats), `to_arviz()` and `plot()`.
+        With `draws`, `mean`, `interval`, `information` (nats) and `to_arviz()`;
+        `stiction.plot.posterior` draws it.
 
     Raises
     ------
@@ -110,16 +105,17 @@ def infer(
     Warns
     -----
     AccuracyWarning
-        If affine scaling does not hold and every parameter is simulated; the posterior piles up at
-        an end of the prior; the number of simulated samples matters; or the peaks fall into
-        groups that one population does not show.
+        If the posterior piles up at an end of the prior; the number of simulated samples matters;
+        or the peaks fall into groups that one population does not show.
 
     Notes
     -----
     The likelihood is a kernel density of simulated onsets, joined with the error of the load cell.
     Parameters that only shift and stretch the strength need no simulation: see
-    `stiction.inference.affine` for when the onset follows them exactly. The others are simulated
-    on a grid with the same draws everywhere, and interpolated.
+    `stiction.inference.scaling` for when the onset follows them exactly. The others are simulated
+    on a grid with the same draws everywhere, and interpolated. The posterior is summed on a grid
+    that closes in on it, for up to four parameters or so; for more, give `log_likelihood` and
+    `prior_transform` of the result to emcee or dynesty.
 
     Examples
     --------
@@ -137,30 +133,24 @@ def infer(
     """
     check_progress(progress)
     check_method(method)
-    check_choice("sampler", sampler, ("grid", "emcee"))
     seed = check_count("seed", seed, 0)
     if samples is not None:
         samples = check_count("samples", samples, 100)
-    measured = make_peaks(peaks, positions, unit)
-    error = _load_cell(load_cell_error, unit, measured, si=isinstance(peaks, Peaks))
+    measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
     check_pressure(parameters, measured)
     options: dict[str, Any] = {
         "lengths": measured.lengths,
-        "error": error,
-        "samples": samples,
+        "error": _load_cell(load_cell_error, unit, measured, si=isinstance(peaks, Peaks)),
         "seed": seed,
         "variable": measured.variable,
-        "scaling": not (varies(problem) and any(p is not None for p in measured.positions)),
     }
     with Meter("infer", show=progress) as meter:
-        _, middle = parameters.at(parameters.theta(np.full((1, parameters.dimension), 0.5))[0])
-        problem.warn_of_units(middle.strength.mean)
-        model, found = _modelled(parameters, method, measured, options, meter)
-        likelihood = make_likelihood(model, measured.values, measured.positions)
-        if found is None:
-            check_reach(likelihood)
-        return _posterior(likelihood, measured, sampler, seed, meter)
+        middle = parameters.theta(np.full((1, parameters.dimension), 0.5))
+        (own,) = experiments_at(parameters, middle, method)
+        own.problem.warn_of_units(own.mean("strength"))
+        likelihood, grid = _located(parameters, method, measured, samples, options, meter)
+        return _posterior(likelihood, grid, measured, seed, meter)
 
 
 def _load_cell(given: Any, unit: str, peaks: Peaks, si: bool) -> float:
@@ -171,8 +161,7 @@ def _load_cell(given: Any, unit: str, peaks: Peaks, si: bool) -> float:
         )
     factor = 1.0 if si else factor_to("1" if peaks.coefficients else "Pa", unit)
     error = float(given) * factor
-    values = np.concatenate(peaks.values)
-    if error > values.max():
+    if error > np.concatenate(peaks.values).max():
         raise InputError(
             f"load_cell_error: {given:g} {unit} is more than the largest peak; it is a standard"
             " deviation in the unit of the peaks"
@@ -190,102 +179,119 @@ def check_pressure(prior: Prior, peaks: Peaks) -> None:
         )
 
 
-def _modelled(
-    prior: Prior, method: Any, peaks: Peaks, options: dict[str, Any], meter: Meter
-) -> tuple[Model, Grid | None]:
-    """The model by a method; where it is dear, on the part of the prior that matters."""
-    if method.type == "local_criterion" or local_refused(prior):
-        return make_model(prior, method=method, meter=meter, **options), None
-    first = make_model(prior, method=LocalCriterion(), meter=meter, **(options | {"samples": None}))
-    likelihood = make_likelihood(first, peaks.values, [None] * len(peaks.values))
-    check_reach(likelihood)
-    grid = on_grid(likelihood, meter)
-    low, high = region(grid)
-    model = make_model(prior, method=method, meter=meter, low=low, high=high, **options)
-    return model, grid
+def _located(
+    prior: Prior,
+    method: Any,
+    peaks: Peaks,
+    samples: int | None,
+    options: Mapping[str, Any],
+    meter: Meter,
+) -> tuple[Likelihood, Grid]:
+    """The likelihood in a box of the prior that holds the posterior, and the posterior."""
+    low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
+    if method.type != "local_criterion" and not local_refused(prior):
+        low, high = _first_box(prior, peaks, options, meter)
+    while True:
+        model = make_model(
+            prior, method=method, samples=samples, low=low, high=high, meter=meter, **options
+        )
+        likelihood = Likelihood(model, peaks.values)
+        whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
+        if whole and (problems := out_of_reach(likelihood)):
+            raise InputError(problems)
+        meter.stage("posterior")
+        grid = on_grid(likelihood, meter)
+        if grid is None and whole:
+            raise InputError(
+                "peaks: no point of the prior can produce all of them; widen the prior, or give"
+                " the load-cell error if they are not exact"
+            )
+        new_low, new_high = (0.0 * low, 0.0 * low + 1.0) if grid is None else grown(grid, low, high)
+        if grid is not None and np.all(new_low == low) and np.all(new_high == high):
+            return likelihood, grid
+        low, high = new_low, new_high
 
 
-def region(grid: Grid) -> tuple[Array, Array]:
-    """The box, as u, that holds a posterior with room for one that is a little elsewhere."""
+def _first_box(
+    prior: Prior, peaks: Peaks, options: Mapping[str, Any], meter: Meter
+) -> tuple[Array, Array]:
+    """Corners, as u, between which the local criterion finds the posterior.
+
+    All of the prior if it cannot produce the peaks: where nodes reach their residual strength
+    before the onset, the other methods may.
+    """
+    model = make_model(prior, method=LocalCriterion(), samples=None, meter=meter, **options)
+    likelihood = Likelihood(model, peaks.values)
+    problems = out_of_reach(likelihood)
+    if none_within_reach(likelihood):
+        raise InputError(problems)
+    grid = None if problems else on_grid(likelihood, meter)
+    if grid is None:
+        return np.zeros(prior.dimension), np.ones(prior.dimension)
     low, high = [], []
-    for axis in range(grid.mass.ndim):
-        mass = np.cumsum(grid.marginal(axis))
-        centres = grid.centres(axis)
-        first = float(centres[int(np.searchsorted(mass, EDGE))])
-        last = float(centres[min(int(np.searchsorted(mass, 1.0 - EDGE)), centres.size - 1)])
+    for axis in range(prior.dimension):
+        mass, centres = np.cumsum(grid.marginal(axis)), grid.centres(axis)
+        first = float(centres[np.searchsorted(mass, LOST)])
+        last = float(centres[min(np.searchsorted(mass, 1.0 - LOST), centres.size - 1)])
         room = max(WIDEN * (last - first), 1e-3)
         low.append(max(0.0, first - room))
         high.append(min(1.0, last + room))
     return np.array(low), np.array(high)
 
 
+def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
+    """The box, wider by its width on each side where the posterior reaches its end."""
+    new_low, new_high = low.copy(), high.copy()
+    for axis, width in enumerate(high - low):
+        mass, centres = grid.marginal(axis), grid.centres(axis)
+        if mass[centres < low[axis] + NEAR * width].sum() > HELD:
+            new_low[axis] = max(0.0, low[axis] - width)
+        if mass[centres > high[axis] - NEAR * width].sum() > HELD:
+            new_high[axis] = min(1.0, high[axis] + width)
+    return new_low, new_high
+
+
 def _posterior(
-    likelihood: Likelihood, peaks: Peaks, sampler: str, seed: int, meter: Meter
+    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, meter: Meter
 ) -> Posterior:
     model = likelihood.model
     prior = model.prior
-    diagnostics: dict[str, float] = {}
-    total = evidence = float("nan")
-    meter.stage("posterior")
-    if sampler == "grid":
-        grid = on_grid(likelihood, meter)
-        u = grid.draws(DRAWS, seed)[None]
-        information = {name: grid.information(i) for i, name in enumerate(prior.names)}
-        total, evidence = grid.gain, grid.log_evidence
-    else:
-        u, diagnostics = by_walkers(likelihood, meter, seed)
-        information = {name: divergence(u[..., i].ravel()) for i, name in enumerate(prior.names)}
+    u = grid.draws(DRAWS, seed)
     meter.stage("Monte Carlo error")
-    flat = u.reshape(-1, prior.dimension)
-    few = flat[:: max(1, flat.shape[0] // 2000)]
-    errors = dict(zip(prior.names, map(float, monte_carlo_errors(likelihood, few)), strict=True))
-    theta = prior.theta(flat).reshape(u.shape)
+    errors = dict(zip(prior.names, monte_carlo_errors(likelihood, u[::2]).tolist(), strict=True))
+    theta = prior.theta(u)
     posterior = Posterior(
         names=prior.names,
-        draws={name: theta[..., i] for i, name in enumerate(prior.names)},
-        information=information,
-        total_information=total,
-        log_evidence=evidence,
+        draws={name: theta[:, i] for i, name in enumerate(prior.names)},
+        information={name: grid.information(i) for i, name in enumerate(prior.names)},
+        total_information=grid.gain,
+        log_evidence=grid.log_evidence,
         monte_carlo_error=errors,
-        sampler=sampler,
         method=model.method.label,
         peaks=peaks,
-        notes=_notes(likelihood, errors, flat),
+        notes=_notes(likelihood, errors, u),
         likelihood=likelihood,
         u=u,
         seed=seed,
-        diagnostics=diagnostics,
     )
     check_agreement(peaks, posterior.predicted)
     return posterior
 
 
 def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tuple[str, ...]:
-    """What has to be said of the posterior; what is serious is a warning as well."""
+    """What limits the posterior; what is serious is a warning as well."""
     model = likelihood.model
-    notes = []
     worst = max(errors, key=lambda name: errors[name])
     serious = [piled_up(model, u)]
     if errors[worst] > TOLERABLE:
-        samples = model.specimens[0].table.peaks.shape[1]
+        samples = model.specimens[0].onsets.shape[1]
         serious.append(
             f"the mean of {worst} is uncertain by {errors[worst]:.0%} of its standard deviation"
             f" because only {samples} samples were simulated at each point; give more samples"
         )
-    for text in filter(None, serious):
+    notes = [text for text in serious if text]
+    for text in notes:
         warn_accuracy(text)
-        notes.append(text)
-    if model.affine.reason:
-        notes.append(f"every parameter was simulated: {model.affine.reason}")
+    if model.scaling.reason:
+        notes.append(f"every parameter was simulated: {model.scaling.reason}")
     return tuple(notes)
-
-
-def divergence(u: Array) -> float:
-    """Divergence of draws in [0, 1] from the uniform distribution, nats, by a histogram.
-
-    With the correction of Miller and Madow for the number of draws.
-    """
-    counts = np.histogram(u, bins=BINS, range=(0.0, 1.0))[0]
-    share = counts[counts > 0] / counts.sum()
-    bias = (share.size - 1) / (2.0 * counts.sum())
-    return max(0.0, float(np.sum(share * np.log(share * BINS))) - bias)

@@ -1,4 +1,4 @@
-"""Measured peaks: checked, in SI units, one array for each kind of specimen."""
+"""Measured peaks: validated, in SI units, one array for each kind of specimen."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from stiction.errors import InputError
 from stiction.model import describe
 from stiction.profile_files import decoded
 from stiction.profile_text import read_table
-from stiction.units import factor_to, parse
+from stiction.units import factor_to
 
 FEWEST = 3
-"""Peaks in all; two numbers tell neither a spread nor a mistake."""
+"""Peaks in all; of two numbers, one may be a mistake."""
 PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH = ("length", "specimen")
-POSITION = ("position", "place", "x")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +33,12 @@ class Peaks:
         m, one for each kind of specimen; None for that of the problem.
     values : tuple of arrays
         Peaks of each kind: Pa, or coefficients of friction.
-    positions : tuple of arrays or None
-        Where slip began, m, NaN where it was not seen; None for a kind where none was.
     coefficients : bool
         Whether the peaks are coefficients of friction.
     """
 
     lengths: tuple[float | None, ...]
     values: tuple[Array, ...]
-    positions: tuple[Array | None, ...]
     coefficients: bool
 
     @property
@@ -63,8 +59,8 @@ class Peaks:
         return ", ".join(kinds)
 
 
-def make_peaks(peaks: Any, positions: Any = None, unit: str = "Pa") -> Peaks:
-    """Checked peaks from an array, a mapping of arrays by length, or `Peaks` as they are.
+def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
+    """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are.
 
     Raises
     ------
@@ -72,108 +68,80 @@ def make_peaks(peaks: Any, positions: Any = None, unit: str = "Pa") -> Peaks:
         Naming all that is wrong.
     """
     if isinstance(peaks, Peaks):
-        if positions is not None:
-            raise InputError("positions: are given with the peaks already; leave them out")
         return peaks
     factor, coefficients = _unit(unit)
-    if isinstance(peaks, Mapping):
-        groups = dict(peaks)
-        wrong = [key for key in groups if not (is_finite(key) and key > 0.0)]
-        if wrong or not groups:
-            raise InputError(
-                "peaks: of several specimens must map each length (m) to its peaks, such as"
-                f" {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
-            )
-        where: dict[Any, Any] = dict.fromkeys(groups) if positions is None else positions
-        if not isinstance(where, Mapping) or set(where) - set(groups):
-            raise InputError("positions: must map the same lengths to positions as the peaks do")
-    else:
-        groups, where = {None: peaks}, {None: positions}
+    groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
+    wrong = [key for key in groups if key is not None and not (is_finite(key) and key > 0.0)]
+    if wrong or not groups:
+        raise InputError(
+            "peaks: of several specimens must map each length (m) to its peaks, such as"
+            f" {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
+        )
     problems: list[str] = []
-    values, places = [], []
+    values = []
     for length, given in groups.items():
         name = "peaks" if length is None else f"peaks at {length:g} m"
         try:
-            values.append(_values(name, given, factor, unit))
-            places.append(_places(where.get(length), values[-1].size, name))
+            values.append(factor * _values(name, given, unit))
         except InputError as error:
             problems += error.problems
-    if not problems:
-        problems = _doubtful(np.concatenate(values), coefficients)
+    problems = problems or _doubtful(np.concatenate(values), coefficients)
     if problems:
         raise InputError(problems)
     lengths = tuple(None if length is None else float(length) for length in groups)
-    return Peaks(lengths, tuple(values), tuple(places), coefficients)
+    return Peaks(lengths, tuple(values), coefficients)
 
 
 def _unit(unit: Any) -> tuple[float, bool]:
-    """Factor to SI, and whether it is a pure number."""
+    """Factor to SI, and whether the unit is that of a pure number."""
     if not isinstance(unit, str):
         raise InputError(f"unit: must be text such as 'MPa' or '1', got {describe(unit)}")
-    known = parse(unit)
-    if known is not None and known.dimension == (0, 0, 0):
-        return known.factor, True
-    if known is not None and known.dimension == (1, 1, -2):
-        raise InputError(
-            f"unit: peaks are in {unit}, a force; divide by the area of the interface and give a"
-            " stress, or by the normal force and give a coefficient of friction (unit = '1')"
-        )
+    for si, coefficients in (("1", True), ("Pa", False)):
+        try:
+            return factor_to(si, unit), coefficients
+        except InputError as error:
+            problems = error.problems
     try:
-        return factor_to("Pa", unit), False
-    except InputError as error:
-        raise InputError([f"unit: {text}" for text in error.problems]) from None
+        factor_to("N", unit)
+    except InputError:
+        raise InputError([f"unit: {text}" for text in problems]) from None
+    raise InputError(
+        f"unit: peaks are in {unit}, a force; divide by the area of the interface and give a"
+        " stress, or by the normal force and give a coefficient of friction (unit = '1')"
+    )
 
 
-def _values(name: str, given: Any, factor: float, unit: str) -> Array:
-    stated = getattr(given, "attrs", {}).get("units")
-    if stated is not None:
-        own, coefficient = _unit(str(stated))
-        if coefficient != _unit(unit)[1]:
-            raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
-        factor = own
+def _values(name: str, given: Any, unit: str) -> Array:
+    """Peaks of one kind of specimen, in `unit`."""
     ragged = isinstance(given, list | tuple) and any(np.ndim(one) for one in given)
-    values = numbers(name, getattr(given, "values", given)) if not ragged else np.empty((0, 0))
+    values = np.empty((0, 0)) if ragged else numbers(name, getattr(given, "values", given))
     if values.ndim != 1:
         raise InputError(
             f"{name}: must be one list of numbers for one kind of specimen, got"
             f" {describe(given)}; of several specimens map each length (m) to its peaks:"
             " {0.1: [...], 0.2: [...]}"
         )
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
+        more = f", and {bad.size - 1} more are not positive" if bad.size > 1 else ""
         raise InputError(
-            f"{name}: number {bad[0]} is {values[bad[0]]:g}"
-            f"{f', and {bad.size - 1} more' if bad.size > 1 else ''}; leave out tests that gave no"
-            " peak, and count them"
+            f"{name}: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}{more}; leave"
+            " out tests that gave no peak"
         )
-    if values.size and values.min() <= 0.0:
-        raise InputError(
-            f"{name}: must be positive, number {int(values.argmin())} is {values.min():g}"
-        )
-    if not values.size:
-        raise InputError(f"{name}: are none")
-    return values * factor
-
-
-def _places(given: Any, count: int, name: str) -> Array | None:
-    if given is None:
-        return None
-    places = numbers("positions", getattr(given, "values", given))
-    if places.shape != (count,):
-        raise InputError(
-            f"positions: must be one for each of the {count} {name} (nan where it was not seen),"
-            f" got shape {places.shape}"
-        )
-    if np.isinf(places).any():
-        raise InputError("positions: must be finite, or nan where slip was not seen")
-    return None if np.isnan(places).all() else places
+    stated = getattr(given, "attrs", {}).get("units")
+    if stated is not None:
+        (own, coefficients), (asked, expected) = _unit(str(stated)), _unit(unit)
+        if coefficients != expected:
+            raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
+        values = values * (own / asked)
+    return values
 
 
 def _doubtful(values: Array, coefficients: bool) -> list[str]:
     if values.size < FEWEST:
         return [
-            f"peaks: are {values.size}; at least {FEWEST} are needed, and fewer than about ten tell"
-            " little: see st.design_of_tests"
+            f"peaks: are {values.size}; at least {FEWEST} are needed, and fewer than about ten"
+            " constrain little: see st.design_of_tests"
         ]
     if np.ptp(values) == 0.0:
         return [
@@ -186,16 +154,15 @@ def _doubtful(values: Array, coefficients: bool) -> list[str]:
 
 
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
-    """Peaks of repeated tests from a text file.
+    """Read the peaks of repeated tests from a text file.
 
     Parameters
     ----------
     path : path
         A table, separated by commas, semicolons, tabs or blanks, one test a line, with a heading.
         One column is called peak, stress, strength or friction, with its unit: ``peak [MPa]``; a
-        coefficient of friction has the unit 1 or -. Others may be length, of the specimen, and
-        position, where slip began, empty where it was not seen: ``length [mm]``,
-        ``position [mm]``. Columns of other names are not read.
+        coefficient of friction has the unit 1 or -. Another may be the length of the specimen:
+        ``length [mm]``. Columns of other names are not read.
     unit : str, optional
         Of the peaks, where the file states none.
 
@@ -221,65 +188,44 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     """
     path = as_path("path", path)
     try:
-        table = read_table(decoded(path))
+        return _from_table(read_table(decoded(path)), unit)
     except InputError as error:
         raise InputError([f"{path}: {text}" for text in error.problems]) from None
-    peak = _column(path, table.names, PEAK, "peak")
+
+
+def _from_table(table: Any, unit: str | None) -> Peaks:
+    peak = _column(table.names, PEAK, "peak")
     if peak is None and table.columns.shape[0] == 1:
         peak = 0
     if peak is None:
         found = ", ".join(str(name) for name in table.names)
-        raise InputError(f"{path}: no column is called peak [MPa] or the like; found {found}")
+        raise InputError(f"no column is called peak [MPa] or the like; found {found}")
     stated = table.units[peak] or unit
     if stated is None:
         raise InputError(
-            f"{path}: the unit of the peaks is not stated; write it into the heading, 'peak [MPa]',"
-            " or give unit="
+            "the unit of the peaks is not stated; write it into the heading, 'peak [MPa]', or give"
+            " unit="
         )
     if unit is not None and unit != stated:
-        raise InputError(f"{path}: the peaks are in {stated} by the heading, but unit = {unit!r}")
-    metres = {
-        name: _metres(path, table, name, kinds)
-        for name, kinds in (("length", LENGTH), ("position", POSITION))
-    }
-    values, lengths, places = table.columns[peak], metres["length"], metres["position"]
-    try:
-        if lengths is None:
-            return make_peaks(values, places, stated)
-        if not np.isfinite(lengths).all():
-            line = int(np.argmin(np.isfinite(lengths)))
-            raise InputError(
-                f"length: missing in row {line}; specimens of unknown length are mixed in"
-            )
-        own = {float(one): lengths == one for one in np.unique(lengths)}
-        return make_peaks(
-            {length: values[rows] for length, rows in own.items()},
-            None if places is None else {length: places[rows] for length, rows in own.items()},
-            stated,
-        )
-    except InputError as error:
-        raise InputError([f"{path}: {text}" for text in error.problems]) from None
+        raise InputError(f"the peaks are in {stated} by the heading, but unit = {unit!r}")
+    values, column = table.columns[peak], _column(table.names, LENGTH, "length")
+    if column is None:
+        return make_peaks(values, stated)
+    metre = table.units[column]
+    if metre is None:
+        raise InputError("the unit of the length is not stated; write 'length [mm]'")
+    lengths = table.columns[column] * factor_to("m", metre)
+    if not np.isfinite(lengths).all():
+        line = int(np.argmin(np.isfinite(lengths)))
+        raise InputError(f"length: missing in row {line}; specimens of unknown length are mixed in")
+    return make_peaks({one: values[lengths == one] for one in np.unique(lengths)}, stated)
 
 
-def _column(path: Path, names: Any, kinds: tuple[str, ...], what: str) -> int | None:
+def _column(names: Any, kinds: tuple[str, ...], what: str) -> int | None:
     """The one column whose name begins with one of some words."""
     words = [str(name or "").lower().split() for name in names]
     found = [i for i, word in enumerate(words) if word and word[0].strip("_:.") in kinds]
     if len(found) > 1:
         both = " and ".join(repr(names[i]) for i in found)
-        raise InputError(f"{path}: {both} may both be the {what}; rename one")
+        raise InputError(f"{both} may both be the {what}; rename one")
     return found[0] if found else None
-
-
-def _metres(path: Path, table: Any, name: str, kinds: tuple[str, ...]) -> Array | None:
-    column = _column(path, table.names, kinds, name)
-    if column is None:
-        return None
-    stated = table.units[column]
-    if stated is None:
-        raise InputError(f"{path}: the unit of the {name} is not stated; write '{name} [mm]'")
-    try:
-        values: Array = table.columns[column] * factor_to("m", stated)
-    except InputError as error:
-        raise InputError([f"{path}: {name}: {text}" for text in error.problems]) from None
-    return values

@@ -1,11 +1,11 @@
-"""What the tests have told: draws, intervals, information gained, and how far to trust them."""
+"""The posterior: draws, intervals, information gained, and how accurate they are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,46 +14,39 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
+from stiction.inference.onset_table import corners
 from stiction.inference.peaks import Peaks
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
-if TYPE_CHECKING:
-    pass
-
-BINS = 40
-
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Parameters after the tests, beside what was thought of them before.
+    """Posterior of the parameters, together with their prior.
 
     Attributes
     ----------
     names : tuple of str
         The keys of the prior.
-    draws : dict of arrays
-        Draws of each parameter, (chains, draws), in its own unit.
+    draws : dict of (draws,) arrays
+        Of each parameter, in its own unit.
     information : dict of float
-        How much the tests told of each parameter alone: Kullback-Leibler divergence of its
-        posterior from its prior, nats. 0 is nothing; ln 2 = 0.69 halves a uniform range.
+        Kullback-Leibler divergence of the posterior of each parameter alone from its prior, nats.
+        0 is nothing; ln 2 = 0.69 halves a uniform range.
     total_information : float
-        The same of all parameters together; NaN by emcee, which does not tell.
+        The same of all parameters together.
     log_evidence : float
-        Logarithm of the density of the peaks under the prior, for comparing models; NaN by emcee.
+        Logarithm of the density of the peaks under the prior, for comparing models.
     monte_carlo_error : dict of float
         Standard error of the posterior mean that is due to the number of simulated samples, as a
         share of the standard deviation of the posterior.
-    sampler : {"grid", "emcee"}
     method : str
         By what the onset was found.
     peaks : Peaks
         What was measured.
     notes : tuple of str
-        What had to be said of the likelihood.
-    diagnostics : dict
-        Numbers that belong to the sampler.
+        What limits the result.
     """
 
     names: tuple[str, ...]
@@ -62,26 +55,28 @@ class Posterior:
     total_information: float
     log_evidence: float
     monte_carlo_error: Mapping[str, float]
-    sampler: str
     method: str
     peaks: Peaks
     notes: tuple[str, ...]
     likelihood: Likelihood = field(repr=False)
     u: Array = field(repr=False)
     seed: int = 0
-    diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
 
-    def _flat(self, name: str) -> Array:
+    def _draws(self, name: str) -> Array:
         if name not in self.draws:
             raise InputError(f"name: must be one of {', '.join(self.names)}, got {describe(name)}")
-        return self.draws[name].ravel()
+        return self.draws[name]
+
+    @property
+    def _prior(self) -> Any:
+        return self.likelihood.model.prior
 
     def mean(self, name: str) -> float:
-        """Posterior mean of a parameter."""
-        return float(self._flat(name).mean())
+        """Return the posterior mean of a parameter."""
+        return float(self._draws(name).mean())
 
     def interval(self, name: str, confidence: float = 0.9) -> tuple[float, float]:
-        """Central credible interval of a parameter.
+        """Return the central credible interval of a parameter.
 
         Parameters
         ----------
@@ -89,38 +84,36 @@ class Posterior:
         confidence : float
             Between 0 and 1.
         """
-        if not (is_finite(confidence) and 0.0 < confidence < 1.0):
-            raise InputError(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
-        tail = 0.5 * (1.0 - confidence)
-        low, high = np.quantile(self._flat(name), [tail, 1.0 - tail])
+        low, high = np.quantile(self._draws(name), _tails(confidence))
         return float(low), float(high)
 
     def prior_interval(self, name: str, confidence: float = 0.9) -> tuple[float, float]:
-        """The same of the prior."""
-        self._flat(name)
-        tail = 0.5 * (1.0 - confidence)
-        prior = self.likelihood.model.prior
-        ends = prior.theta(np.full((2, prior.dimension), [[tail], [1.0 - tail]]))
-        low, high = ends[:, self.names.index(name)]
+        """Return the same interval of the prior."""
+        self._draws(name)
+        u = np.tile(_tails(confidence)[:, None], (1, len(self.names)))
+        low, high = self._prior.theta(u)[:, self.names.index(name)]
         return float(low), float(high)
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
-        """Problem and what is random at one draw, to compute with: 0 to the number of draws - 1."""
-        theta = np.array([self._flat(name)[draw] for name in self.names])
-        return self.likelihood.model.prior.at(theta)
+        """Return the problem and what is random at one draw, to compute with."""
+        found: tuple[Problem, RandomInterface] = self._prior.at(
+            np.array([self.draws[name][draw] for name in self.names])
+        )
+        return found
 
     def prior_transform(self, u: Any) -> Array:
-        """Parameters at points u of the unit cube, in which the prior is uniform.
+        """Return the parameters at points u of the unit cube, in which the prior is uniform.
 
         Parameters
         ----------
         u : (parameters,) or (points, parameters) array
         """
         given = numbers("u", u)
-        return self.likelihood.model.prior.theta(np.atleast_2d(given)).reshape(given.shape)
+        found: Array = self._prior.theta(np.atleast_2d(given)).reshape(given.shape)
+        return found
 
     def log_likelihood(self, theta: Any) -> Array | float:
-        """Logarithm of the likelihood of all peaks.
+        """Return the logarithm of the likelihood of all peaks.
 
         Parameters
         ----------
@@ -138,17 +131,17 @@ class Posterior:
             raise InputError(
                 f"theta: must have shape ({wanted},) or (points, {wanted}), got {given.shape}"
             )
-        found = self.likelihood(self.likelihood.model.prior.u(np.atleast_2d(given)))
+        found = self.likelihood(self._prior.u(np.atleast_2d(given)))
         return float(found[0]) if given.ndim == 1 else found
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
-        """Peaks that more tests would show, a draw each, for every kind of specimen."""
-        model, u = self.likelihood.model, self.u.reshape(-1, self.u.shape[-1])
-        return tuple(predicted(model, i, u, self.seed)[0] for i in range(len(model.specimens)))
+        """Peaks of further tests, one for each draw, for every kind of specimen."""
+        model = self.likelihood.model
+        return tuple(predicted(model, i, self.u, self.seed) for i in range(len(model.specimens)))
 
     def to_arviz(self) -> Any:
-        """An `arviz.InferenceData` with posterior, prior, log-likelihood, prediction and data.
+        """Return an `arviz.InferenceData`: posterior, prior, log-likelihood, prediction, data.
 
         Raises
         ------
@@ -161,34 +154,36 @@ class Posterior:
             raise InputError(
                 "to_arviz: needs the package arviz; pip install 'stiction[inference]'"
             ) from None
-        chains, count = self.u.shape[:2]
-        prior = self.likelihood.model.prior
-        rng = np.random.default_rng(self.seed)
-        before = prior.theta(rng.random((count, prior.dimension)))
-        each = self.likelihood.each(self.u.reshape(-1, prior.dimension))
-        measured = np.concatenate(self.peaks.values)
-        name = "friction_coefficient" if self.peaks.coefficients else "peak"
-        lengths = [
-            np.full(values.size, np.nan if length is None else length)
-            for length, values in zip(self.peaks.lengths, self.peaks.values, strict=True)
+        count = self.u.shape[0]
+        before = self._prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
+        kinds = list(zip(self.peaks.lengths, self.peaks.values, strict=True))
+        lengths = [np.full(own.size, np.nan if at is None else at) for at, own in kinds]
+        more = [
+            np.broadcast_to(peaks[:, None], (count, own.size))
+            for peaks, (_, own) in zip(self.predicted, kinds, strict=True)
         ]
-        more = [np.repeat(own.reshape(chains, count, 1), values.size, axis=2) for own, values in
-                zip(self.predicted, self.peaks.values, strict=True)]  # fmt: skip
+        name = "friction_coefficient" if self.peaks.coefficients else "peak"
         return arviz.from_dict(
-            posterior=dict(self.draws),
+            posterior={key: own[None] for key, own in self.draws.items()},
             prior={key: before[None, :, i] for i, key in enumerate(self.names)},
-            log_likelihood={name: each.reshape(chains, count, measured.size)},
-            posterior_predictive={name: np.concatenate(more, axis=2)},
-            observed_data={name: measured},
+            log_likelihood={name: self.likelihood.each(self.u)[None]},
+            posterior_predictive={name: np.concatenate(more, axis=1)[None]},
+            observed_data={name: np.concatenate(self.peaks.values)},
             constant_data={"specimen_length": np.concatenate(lengths)},
-            coords={"test": np.arange(measured.size)},
+            coords={"test": np.arange(self.peaks.count)},
             dims={name: ["test"], "specimen_length": ["test"]},
-            attrs={"sampler": self.sampler, "method": self.method},
+            attrs={"method": self.method},
         )
+
+    def plot(self) -> Any:
+        """Posterior against prior, pairs, and predicted against measured peaks."""
+        from stiction.inference.posterior_figure import posterior_figure
+
+        return posterior_figure(self)
 
     def __str__(self) -> str:
         width = max(map(len, self.names))
-        lines = [f"{self.peaks}; onset by {self.method}, posterior by {self.sampler}"]
+        lines = [f"{self.peaks}; onset by {self.method}"]
         for name in self.names:
             low, high = self.interval(name)
             before = self.prior_interval(name)
@@ -200,19 +195,24 @@ class Posterior:
         return "\n".join(lines)
 
 
-def predicted(model: Model, number: int, u: Array, seed: int) -> tuple[Array, Array]:
-    """A peak and a position of specimen `number` at each of some points u (points, parameters)."""
+def _tails(confidence: float) -> Array:
+    if not (is_finite(confidence) and 0.0 < confidence < 1.0):
+        raise InputError(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
+    return np.array([0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence])
+
+
+def predicted(model: Model, number: int, u: Array, seed: int) -> Array:
+    """A peak of specimen `number` at each of some points u (points, parameters)."""
     rng = np.random.default_rng([seed, 1])
     theta = model.prior.theta(u)
-    shift, stretch = model.affine.of(theta)
-    rows = np.arange(u.shape[0])
-    table, known = model.specimens[number].table, model.specimens[number].densities
-    index, weight = table.corners(theta)
-    cell = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
-    node = index[rows, np.minimum(cell, index.shape[1] - 1)]
-    sample = rng.integers(table.peaks.shape[1], size=u.shape[0])
-    v = to_v(table.peaks, known.bound)[node, sample]
-    z = (v - known.mean[node]) / known.spread[node]
+    shift, stretch = model.scaling.of(theta)
+    own, rows = model.specimens[number], np.arange(u.shape[0])
+    known = own.densities
+    index, weight = corners(model.axes, theta)
+    corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
+    node = index[rows, np.minimum(corner, index.shape[1] - 1)]
+    sample = rng.integers(own.peaks.shape[1], size=u.shape[0])
+    z = (to_v(own.peaks, known.bound)[node, sample] - known.mean[node]) / known.spread[node]
 
     def between(values: Array) -> Array:
         found: Array = np.einsum("pc,pc->p", weight, values[index])
@@ -221,8 +221,8 @@ def predicted(model: Model, number: int, u: Array, seed: int) -> tuple[Array, Ar
     onset = between(known.mean) + between(known.spread) * z
     if np.isfinite(known.bound).all():
         onset = between(known.bound) + np.exp(onset)
-    peaks = shift + stretch * onset + model.error * rng.standard_normal(u.shape[0])
-    return peaks, table.places[node, sample]
+    found: Array = shift + stretch * onset + model.error * rng.standard_normal(u.shape[0])
+    return found
 
 
 def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
@@ -231,11 +231,11 @@ def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
     Jackknife over batches of the simulated samples: the posterior without each is the one at hand,
     weighted.
     """
-    whole = likelihood.of_peaks(u)
+    whole = likelihood(u)
     theta = likelihood.model.prior.theta(u)
     means = []
     for batch in range(BATCHES):
-        change = likelihood.of_peaks(u, without=batch) - whole
+        change = likelihood.without(u, batch) - whole
         weight = np.exp(change - change.max())
         means.append(weight @ theta / weight.sum())
     spread = np.array(means) - np.mean(means, axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
@@ -72,12 +72,10 @@ class Inference:
         ``{type = "norm", loc = ..., scale = ...}`` with the name of a `scipy.stats` distribution.
     load_cell_error : float
         Standard deviation, Pa, or of a coefficient of friction.
-    sampler : {"grid", "emcee"}
     samples : int, optional
         Simulated specimens at each point.
     """
 
     prior: PriorTable
     load_cell_error: NotNegative = 0.0
-    sampler: Literal["grid", "emcee"] = "grid"
     samples: Count | None = None
