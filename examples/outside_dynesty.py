@@ -1,6 +1,6 @@
 """What do twenty-five peaks tell, by a nested sampler of others (dynesty)?
 
-`st.simulator` gives the peaks of tests at given parameters; prior, likelihood and sampler are the
+`st.external.simulator` gives the peaks of tests at given parameters; prior, likelihood and sampler are the
 user's own. Nothing of `st.infer` is used, so that the two check each other.
 """
 
@@ -24,9 +24,11 @@ prior = {names[0]: {"low": 0.5 * h_n, "high": 2.0 * h_n, "spacing": "log"},
 setting = {"method": st.LocalCriterion(), "load_cell_error": 1e4}
 
 truth = (h_n, 0.66e6)
-peaks = st.simulator(problem, strength, names, samples=25, seed=7, **setting)(truth)
+peaks = st.external.simulator(problem, strength, names, samples=25, seed=7, **setting)(truth)
 
-simulate = st.simulator(problem, strength, names, samples=1000, seed=0, method=setting["method"])
+simulate = st.external.simulator(
+    problem, strength, names, samples=1000, seed=0, method=setting["method"]
+)
 
 
 def transform(u):

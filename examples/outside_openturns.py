@@ -1,6 +1,6 @@
 """How likely is sliding below a stress, by a reliability code of others (OpenTURNS)?
 
-`st.limit_state` is a function of standard normal draws, which is all that such codes ask for.
+`st.external.limit_state` is a function of standard normal draws, which is all that such codes ask for.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ strength = st.paper.strength(problem, correlation_ratio=2.0)
 stress = 0.662e6  # Pa
 method = st.LocalCriterion()
 
-limit_state = st.limit_state(problem, strength, method)
+limit_state = st.external.limit_state(problem, strength, method)
 function = ot.PythonFunction(
     limit_state.dimension, 1, func_sample=lambda draws: limit_state(np.array(draws))[:, None]
 )

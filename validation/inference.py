@@ -1,61 +1,120 @@
 """Are posteriors calibrated? Ranks of the truth over many simulated campaigns, and coverage.
 
-Simulation-based calibration (Talts et al., 2018): parameters from the prior, 25 peaks from them by
+Simulation-based calibration (Talts et al., 2018): parameters from the prior, peaks from them by
 fresh samples and a load cell's error, and the rank of each true parameter among 99 draws from its
-posterior. The ranks must be uniform. Draws inference_calibration.png into a folder.
+posterior. The ranks must be uniform. Draws inference_calibration.png of the first case into a
+folder.
 
-    python validation/inference.py [folder [campaigns]]
+    python validation/inference.py [--folder .] [--campaigns 100] [--only NAME]
 """
 
-import sys
+import argparse
 import warnings
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 import scipy.stats
 
 import stiction as st
-from stiction.progress import SILENT
 from stiction.inference.grid import on_grid
-from stiction.inference.likelihood import make_likelihood, make_model
-from stiction.inference.onset_table import simulate
+from stiction.inference.likelihood import Likelihood, make_model
+from stiction.inference.onset_table import experiments_at, simulate
 from stiction.inference.prior import make_prior
+from stiction.progress import SILENT
 
 DRAWS, BINS, TESTS = 99, 10, 25
-ERROR = 5e3
-"""Standard deviation of the load cell, Pa."""
 POINTS = 30**3
 
 
-def setting(nodes=256):
-    """The prior: bounds of the strength and its correlation length."""
+class Case(NamedTuple):
+    """A prior of parameters of a problem, and how its peaks are measured."""
+
+    problem: st.Problem
+    random: st.RandomField
+    prior: dict[str, Any]
+    method: Any
+    error: float
+    """Standard deviation of the load cell, in the unit of the peaks."""
+    variable: str = "critical_stress"
+    lengths: tuple[float | None, ...] = (None,)
+
+
+def cases(nodes=256):
+    """The paper's interface with bounds and correlation length not known, and harder ones."""
     problem = st.paper.problem(nodes=nodes)
     h_n = problem.nucleation_length
     strength = st.paper.strength(problem, correlation_ratio=0.6)
-    prior = {
-        "correlation_length": {"low": 0.25 * h_n, "high": 4.0 * h_n, "spacing": "log"},
-        "marginal.low": (0.4e6, 0.9e6),
-        "marginal.high": (1.2e6, 2.2e6),
-    }
-    return make_prior(problem, strength, prior)
+    length = {"low": 0.25 * h_n, "high": 4.0 * h_n, "spacing": "log"}
+    bounds = {"marginal.low": (0.4e6, 0.9e6), "marginal.high": (1.2e6, 2.2e6)}
+    local = st.LocalCriterion()
+
+    def loaded(**load):
+        return st.Problem(problem.solid, problem.interface, problem.friction, st.Load(**load))
+
+    coefficients = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.22, high=0.55), strength.spectrum,
+        of="friction_coefficient",
+    )  # fmt: skip
+    wave = 1.0 + 0.5 * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)
+    rate = problem.friction.weakening_rate
+    residual = st.Problem(
+        problem.solid, st.Interface(0.05, nodes // 2),
+        st.LinearWeakening(weakening_rate=rate, residual_ratio=0.5),
+    )  # fmt: skip
+    weibull = st.RandomField(st.Weibull(mean=1e6, cv=0.25), strength.spectrum, mean_mode=True)
+    low = {"marginal.low": bounds["marginal.low"]}
+    return {
+        "three parameters": Case(
+            problem, strength, {"correlation_length": length, **bounds}, local, 5e3
+        ),
+        "coefficients": Case(
+            loaded(normal_pressure=3e6), coefficients,
+            {"marginal.low": (0.13, 0.3), "marginal.high": (0.4, 0.7)},
+            local, 2e-3, "friction_coefficient",
+        ),
+        "coefficients, varying pressure": Case(
+            loaded(normal_pressure=3e6 * wave), coefficients,
+            {"correlation_length": length, "marginal.low": (0.13, 0.3)}, local, 5e3,
+        ),
+        "gradient load": Case(
+            loaded(profile=st.GradientLoad(amplitude=0.5)), strength,
+            {"correlation_length": length, **low}, local, 5e3,
+        ),
+        "residual strength": Case(
+            residual, weibull, {"marginal.mean": (0.7e6, 1.4e6), "marginal.cv": (0.1, 0.5)},
+            st.Equilibrium(), 5e3,
+        ),
+        "two lengths": Case(
+            problem, strength, {"correlation_length": length, **low}, local, 5e3,
+            lengths=(0.1, 0.04),
+        ),
+    }  # fmt: skip
 
 
-def ranks(campaigns, tests=TESTS, seed=0, samples=2000, points=POINTS):
+def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None):
     """Ranks of the truth, and the truth and the posterior means as u, (campaigns, parameters)."""
-    prior, method = setting(), st.LocalCriterion()
-    common = {"method": method, "variable": "critical_stress", "meter": SILENT}
-    model = make_model(prior, lengths=[None], error=ERROR, samples=samples, seed=0, **common)
+    case = cases()["three parameters"] if case is None else case
+    prior = make_prior(case.problem, case.random, case.prior)
+    model = make_model(
+        prior, method=case.method, lengths=case.lengths, error=case.error, samples=samples,
+        seed=0, variable=case.variable, meter=SILENT,
+    )  # fmt: skip
     rng = np.random.default_rng(seed)
     truth = rng.random((campaigns, prior.dimension))
     found, means = np.empty(truth.shape, dtype=int), np.empty(truth.shape)
     for i, u in enumerate(truth):
-        peaks, _ = simulate(
-            prior, prior.theta(u[None]), length=None, samples=tests, first=256 * (i + 10),
-            seed=1000 + seed, **common,
-        )  # fmt: skip
-        peaks = peaks[0] + ERROR * rng.standard_normal(tests)
-        draws = on_grid(make_likelihood(model, [peaks], [None]), SILENT, points).draws(DRAWS, i)
+        peaks = []
+        for number, length in enumerate(case.lengths):
+            own = experiments_at(prior, prior.theta(u[None]), case.method, length)
+            onsets = simulate(
+                own, samples=tests, first=256 * (i + 10), seed=1000 + seed + number,
+                variable=case.variable, meter=SILENT,
+            )  # fmt: skip
+            peaks.append(onsets[0] + case.error * rng.standard_normal(tests))
+        grid = on_grid(Likelihood(model, tuple(peaks)), SILENT, points)
+        draws = grid.draws(DRAWS, i)
         found[i], means[i] = (draws < u).sum(axis=0), draws.mean(axis=0)
     return prior.names, found, truth, means
 
@@ -72,22 +131,39 @@ def coverage(own, confidence=0.9):
     return float(np.mean((own >= tail) & (own < DRAWS + 1 - tail)))
 
 
-def main(folder=".", campaigns=100):
-    """Print p-values and coverage, and draw the ranks."""
-    warnings.simplefilter("ignore", st.AccuracyWarning)
-    names, found, *_ = ranks(int(campaigns))
+def draw(names, found, path):
+    """Draw histograms of the ranks, with the band that holds 99 % of counts."""
     figure, axes = plt.subplots(1, len(names), figsize=(9, 2.6), layout="constrained")
-    low, high = scipy.stats.binom.ppf([0.005, 0.995], int(campaigns), 1.0 / BINS)
+    low, high = scipy.stats.binom.ppf([0.005, 0.995], len(found), 1.0 / BINS)
     for own, name, ax in zip(found.T, names, axes, strict=True):
-        p, share = p_value(own), coverage(own)
-        print(f"{name:20s} chi-square p = {p:.3f}; {share:.1%} in their 90 % intervals")
         ax.hist(own, bins=BINS, range=(0, DRAWS + 1), color="#14213d", rwidth=0.92)
         ax.axhspan(low, high, color="#d9d9d9", zorder=0)
         ax.set(xlabel=f"rank of the true {name}", ylabel="campaigns")
-        ax.set_title(f"p = {p:.2f}, coverage {share:.0%}", fontsize=9, loc="left")
+        ax.set_title(f"p = {p_value(own):.2f}, coverage {coverage(own):.0%}", loc="left")
         ax.spines[["top", "right"]].set_visible(False)
-    figure.savefig(Path(folder) / "inference_calibration.png", dpi=130)
+    figure.savefig(path, dpi=130)
+
+
+def main():
+    """Print p-values and coverage of every case."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--folder", type=Path, default=Path())
+    parser.add_argument("--campaigns", type=int, default=100)
+    parser.add_argument("--only", default="")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore", st.AccuracyWarning)
+    for title, case in cases().items():
+        if options.only not in title:
+            continue
+        names, found, *_ = ranks(options.campaigns, case=case)
+        for own, name in zip(found.T, names, strict=True):
+            print(
+                f"{title}: {name:20s} chi-square p = {p_value(own):.3f};"
+                f" {coverage(own):.1%} in their 90 % intervals", flush=True,
+            )  # fmt: skip
+        if title == "three parameters":
+            draw(names, found, options.folder / "inference_calibration.png")
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

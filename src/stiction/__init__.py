@@ -44,7 +44,6 @@ _HOMES = {
     "combined_mean": "statistics.control_variates",
     "density": "statistics.densities",
     "quantiles": "statistics.quantiles",
-    "FieldFit": "inference.field_fit",
     "fit_field": "inference.fit",
     "quantile_distance": "statistics.quantiles",
     "failure_probability": "reliability.estimate",
@@ -52,11 +51,8 @@ _HOMES = {
     "DesignStress": "reliability.design",
     "design_stress": "reliability.design",
     "failure_curve": "reliability.curve",
-    "limit_state": "reliability.limit_state",
-    "simulator": "inference.simulator",
     "read_peaks": "inference.peaks",
     "infer": "inference.infer",
-    "Posterior": "inference.posterior",
     "design_of_tests": "inference.design",
     "Ensemble": "study.study",
     "Study": "study.study",
@@ -67,7 +63,7 @@ _HOMES = {
     "AccuracyWarning": "errors",
     "UnitWarning": "errors",
 }
-_MODULES = {"paper": "paper", "plot": "plot", "theory": "theory"}
+_MODULES = {"external": "external", "paper": "paper", "plot": "plot", "theory": "theory"}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 

@@ -1,6 +1,7 @@
 # What editors see: the names of the lazy table in __init__.py, imported for real.
 # A test keeps the two equal.
 
+from stiction import external as external
 from stiction import paper as paper
 from stiction import plot as plot
 from stiction import theory as theory
@@ -33,12 +34,9 @@ from stiction.friction import ExponentialWeakening as ExponentialWeakening
 from stiction.friction import LinearWeakening as LinearWeakening
 from stiction.friction import PiecewiseWeakening as PiecewiseWeakening
 from stiction.inference.design import design_of_tests as design_of_tests
-from stiction.inference.field_fit import FieldFit as FieldFit
 from stiction.inference.fit import fit_field as fit_field
 from stiction.inference.infer import infer as infer
 from stiction.inference.peaks import read_peaks as read_peaks
-from stiction.inference.posterior import Posterior as Posterior
-from stiction.inference.simulator import simulator as simulator
 from stiction.interface import Interface as Interface
 from stiction.load import EdgeLoad as EdgeLoad
 from stiction.load import GradientLoad as GradientLoad
@@ -79,7 +77,6 @@ from stiction.reliability.design import (
     design_stress as design_stress,
 )
 from stiction.reliability.estimate import failure_probability as failure_probability
-from stiction.reliability.limit_state import limit_state as limit_state
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
 from stiction.statistics.control_variates import combined_mean as combined_mean

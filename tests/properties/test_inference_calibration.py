@@ -16,7 +16,7 @@ pytestmark = [
 
 def test_ranks_of_the_truth_are_uniform():
     campaigns = 120
-    names, ranks, *_ = VALIDATION["ranks"](campaigns, points=20_000)
+    names, ranks, *_ = VALIDATION["ranks"](campaigns, points=20_000, samples=2000)
     for name, own in zip(names, ranks.T, strict=True):
         # Three parameters: a right posterior fails this once in three hundred seeds.
         assert VALIDATION["p_value"](own) > 1e-3, name
@@ -29,7 +29,7 @@ def test_more_tests_find_the_truth():
     """The lower bound, which the peaks see; 16 times the tests, a good half of the error."""
     errors = []
     for tests in (10, 160):
-        names, _, truth, means = VALIDATION["ranks"](25, tests, seed=3, points=20_000)
+        names, _, truth, means = VALIDATION["ranks"](25, tests, seed=3, points=20_000, samples=2000)
         i = names.index("marginal.low")
         errors.append(np.sqrt(np.mean((means[:, i] - truth[:, i]) ** 2)))
     # The bound hides behind the correlation length, so that it is not a quarter.

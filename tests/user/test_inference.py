@@ -181,15 +181,19 @@ BAD = {
         ["5 parameters would have to be simulated"],
     ),
     "limit state": (
-        lambda: st.limit_state(PROBLEM, STRENGTH, LOCAL)(np.zeros((2, 3))),
+        lambda: st.external.limit_state(PROBLEM, STRENGTH, LOCAL)(np.zeros((2, 3))),
         ["draws", "shape"],
     ),
     "simulator": (
-        lambda: st.simulator(PROBLEM, STRENGTH, ("marginal.lo",), method=LOCAL, samples=3)([1.0]),
+        lambda: st.external.simulator(PROBLEM, STRENGTH, ("marginal.lo",), method=LOCAL, samples=3)(
+            [1.0]
+        ),
         ["'lo'", "'low'"],
     ),
     "theta": (
-        lambda: st.simulator(PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=3)([]),
+        lambda: st.external.simulator(
+            PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=3
+        )([]),
         ["theta", "1 finite"],
     ),
 }
@@ -250,7 +254,9 @@ def test_no_file():
 
 
 def test_simulated_tests_are_those_of_monte_carlo():
-    simulate = st.simulator(PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=30, seed=99)
+    simulate = st.external.simulator(
+        PROBLEM, STRENGTH, ("marginal.low",), method=LOCAL, samples=30, seed=99
+    )
     np.testing.assert_array_equal(simulate([0.66e6]), PEAKS)
     np.testing.assert_array_equal(simulate({"marginal.low": 0.66e6}), PEAKS)
     later = simulate([0.66e6], first=10)
@@ -258,7 +264,7 @@ def test_simulated_tests_are_those_of_monte_carlo():
 
 
 def test_a_limit_state_of_one_row_and_of_many():
-    state = st.limit_state(PROBLEM, STRENGTH, LOCAL)
+    state = st.external.limit_state(PROBLEM, STRENGTH, LOCAL)
     draws = state.draws(seed=99, first=0, samples=30)
     np.testing.assert_array_equal(state(draws), PEAKS)
     assert state(draws[3]) == PEAKS[3]

@@ -1,11 +1,8 @@
 """What is shown of inference: the page, its data, the command and the examples, as they stand."""
 
-import os
 import re
 import runpy
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +33,7 @@ def test_openturns_works_on_the_limit_state(monkeypatch, tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_dynesty_finds_the_same_posterior(monkeypatch, tmp_path, capsys):
-    """Another sampler, likelihood and no affine scaling: 60 live points, two minutes."""
+    """Another sampler, likelihood and no scaling: 60 live points, two minutes."""
     pytest.importorskip("dynesty")
     found, _ = run_example("outside_dynesty", monkeypatch, tmp_path, capsys)
     for i, name in enumerate(found["names"]):
@@ -59,7 +56,7 @@ def test_the_page_runs_and_says_what_it_prints(monkeypatch, tmp_path):
     scope = {}
     for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
         exec(compile(block, PAGE.name, "exec"), scope)
-    posterior, told = scope["posterior"], scope["told"].information
+    posterior, told = scope["posterior"], scope["plans"].information
     low, high = posterior.interval("marginal.low", 0.99)
     assert low < 0.66e6 < high  # the truth of the data
     low, high = posterior.interval("correlation_length", 0.99)
@@ -72,59 +69,3 @@ def test_the_page_runs_and_says_what_it_prints(monkeypatch, tmp_path):
 def test_the_data_say_that_they_are_synthetic():
     assert (DATA / "peaks.csv").read_text().startswith("# synthetic")
     assert "Nothing here was measured" in (DATA / "make_peaks.py").read_text()
-    assert "synthetic" in (DATA / "tests.toml").read_text()
-
-
-def command(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "stiction", *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "100"}, check=False,
-    )  # fmt: skip
-
-
-def small_study(folder, more=""):
-    text = (DATA / "tests.toml").read_text()
-    text = text.replace("nodes = 512", "nodes = 256")
-    text = text.replace("load_cell_error = 4e3", "load_cell_error = 4e3\nsamples = 200")
-    (folder / "tests.toml").write_text(text + more)
-    return folder / "tests.toml"
-
-
-@pytest.mark.slow
-def test_the_command_writes_a_page(tmp_path):
-    study = small_study(tmp_path)
-    done = command("infer", study, "--peaks", DATA / "peaks.csv", "--out", "told", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "15 peaks at 0.04 m, 25 peaks at 0.1 m" in done.stdout
-    assert "marginal.low" in done.stdout
-    assert "nats" in done.stdout
-    names = {path.name for path in (tmp_path / "told").iterdir()}
-    wanted = {"report.html", "posterior.png", "posterior.pdf", "parameters.csv", "draws.csv"}
-    assert wanted <= names
-    page = (tmp_path / "told" / "report.html").read_text()
-    assert "data:image/png" in page
-    draws = np.loadtxt(tmp_path / "told" / "draws.csv", delimiter=",", skiprows=1)
-    assert draws.shape == (4000, 3)
-
-
-def test_the_command_says_what_is_missing(tmp_path):
-    text = (DATA / "tests.toml").read_text()
-    (tmp_path / "bare.toml").write_text(text[: text.index("[inference]")])
-    done = command("infer", "bare.toml", "--peaks", DATA / "peaks.csv", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "no table [inference]" in done.stderr
-    (tmp_path / "odd.toml").write_text(text + "exponent = {type = 'nrm', loc = 4}\n")
-    done = command("infer", "odd.toml", "--peaks", DATA / "peaks.csv", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "inference.prior" in done.stderr
-    assert "'nrm'" in done.stderr
-
-
-def test_a_study_keeps_its_inference(tmp_path):
-    import stiction as st
-
-    study = st.Study.from_toml(DATA / "tests.toml")
-    assert study.inference.prior["marginal.low"] == [0.4e6, 0.8e6]
-    study.to_toml(tmp_path / "again.toml")
-    assert st.Study.from_toml(tmp_path / "again.toml") == study
-    assert "inference" not in study.attributes["study"]

@@ -2,102 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from stiction._checks import (
-    as_names,
-    check_count,
-    check_instance,
-    is_finite,
-    numbers,
-)
+from stiction._checks import as_names, check_count, check_instance, is_finite, numbers
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import full_key, with_parameters
-from stiction.methods import Method, check_method, refusals
+from stiction.methods import Method, check_method
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-
-
-@dataclass(frozen=True, eq=False)
-class Simulator:
-    """Peaks as a function of parameters; see `stiction.simulator`.
-
-    Attributes
-    ----------
-    problem : Problem
-    random : RandomInterface
-    names : tuple of str
-        The parameters, in order.
-    method : Method
-    samples, seed : int
-    load_cell_error : float
-        Pa.
-    """
-
-    problem: Problem
-    random: RandomInterface
-    names: tuple[str, ...]
-    method: Any
-    samples: int
-    seed: int
-    load_cell_error: float
-
-    def _values(self, theta: Any) -> Array:
-        if isinstance(theta, Mapping):
-            if set(theta) != set(self.names):
-                given = describe(list(theta))
-                raise InputError(f"theta: must have the keys {', '.join(self.names)}, got {given}")
-            theta = [theta[name] for name in self.names]
-        values = numbers("theta", theta)
-        if values.shape != (len(self.names),) or not np.isfinite(values).all():
-            raise InputError(
-                f"theta: must be {len(self.names)} finite numbers, {', '.join(self.names)}, got"
-                f" {describe(theta)}"
-            )
-        return values
-
-    def at(self, theta: Any) -> tuple[Problem, RandomInterface]:
-        """The problem and what is random with these parameters."""
-        return with_parameters(self.problem, self.random, self.names, self._values(theta))
-
-    def __call__(self, theta: Any, *, first: int = 0) -> Array:
-        """Peaks of tests at these parameters, Pa, (samples,).
-
-        Parameters
-        ----------
-        theta : sequence or mapping of float
-            In the order of `names`, or by name.
-        first : int
-            Number of the first sample: the same samples give a smooth function of theta, others
-            an independent set of tests.
-
-        Raises
-        ------
-        InputError
-            If there is no problem with these parameters.
-        """
-        first = check_count("first", first, 0)
-        problem, random = self.at(theta)
-        if refused := refusals(problem, self.method):
-            raise InputError(refused)
-        experiment = Experiment(problem, random, self.method)
-        parts = [
-            experiment.results(self.seed, start, count)["critical_stress"]
-            for start, count in experiment.batches(first, self.samples, max(256, experiment.batch))
-        ]
-        peaks: Array = np.concatenate(parts)
-        if self.load_cell_error > 0.0:
-            rng = np.random.default_rng([self.seed, first, 1])
-            peaks = peaks + self.load_cell_error * rng.standard_normal(peaks.size)
-        return peaks
 
 
 def simulator(
@@ -109,8 +28,8 @@ def simulator(
     samples: int,
     seed: int = 0,
     load_cell_error: float = 0.0,
-) -> Simulator:
-    """Peaks of repeated tests as a function of parameters, for dynesty, sbi and others.
+) -> Callable[..., Array]:
+    """Return a function from parameters to the peaks of repeated tests, for dynesty, sbi, others.
 
     Parameters
     ----------
@@ -129,14 +48,17 @@ def simulator(
 
     Returns
     -------
-    Simulator
-        ``simulate(theta)`` gives the peaks, Pa, of shape (samples,); ``simulate(theta, first=k)``
-        those of samples k, k + 1, ..., independent of the first ones if k >= samples.
+    callable
+        ``simulate(theta)``, with theta a sequence of numbers or a mapping by name, returns the
+        peaks, Pa, of shape (samples,); ``simulate(theta, first=k)`` those of samples k, k + 1, ...,
+        independent of the first ones if k >= samples. The same samples at every theta make a
+        smooth function of it.
 
     Raises
     ------
     InputError
-        If a parameter does not exist, or another argument does not fit.
+        If a parameter does not exist, or another argument does not fit; by the function, if there
+        is no problem with these parameters.
 
     Examples
     --------
@@ -144,7 +66,9 @@ def simulator(
     >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
     >>> keys = ("correlation_length", "marginal.low")
-    >>> simulate = st.simulator(problem, strength, keys, method=st.LocalCriterion(), samples=25)
+    >>> simulate = st.external.simulator(
+    ...     problem, strength, keys, method=st.LocalCriterion(), samples=25
+    ... )
     >>> simulate([2e-3, 0.66e6]).shape
     (25,)
     """
@@ -159,4 +83,34 @@ def simulator(
     if not names or len({full_key(name) for name in names}) < len(names):
         raise InputError(f"parameters: must be different names, got {describe(list(names))}")
     interface = as_random_interface(random)
-    return Simulator(problem, interface, names, method, samples, seed, float(load_cell_error))
+
+    def simulate(theta: Any, *, first: int = 0) -> Array:
+        """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
+        first = check_count("first", first, 0)
+        changed = with_parameters(problem, interface, names, _values(theta, names))
+        experiment = Experiment(*changed, method)
+        peaks: Array = np.concatenate(
+            [
+                experiment.results(seed, start, count)["critical_stress"]
+                for start, count in experiment.batches(first, samples, max(256, experiment.batch))
+            ]
+        )
+        errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)
+        return peaks + load_cell_error * errors
+
+    return simulate
+
+
+def _values(theta: Any, names: tuple[str, ...]) -> Array:
+    """Parameters in the order of their names."""
+    if isinstance(theta, Mapping):
+        if set(theta) != set(names):
+            given = describe(list(theta))
+            raise InputError(f"theta: must have the keys {', '.join(names)}, got {given}")
+        theta = [theta[name] for name in names]
+    values = numbers("theta", theta)
+    if values.shape != (len(names),) or not np.isfinite(values).all():
+        raise InputError(
+            f"theta: must be {len(names)} finite numbers, {', '.join(names)}, got {describe(theta)}"
+        )
+    return values

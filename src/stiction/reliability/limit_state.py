@@ -40,7 +40,7 @@ PIECE = 16
 
 @dataclass(frozen=True)
 class LimitState:
-    """Stress at onset as a function of standard normal draws; see `stiction.limit_state`.
+    """Stress at onset as a function of standard normal draws; see `stiction.external.limit_state`.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ def limit_state(
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> stress = st.limit_state(problem, strength, st.LocalCriterion())
+    >>> stress = st.external.limit_state(problem, strength, st.LocalCriterion())
     >>> draws = stress.draws(seed=0, first=0, samples=3)
     >>> draws.shape == (3, stress.dimension)
     True
