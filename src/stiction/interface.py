@@ -133,6 +133,11 @@ class Interface:
         return len(self.shape) == 2
 
     @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the nodes of profiles (..., *shape), counted from the last."""
+        return tuple(range(-len(self.shape), 0))
+
+    @property
     def size(self) -> int:
         """Number of nodes in all."""
         return math.prod(self.shape)

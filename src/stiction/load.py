@@ -1,25 +1,26 @@
-"""The load: a profile that grows, on top of an initial stress."""
+"""The load: a profile that grows, on top of an initial stress.
+
+A load of your own is a class that derives from `LoadShape`, as `GradientLoad` and `EdgeLoad` do.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any, Literal, TypeAlias
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
-import pydantic
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import Field, WithJsonSchema, WrapSerializer, WrapValidator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
 from stiction.model import (
-    _PROFILE_SCHEMA,
+    PROFILE_SCHEMA,
     OptionalProfile,
     Positive,
     Profile,
     Real,
-    _plain,
-    _profile,
     is_unplaced,
     model,
 )
@@ -28,35 +29,53 @@ Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
 NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
-class LoadShape:
-    """A load profile by a formula; its mean over the interface is one, so that tau_0 is the mean
-    stress."""
+class LoadShape(ABC):
+    """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
 
-    def plain(self) -> dict[str, Any]:
-        """What TOML and JSON hold."""
-        return dataclasses.asdict(self)  # type: ignore[call-overload]  # of models
+    To add one, decorate a class that derives from it with `stiction.model.model`, so that its
+    parameters are checked, and with `register`, so that study files know its `type`.
+    """
+
+    @abstractmethod
+    def values(self, interface: Interface) -> Array:
+        """Return the profile at the nodes, of any mean, broadcasting to ``interface.shape``."""
 
     def on(self, interface: Interface) -> Array:
-        """Values at the nodes, (*shape); on a plane they vary along x."""
-        length = np.atleast_1d(interface.length)[0]
-        shape = interface.shape
-        x = np.arange(shape[0]) * length / shape[0]
-        away = np.mod(x - self._centre * length + 0.5 * length, length) - 0.5 * length
-        values = self._at(np.abs(away), float(length))
+        """Return the profile p at the nodes, (*shape), with a mean of one."""
+        values = np.asarray(self.values(interface), dtype=np.float64)
         values = values / values.mean()
-        result: Array = np.ascontiguousarray(
-            np.broadcast_to(values.reshape(-1, *(1 for _ in shape[1:])), shape)
-        )
-        return result
-
-    @property
-    def _centre(self) -> float:
-        raise NotImplementedError
-
-    def _at(self, away: Array, length: float) -> Array:
-        raise NotImplementedError
+        if not np.all(values > 0.0):
+            raise InputError(
+                f"load.profile: {type(self).__name__} must be positive everywhere, smallest over"
+                f" its mean is {values.min():g}"
+            )
+        return np.ascontiguousarray(np.broadcast_to(values, interface.shape))
 
 
+Shape = TypeVar("Shape", bound=type[LoadShape])
+
+SHAPES: dict[str, Any] = {}
+"""Load shapes of study files by their `type`."""
+
+
+def register(shape: Shape) -> Shape:
+    """Make a load shape known to study files by its `type`; a decorator of its class."""
+    SHAPES[shape.type] = shape  # type: ignore[attr-defined]  # the default of a field
+    return shape
+
+
+def distance(interface: Interface, centre: float) -> Array:
+    """Return the distance of nodes along x from a place given as a share of the length, m.
+
+    Periodic; of shape (nx,) on a line and (nx, 1) on a plane.
+    """
+    length = interface.lengths[0]
+    x = np.arange(interface.shape[0]) * length / interface.shape[0]
+    away = np.mod(x - centre * length + 0.5 * length, length) - 0.5 * length
+    return np.abs(away).reshape(-1, *(1 for _ in interface.shape[1:]))
+
+
+@register
 @model(kw_only=True)
 class GradientLoad(LoadShape):
     """Load that falls linearly from a ridge to half a period away.
@@ -78,15 +97,13 @@ class GradientLoad(LoadShape):
     centre: Fraction = 0.0
     type: Literal["gradient"] = "gradient"
 
-    @property
-    def _centre(self) -> float:
-        return self.centre
-
-    def _at(self, away: Array, length: float) -> Array:
-        values: Array = 1.0 + self.amplitude * (1.0 - 4.0 * away / length)
-        return values
+    def values(self, interface: Interface) -> Array:
+        """Return 1 + amplitude (1 - 4 |x - centre|/L)."""
+        away = distance(interface, self.centre)
+        return 1.0 + self.amplitude * (1.0 - 4.0 * away / interface.lengths[0])
 
 
+@register
 @model(kw_only=True)
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
@@ -114,20 +131,12 @@ class EdgeLoad(LoadShape):
     edge: Fraction = 0.0
     type: Literal["edge"] = "edge"
 
-    @property
-    def _centre(self) -> float:
-        return self.edge
-
-    def _at(self, away: Array, length: float) -> Array:
-        values: Array = 1.0 + self.excess * np.exp(-away / self.decay)
-        return values
+    def values(self, interface: Interface) -> Array:
+        """Return 1 + excess exp(-distance/decay)."""
+        return 1.0 + self.excess * np.exp(-distance(interface, self.edge) / self.decay)
 
 
-SHAPES: dict[str, type[Any]] = {"gradient": GradientLoad, "edge": EdgeLoad}
-
-
-def _load_profile(value: Any, info: pydantic.ValidationInfo) -> Any:
-    """A shape, or what any profile may be."""
+def _shape(value: Any, handler: Any) -> Any:
     if isinstance(value, LoadShape):
         return value
     if isinstance(value, dict) and "type" in value:
@@ -135,20 +144,24 @@ def _load_profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         if kind not in SHAPES:
             raise InputError(unknown_name("type", str(kind), SHAPES))
         return SHAPES[kind](**value)
-    return _profile(value, info)
+    return handler(value)
+
+
+def _written(value: Any, handler: Any) -> Any:
+    return dataclasses.asdict(value) if isinstance(value, LoadShape) else handler(value)
 
 
 _SHAPE_SCHEMA = {
     "type": "object",
     "description": "'gradient' with amplitude, centre; or 'edge' with excess, decay, edge",
-    "properties": {"type": {"enum": list(SHAPES)}},
+    "properties": {"type": {"type": "string"}},
     "required": ["type"],
 }
 LoadProfile: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_load_profile),
-    PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": [*_PROFILE_SCHEMA, _SHAPE_SCHEMA]}),
+    Profile,
+    WrapValidator(_shape),
+    WrapSerializer(_written),
+    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, _SHAPE_SCHEMA]}),
 ]
 
 

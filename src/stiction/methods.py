@@ -16,7 +16,7 @@ from pydantic import WrapValidator
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.model import Progress, checked, describe, to_plain
-from stiction.problem import Problem
+from stiction.problem import Problem, Sample, named_profiles
 from stiction.profile_nodes import Gaps
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
@@ -28,7 +28,6 @@ from stiction.results import (
     coordinate,
     to_dataset,
 )
-from stiction.sample import Sample, named_profiles
 
 if TYPE_CHECKING:
     import xarray as xr

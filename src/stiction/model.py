@@ -138,7 +138,7 @@ def _plain(value: Any) -> Any:
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
 Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
-_PROFILE_SCHEMA = [
+PROFILE_SCHEMA = [
     {"type": "number"},
     {"type": "array", "items": {"type": "number"}},
     {"type": "string", "description": "path to a .npy, text or NetCDF file"},
@@ -148,7 +148,7 @@ Profile: TypeAlias = Annotated[
     Any,
     BeforeValidator(_profile),
     PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": _PROFILE_SCHEMA}),
+    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
 ]
 """A number, or a read-only array of shape (nodes,)."""
 
@@ -161,7 +161,7 @@ OptionalProfile: TypeAlias = Annotated[
     Any,
     BeforeValidator(_optional_profile),
     PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": [*_PROFILE_SCHEMA, {"type": "null"}]}),
+    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, {"type": "null"}]}),
 ]
 """The same, or None for 'not given'."""
 

@@ -1,37 +1,144 @@
-"""The physical problem: two solids, an interface, a friction law and a load."""
+"""The physical problem: two solids, an interface, a friction law and a load; and its samples."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import model_validator
 
-from stiction._checks import as_names, is_real
-from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
+from stiction.arrays import Array
+from stiction.errors import InputError, UnitWarning, unknown_name, warn_accuracy, warn_user
 from stiction.friction import SCALES, Friction, contradictions
+from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
-from stiction.load import Load
-from stiction.model import Mode, describe, is_unplaced, model
+from stiction.load import Load, LoadShape
+from stiction.model import Mode, describe, is_unplaced, model, real_array
 from stiction.placed import on_nodes
-from stiction.sample import (
-    PROFILES,
-    Sample,
-    named_profiles,
-    profiles_of,
-    steepest_rate,
-)
+from stiction.profile_nodes import describe_gaps
+from stiction.profiles import at_nodes
+from stiction.results import Variable
 from stiction.solid import Solid
 
-# lambda_0 in h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003).
-SMALLEST_EIGENVALUE = 0.5788869418506
 FEWEST_NODES = 4
 MOST_NODES = 5e4
 """A problem that needs more has a wrong unit rather than a long interface."""
 WEAKEST, STRONGEST = 1e-8, 1.0
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
+
+
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
+weaken."""
+
+
+def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+    """Return the largest weakening rate of nodes that may break, Pa/m; arrays (samples, *shape).
+
+    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min():
+        return float(rate.max())
+    drop = drop.reshape(drop.shape[0], -1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
+    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
+
+
+class Sample(NamedTuple):
+    """One interface or many: the profiles that every method starts from.
+
+    A NamedTuple of arrays, so that compiled kernels take it as it is.
+
+    Attributes
+    ----------
+    strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); views of what was given, not to be
+        written to. Without the first axis for `one` sample. Strength may be infinite for methods
+        that accept barriers. Where it was given at or below the residual strength, both are equal:
+        strength is constant, whatever W.
+    load_profile : (*shape) array
+        p, dimensionless, positive.
+    normal_pressure : (samples, *shape) array
+        Pa; NaN where the problem has none.
+    """
+
+    strength: Array
+    residual_strength: Array
+    weakening_rate: Array
+    initial_stress: Array
+    load_profile: Array
+    normal_pressure: Array
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.strength.shape[0])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of nodes in each direction."""
+        return self.load_profile.shape
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the nodes, counted from the last."""
+        return tuple(range(-self.load_profile.ndim, 0))
+
+    def part(self, some: slice) -> Sample:
+        """Return some samples of the batch."""
+        own = (getattr(self, name)[some] for name in BY_SAMPLE)
+        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
+
+    def one(self, number: int) -> Sample:
+        """Return sample `number` by itself, its arrays of shape (*shape) and contiguous."""
+        own = (np.ascontiguousarray(getattr(self, name)[number]) for name in BY_SAMPLE)
+        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
+
+    @property
+    def uniform_weakening(self) -> bool:
+        """Whether W is the same at all nodes of each sample."""
+        flat = self.weakening_rate.reshape(self.samples, -1)
+        return bool(np.all(flat == flat[:, :1]))
+
+    @property
+    def mean_strength(self) -> float:
+        """Mean strength where it is finite, Pa."""
+        return float(self.strength.mean(where=np.isfinite(self.strength)))
+
+    @property
+    def steepest_rate(self) -> float:
+        """Largest weakening rate of nodes that may break, Pa/m."""
+        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
+    def every_second(self, first: int) -> Sample:
+        """Return the same samples on the nodes `first`, `first` + 2, ... of a line."""
+        return Sample(*(values[..., first::2] for values in self))
+
+    def mean_stress(self, load: Array) -> Array:
+        """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
+        return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
+
+
+BY_SAMPLE = (
+    "strength", "residual_strength", "weakening_rate", "initial_stress", "normal_pressure"
+)  # fmt: skip
+"""What has an axis of samples."""
+
+PROFILES: dict[str, Variable] = {
+    "strength": Variable("Pa", "peak strength"),
+    "residual_strength": Variable("Pa", "residual strength"),
+    "initial_stress": Variable("Pa", "initial stress"),
+    "weakening_rate": Variable("Pa m-1", "weakening rate"),
+    "critical_slip": Variable("m", "critical slip"),
+    "fracture_energy": Variable("J m-2", "fracture energy"),
+    "normal_pressure": Variable("Pa", "normal pressure"),
+}
+"""What may be given or sampled along an interface, with its unit; the order is that of the streams
+of random draws and never changes."""
 
 
 @model
@@ -77,24 +184,19 @@ class Problem:
         self._place_profiles()
         shape = self.interface.shape
         friction, load = self.friction, self.load
-        arrays = {
-            "friction.weakening_rate": friction.weakening_rate,
-            "friction.critical_slip": friction.critical_slip,
-            "friction.fracture_energy": friction.fracture_energy,
-            "friction.residual_strength": friction.residual_strength,
-            "friction.residual_ratio": friction.residual_ratio,
-            "load.profile": load.profile,
-            "load.initial_stress": load.initial_stress,
-            "load.normal_pressure": load.normal_pressure,
-        }
         nodes = " x ".join(map(str, shape))
-        problems = [
-            f"{name}: must have one entry for each of the {nodes} nodes, got {describe(value)}"
-            + "; x and y have changed places: the first axis of a profile is x"
-            * (value.shape == shape[::-1] and len(shape) == 2)
-            for name, value in arrays.items()
-            if isinstance(value, np.ndarray) and value.shape != shape
-        ]
+        problems = []
+        for part in ("friction", "load"):
+            owner = getattr(self, part)
+            for field in dataclasses.fields(owner):
+                value = getattr(owner, field.name)
+                if isinstance(value, np.ndarray) and value.shape != shape:
+                    problems.append(
+                        f"{part}.{field.name}: must have one entry for each of the {nodes} nodes,"
+                        f" got {describe(value)}{_turned(value.shape, shape)}"
+                    )
+        if isinstance(load.profile, LoadShape):
+            load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane:
             if self.solid.plane != "strain":
                 problems.append(
@@ -113,7 +215,7 @@ class Problem:
         if problems:
             raise InputError(problems)
         if rate is not None:
-            self._warn_if_short(self.nucleation_length_of(float(np.median(rate))))
+            self._warn_if_short(self.nucleation_lengths(float(np.median(rate)))[0])
         return self
 
     def _warn_if_short(self, patch: float) -> None:
@@ -144,7 +246,7 @@ class Problem:
         elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
             scale, value = self.friction.scale
             rate = float(self.friction.rate(np.array(strength - residual), scale, np.median(value)))
-            self._warn_if_short(self.nucleation_length_of(max(rate, 1e-300)))
+            self._warn_if_short(self.nucleation_lengths(max(rate, 1e-300))[0])
 
     def _place_profiles(self) -> None:
         """Put profiles with coordinates of their own on the nodes."""
@@ -189,7 +291,7 @@ class Problem:
                 "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
                 " rate; where it varies, use st.Equilibrium() or st.Rupture()"
             )
-        return self.nucleation_length_of(rate)
+        return self.nucleation_lengths(rate)[0]
 
     @property
     def uniform_rate(self) -> float | None:
@@ -197,38 +299,30 @@ class Problem:
         rate = self.friction.weakening_rate
         return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
 
-    def nucleation_length_of(self, rate: float) -> float:
-        """h_n, m, of a uniform weakening rate in Pa/m."""
-        if not (is_real(rate) and rate > 0.0):
-            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
-        return 2.0 * SMALLEST_EIGENVALUE * self.effective_modulus / rate
+    def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
+        """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
 
-    def nodes_in_nucleation_length(self, rate: float) -> float:
-        """Nodes that the nucleation length of a weakening rate (Pa/m) spans, where fewest.
-
-        Of a law that steepens with slip the steepest rate counts; on a plane the length across
-        the slip, that of mode III, counts as well.
+        On a plane that of mode II along x, and that of mode III along y.
         """
-        return min(self._resolution(rate))
+        if not rate > 0.0:
+            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
+        moduli = (self.effective_modulus, self.solid.shear_modulus)[: len(self.interface.shape)]
+        return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in moduli)
 
-    def _resolution(self, rate: float) -> list[float]:
-        """The same for each direction."""
-        friction, interface = self.friction, self.interface
-        steepest = rate * friction.steepest_slope / friction.initial_slope
-        unit = 2.0 * SMALLEST_EIGENVALUE / steepest
-        moduli = [self.effective_modulus]
-        if interface.is_plane:
-            moduli.append(self.solid.shear_modulus)
-        return [
-            unit * modulus / spacing
-            for modulus, spacing in zip(moduli, interface.spacings, strict=True)
-        ]
+    def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
+        """Return how many nodes the nucleation length of a weakening rate (Pa/m) spans.
+
+        In each direction. If the law steepens with slip, the steepest rate counts.
+        """
+        steepest = rate * self.friction.steepest_slope / self.friction.initial_slope
+        lengths = zip(self.nucleation_lengths(steepest), self.interface.spacings, strict=True)
+        return tuple(length / spacing for length, spacing in lengths)
 
     def _too_few_nodes(self, highest_rate: float) -> list[str]:
-        resolution = self.nodes_in_nucleation_length(highest_rate)
+        resolution = min(self.nodes_in_nucleation_length(highest_rate))
         if resolution >= FEWEST_NODES:
             return []
-        length = self.nucleation_length_of(highest_rate)
+        length = self.nucleation_lengths(highest_rate)[0]
         shape = self.interface.shape
         finer = [2.0 * np.ceil(0.5 * FEWEST_NODES * n / max(resolution, 1e-300)) for n in shape]
         enough = " x ".join(f"{n:.10g}" for n in finer)
@@ -242,8 +336,8 @@ class Problem:
         ]
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
-        """Warn where the nucleation length spans fewer than `enough` nodes; `cost` says what of."""
-        resolution = self._resolution(sample.steepest_rate)
+        """Warn if the nucleation length spans fewer than `enough` nodes; `cost`: the error."""
+        resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
         if min(resolution) < enough:
             nodes = f"{resolution[0]:.1f} nodes"
             if self.interface.is_plane:
@@ -285,83 +379,19 @@ class Problem:
         """
         if isinstance(profiles, Sample):
             return profiles
-        accept = as_names("accept", accept)
-        given = named_profiles(profiles)
-        shape = self.interface.shape
-        friction, load = self.friction, self.load
-        problems: list[str] = []
-
-        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
-            try:
-                return profiles_of(name, given.get(name, own), self.interface, samples, infinite)
-            except InputError as error:
-                problems.extend(error.problems)
-                return None
-
-        if "strength" not in given:
-            raise InputError("strength: missing among the profiles")
-        strength = checked("strength", None, None, "barriers" in accept)
-        samples = 1 if strength is None else strength.shape[0]
-        along = tuple(range(1, 1 + len(shape)))
-        breaks = strength
-        if strength is not None:
-            stuck = np.isinf(strength).all(axis=along)
-            breaks = np.where(np.isinf(strength), 0.0, strength)
-            if stuck.any():
-                problems.append(
-                    f"strength: infinite at every node of sample {int(np.argmax(stuck))}; nothing"
-                    " can break"
-                )
-        own_residual: Any = 0.0 if breaks is None else friction.residual(breaks)
-        residual = checked("residual_strength", own_residual, samples)
-        initial = checked("initial_stress", load.initial_stress, samples)
-        pressure = np.broadcast_to(np.nan, (samples, *shape))
-        if load.normal_pressure is not None or "normal_pressure" in given:
-            pressure = checked("normal_pressure", load.normal_pressure, samples)
-        scales = [name for name in SCALES if name in given]
-        if len(scales) > 1:
-            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
-        scale, own_scale = friction.scale
-        scale = scales[0] if scales else scale
-        value = checked(scale, own_scale, samples)
-        if value is not None and value.min() <= 0.0:
-            problems.append(
-                f"{scale}: must be positive, got {value.min():g} {PROFILES[scale].units}"
-            )
-        if residual is not None and residual.min() < 0.0:
-            problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        overstressed = strength is not None and initial is not None and np.any(strength <= initial)
-        if overstressed and "overstress" not in accept:
-            number, *node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
-            where = (number, *node)
-            problems.append(
-                f"strength: must be above initial_stress everywhere; sample {number}, node"
-                f" {', '.join(map(str, node))}: {strength[where]:g} against {initial[where]:g} Pa;"
-                " only st.Rupture() begins above the strength"
-            )
-        if strength is not None and residual is not None:
-            weakens = (strength > residual) & np.isfinite(strength)
-            nowhere = np.flatnonzero(~weakens.any(axis=along) & ~stuck)
-            if nowhere.size:
-                problems.append(
-                    f"strength: must be above residual_strength somewhere; sample {nowhere[0]} is"
-                    f" nowhere, from {strength[nowhere[0]].min():g} to"
-                    f" {strength[nowhere[0]].max():g} Pa: check the units of both"
-                )
+        values, scale, problems = self._values(named_profiles(profiles), accept)
+        problems += self._impossible(values, scale, accept)
         if problems:
             raise InputError(problems)
+        strength, residual, value, initial, pressure = values
+        rates = value
+        if scale != "weakening_rate":
+            rates = self._rates(strength, residual, scale, value)
         constant = strength <= residual
-        if scale == "weakening_rate":
-            rates = value
-        else:
-            with np.errstate(over="ignore"):  # too short a critical slip is refused just below
-                rates = friction.rate(strength - residual, scale, value)
-            if np.any(barriers := np.isinf(strength)):  # any rate will do where nothing weakens
-                own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
-                rates = np.where(barriers, own, rates)
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
             residual = np.minimum(residual, strength)
+            along = self.interface.axes
             slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
             rates = np.where(constant, slowest, rates)
             if "constant" not in accept:
@@ -372,5 +402,161 @@ class Problem:
         too_few = self._too_few_nodes(steepest_rate(strength, residual, rates))
         if too_few:
             raise InputError(too_few)
+        shape = self.interface.shape
         profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=np.float64)
         return Sample(strength, residual, rates, initial, profile, pressure)
+
+    def _values(
+        self, given: Mapping[str, Any], accept: Collection[str]
+    ) -> tuple[list[Any], str, list[str]]:
+        """Strength, residual strength, scale of slip, initial stress and pressure, broadcast.
+
+        None where the shape is wrong, with the problems; and which scale of slip it is.
+        """
+        friction, load, interface = self.friction, self.load, self.interface
+        problems: list[str] = []
+
+        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
+            try:
+                return profiles_of(name, given.get(name, own), interface, samples, infinite)
+            except InputError as error:
+                problems.extend(error.problems)
+                return None
+
+        if "strength" not in given:
+            raise InputError("strength: missing among the profiles")
+        strength = checked("strength", None, None, "barriers" in accept)
+        samples = 1 if strength is None else strength.shape[0]
+        own_residual: Any = 0.0
+        if strength is not None:
+            own_residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
+        residual = checked("residual_strength", own_residual, samples)
+        initial = checked("initial_stress", load.initial_stress, samples)
+        pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
+        if load.normal_pressure is not None or "normal_pressure" in given:
+            pressure = checked("normal_pressure", load.normal_pressure, samples)
+        scales = [name for name in SCALES if name in given]
+        if len(scales) > 1:
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+        scale, own_scale = friction.scale
+        scale = scales[0] if scales else scale
+        value = checked(scale, own_scale, samples)
+        return [strength, residual, value, initial, pressure], scale, problems
+
+    def _impossible(self, values: list[Any], scale: str, accept: Collection[str]) -> list[str]:
+        """What is wrong with values of the right shape, or None."""
+        strength, residual, value, initial, _ = values
+        along, problems = self.interface.axes, []
+        if value is not None and value.min() <= 0.0:
+            unit = PROFILES[scale].units
+            problems.append(f"{scale}: must be positive, got {value.min():g} {unit}")
+        if residual is not None and residual.min() < 0.0:
+            problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
+        if strength is None:
+            return problems
+        stuck = np.isinf(strength).all(axis=along)
+        if stuck.any():
+            problems.append(
+                f"strength: infinite at every node of sample {int(np.argmax(stuck))}; nothing can"
+                " break"
+            )
+        if initial is not None and "overstress" not in accept and np.any(strength <= initial):
+            number, *node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
+            where = (number, *node)
+            problems.append(
+                f"strength: must be above initial_stress everywhere; sample {number}, node"
+                f" {', '.join(map(str, node))}: {strength[where]:g} against {initial[where]:g} Pa;"
+                " only st.Rupture() begins above the strength"
+            )
+        if residual is not None:
+            weakens = (strength > residual) & np.isfinite(strength)
+            nowhere = np.flatnonzero(~weakens.any(axis=along) & ~stuck)
+            if nowhere.size:
+                first = strength[nowhere[0]]
+                problems.append(
+                    f"strength: must be above residual_strength somewhere; sample {nowhere[0]} is"
+                    f" nowhere, from {first.min():g} to {first.max():g} Pa: check the units of both"
+                )
+        return problems
+
+    def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
+        """Weakening rates, Pa/m, from critical slip or fracture energy."""
+        with np.errstate(over="ignore"):  # too short a critical slip is refused by the caller
+            rates = self.friction.rate(strength - residual, scale, value)
+        barriers = np.isinf(strength)
+        if barriers.any():  # any rate will do where nothing weakens
+            along = self.interface.axes
+            own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
+            rates = np.where(barriers, own, rates)
+        return rates
+
+
+def profiles_of(
+    name: str, value: Any, interface: Interface, samples: int | None = None, infinite: bool = False
+) -> Array:
+    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError` naming it.
+
+    A single profile (*shape) is one sample; where `samples` is given, a number, a profile or one
+    number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays the names of
+    dimensions, the coordinates and the units decide. Positive infinity passes if `infinite`.
+    """
+    shape = interface.shape
+    nodes = ", ".join(map(str, shape))
+    first = "samples" if samples is None else str(samples)
+    valid = f"({first}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
+    if samples is not None:
+        valid += f", ({samples}, 1) or a number"
+    try:
+        array = real_array(at_nodes(name, value, name, interface).values)
+    except TypeError as error:
+        raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
+    if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
+        array = array[..., 0]
+    allowed: set[tuple[int, ...]] = {shape}
+    if samples is not None:
+        column = (samples, *(1 for _ in shape))
+        if array.shape == (samples, 1):
+            array = array.reshape(column)
+        allowed |= {(), (samples, *shape), column}
+    if array.shape not in allowed and not (samples is None and array.shape[1:] == shape):
+        turned = _turned(array.shape[-2:], shape)
+        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{turned}")
+    if array.size == 0:
+        raise InputError(f"{name}: has no samples, shape {array.shape}")
+    _check_finite(name, array, interface, infinite)
+    if samples is not None:
+        return np.broadcast_to(array, (samples, *shape))
+    return array[None] if array.shape == shape else array
+
+
+def _check_finite(name: str, array: Array, interface: Interface, infinite: bool) -> None:
+    bad = np.isnan(array) | (array == -np.inf) if infinite else ~np.isfinite(array)
+    if not bad.any():
+        return
+    missing = np.isnan(array)
+    unless = ", or inf where nothing breaks" if infinite else ""
+    if len(interface.shape) == 1 and array.shape[-1:] == interface.shape and missing.any():
+        where = describe_gaps(np.atleast_2d(missing), interface)
+        raise InputError(
+            f"{name}: must be finite{unless}: there {where}; st.onset(..., gaps='fill') and"
+            " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
+        )
+    entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
+    raise InputError(f"{name}: must be finite{unless}; entry {entry} is not")
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name: of a mapping or dataset, or of the strength alone."""
+    if isinstance(given, Mapping):  # a Dataset is one too
+        names = [str(name) for name in given]
+        unknown = [name for name in names if name not in PROFILES]
+        if unknown and not hasattr(given, "data_vars"):
+            raise InputError([unknown_name("profiles", name, PROFILES) for name in unknown])
+        return {name: given[name] for name in names if name in PROFILES}
+    return {"strength": given}
+
+
+def _turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
+    if len(shape) == 2 and given == shape[::-1]:
+        return "; x and y have changed places: the first axis of a profile is x"
+    return ""

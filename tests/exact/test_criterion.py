@@ -16,7 +16,7 @@ from stiction.criterion.windows import (
     transform,
     windows_of,
 )
-from stiction.problem import SMALLEST_EIGENVALUE
+from stiction.friction.parameters import SMALLEST_EIGENVALUE
 
 
 def multiplier_of(problem):

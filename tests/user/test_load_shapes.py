@@ -1,9 +1,14 @@
 """Load shapes and event sequences: in Python, in study files, swept, and refused by name."""
 
+from typing import Literal
+
 import numpy as np
+import pydantic
 import pytest
 
 import stiction as st
+from stiction.load import LoadShape, distance, register
+from stiction.model import Positive, model, to_plain
 
 PLAIN = st.paper.problem(nodes=256)
 
@@ -105,3 +110,40 @@ def test_quantile_distance():
     assert np.mean([each.error for each in found]) == pytest.approx(values.std(), rel=0.2)
     with pytest.raises(st.InputError, match="low, high"):
         st.quantile_distance(values, 0.5, 0.5)
+
+
+@register
+@model(kw_only=True)
+class BumpLoad(LoadShape):
+    """A load of one's own: higher within `width` (m) of the middle."""
+
+    width: Positive
+    type: Literal["bump"] = "bump"
+
+    def values(self, interface):
+        return 1.0 + (distance(interface, 0.5) < self.width)
+
+
+def test_a_load_of_ones_own():
+    problem = loaded(BumpLoad(width=0.02))
+    assert problem.load_profile.mean() == pytest.approx(1.0, abs=1e-14)
+    plain = to_plain(problem)
+    assert plain["load"]["profile"] == {"type": "bump", "width": 0.02}
+    from_file = pydantic.TypeAdapter(st.Problem).validate_python(plain)
+    assert from_file == problem
+    tau_p = st.paper.strength(PLAIN).sample(PLAIN.interface, samples=2, seed=0)
+    for sample in (tau_p, from_file.sample(tau_p)):
+        found = st.onset(from_file, sample, method=st.LocalCriterion())
+        assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
+    with pytest.raises(
+        st.InputError, match=r"BumpLoad.width: must be greater than 0"
+    ):
+        st.Load(profile={"type": "bump", "width": 0.0})
+    with pytest.raises(st.InputError, match=r"Bump.* must be positive everywhere"):
+        loaded(NegativeBump(width=0.02))
+
+
+@model(kw_only=True)
+class NegativeBump(BumpLoad):
+    def values(self, interface):
+        return super().values(interface) - 1.5

@@ -85,7 +85,7 @@ def _lengths(problems: Sequence[Any], fields: Sequence[Any]) -> Lines:
         lengths = [problem.nucleation_length for problem in problems]
     except InputError:
         return [("nucleation length", "varies along the interface")]
-    nodes = _range((p.nodes_in_nucleation_length(p.uniform_rate) for p in problems), "nodes")
+    nodes = _range((min(p.nodes_in_nucleation_length(p.uniform_rate)) for p in problems), "nodes")
     axes = range(min(len(problem.interface.lengths) for problem in problems))
     pairs = list(zip(problems, lengths, strict=True))
     ratio = " x ".join(

@@ -15,9 +15,8 @@ from stiction.criterion.average import LocalOnset, local_onset, minimum_rows
 from stiction.criterion.windows import Weights, Window, windows_of
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import describe, model
-from stiction.problem import Problem
+from stiction.problem import Problem, Sample
 from stiction.results import Variable, onset_variables, position
-from stiction.sample import Sample
 
 SLIP = {1: 0.6614, 2: 1.3788}
 """W times the slip at the centre of a critical patch over the curvature of its strength, in one and

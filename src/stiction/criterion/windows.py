@@ -104,7 +104,7 @@ def windows_of(
 
 
 def _line_window(problem: Problem, rate: float, weights: Weights) -> Window:
-    length, interface = problem.nucleation_length_of(rate), problem.interface
+    length, interface = problem.nucleation_lengths(rate)[0], problem.interface
     if length > interface.extent:
         raise InputError(
             f"interface.length: the nucleation length {length:.4g} m is longer than the"
@@ -131,7 +131,7 @@ def _plane_window(problem: Problem, rate: float, aspect: float) -> Window:
     grid, solid = problem.interface, problem.solid
     found = _kept(grid.shape, grid.lengths, solid.shear_modulus, solid.poisson_ratio, rate, aspect)
     if found is None:
-        length = problem.nucleation_length_of(rate)
+        length = problem.nucleation_lengths(rate)[0]
         size = " x ".join(f"{one:.4g}" for one in grid.lengths)
         raise InputError(
             f"interface.length: a critical patch of aspect {aspect:.3g} does not fit on a plane of"

@@ -9,8 +9,7 @@ from stiction.dynamics import monitor
 from stiction.dynamics.integrator import Run, State
 from stiction.dynamics.loading import load_at
 from stiction.errors import InputError, warn_accuracy
-from stiction.problem import FEWEST_NODES, Problem
-from stiction.sample import Sample
+from stiction.problem import FEWEST_NODES, Problem, Sample
 
 SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
 _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
@@ -18,7 +17,7 @@ _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the str
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the nucleation length is not resolved, with the error to expect."""
-    unit = problem.nucleation_length_of(rows.steepest_rate) / problem.effective_modulus
+    unit = problem.nucleation_lengths(rows.steepest_rate)[0] / problem.effective_modulus
     moduli = (problem.effective_modulus, problem.solid.shear_modulus)  # mode II, across it III
     spacings = problem.interface.spacings
     resolution = min(unit * g / h for g, h in zip(moduli, spacings, strict=False))
@@ -45,7 +44,7 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
     """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
     rates, interface = run.setting.nodes.weakening, problem.interface
     modulus = problem.solid.shear_modulus if interface.is_plane else problem.effective_modulus
-    shortest = problem.nucleation_length_of(1.0) * modulus / problem.effective_modulus
+    shortest = problem.nucleation_lengths(1.0)[0] * modulus / problem.effective_modulus
     longest = shortest / (FEWEST_NODES * interface.spacing)
     steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
     if steep.size:

@@ -17,9 +17,8 @@ from stiction.dynamics.method import Rupture
 from stiction.dynamics.misfit import misfit, read_record
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.model import Count, model
-from stiction.problem import Problem
+from stiction.problem import Problem, Sample
 from stiction.results import Variable
-from stiction.sample import Sample
 
 _COMPARED = {
     "misfit": Variable("1", "root mean square difference from the record over that of the record"),

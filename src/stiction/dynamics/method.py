@@ -28,10 +28,10 @@ from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction import FrictionLaw
+from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.model import Count, Positive, _number, model
-from stiction.problem import SMALLEST_EIGENVALUE, Problem
+from stiction.problem import Problem, Sample, steepest_rate
 from stiction.results import Variable, onset_variables
-from stiction.sample import Sample, steepest_rate
 
 Floats = NDArray[np.float64]
 Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]

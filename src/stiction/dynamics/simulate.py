@@ -39,11 +39,10 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
 from stiction.methods import refusals
 from stiction.model import describe, real_array, to_plain
-from stiction.problem import Problem
+from stiction.problem import Problem, named_profiles
 from stiction.profiles import at_nodes
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
-from stiction.sample import named_profiles
 
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are streamed
 _NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'

@@ -26,8 +26,7 @@ from stiction.equilibrium.prepared import Setting
 from stiction.equilibrium.solver import sample_of
 from stiction.equilibrium.workspace import Sample as StaticSample
 from stiction.errors import InputError
-from stiction.problem import Problem
-from stiction.sample import Sample
+from stiction.problem import Problem, Sample
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +72,7 @@ def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: floa
     if onset is None:
         return None
     asked = _TOLERANCE * run.scale_at(onset.load)
-    crossing = setting.problem.nucleation_length_of(run.steepest_rate) / (
+    crossing = setting.problem.nucleation_lengths(run.steepest_rate)[0] / (
         setting.problem.solid.shear_wave_speed
     )
     distance = max(_CROSSINGS * crossing * rate, 1e-6 * asked)

@@ -62,7 +62,7 @@ def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
         problem.effective_modulus,
         problem.solid.shear_modulus,
     )  # mode II along x, III along y
-    unit = problem.nucleation_length_of(run.steepest_rate) / problem.effective_modulus
+    unit = problem.nucleation_lengths(run.steepest_rate)[0] / problem.effective_modulus
     return [
         min(max(lengths * unit * modulus, 8.0 * spacing), 0.25 * length)
         for modulus, spacing, length in zip(

@@ -15,7 +15,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.methods import Values, accepted, check_method, prepared, refusals, variables_of
 from stiction.model import describe
-from stiction.problem import Problem
+from stiction.problem import PROFILES, Problem, Sample
 from stiction.random.checks import check_residual, warn_if_unresolved
 from stiction.random.pressure import (
     check_pressure,
@@ -26,7 +26,6 @@ from stiction.random.pressure import (
 from stiction.random.random_interface import as_random_interface
 from stiction.random.synthesis import block_of
 from stiction.results import Variable, along
-from stiction.sample import PROFILES, Sample
 
 SLOW = 32
 """Methods that solve fewer samples at once take so long that drawing does not matter."""

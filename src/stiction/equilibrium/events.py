@@ -13,9 +13,8 @@ from stiction.arrays import Array
 from stiction.equilibrium.plane_path import plane_jumps
 from stiction.equilibrium.solver import Solver
 from stiction.model import to_plain
-from stiction.problem import Problem
+from stiction.problem import Problem, Sample
 from stiction.results import Variable, coordinate, position, to_dataset
-from stiction.sample import Sample
 
 EVENT = Variable("1", "event number", ("event",))
 VARIABLES = {

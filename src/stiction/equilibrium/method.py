@@ -13,8 +13,8 @@ from stiction.equilibrium.plane_solver import PlaneSolver
 from stiction.equilibrium.solver import Solver
 from stiction.model import Real, _count, model
 from stiction.problem import Problem
+from stiction.problem import Sample as Samples
 from stiction.results import Variable, along, onset_variables, position
-from stiction.sample import Sample as Samples
 
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]

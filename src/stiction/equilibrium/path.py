@@ -18,8 +18,8 @@ from stiction.equilibrium.workspace import Sample
 from stiction.errors import InputError
 from stiction.model import real_array, to_plain
 from stiction.problem import Problem
+from stiction.problem import Sample as Samples
 from stiction.results import Variable, along, coordinate, to_dataset
-from stiction.sample import Sample as Samples
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {

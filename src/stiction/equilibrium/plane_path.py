@@ -14,8 +14,7 @@ from stiction.equilibrium.plane_onset import symbol_of
 from stiction.equilibrium.plane_patches import labelled_patches, patch_of
 from stiction.equilibrium.plane_solver import plane_of, sample_of
 from stiction.errors import warn_accuracy
-from stiction.problem import Problem
-from stiction.sample import Sample
+from stiction.problem import Problem, Sample
 
 ACCURACY = 1e-7
 """Of loads, as a share, and of stresses, as a share of the mean strength."""

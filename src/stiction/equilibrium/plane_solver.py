@@ -14,8 +14,7 @@ from stiction.equilibrium.least_equilibrium import AT_RESIDUAL, SLIDING, PlaneSa
 from stiction.equilibrium.plane_onset import Plane
 from stiction.equilibrium.plane_patches import critical_patch, labelled_patches
 from stiction.errors import warn_accuracy
-from stiction.problem import Problem
-from stiction.sample import Sample
+from stiction.problem import Problem, Sample
 
 FINE = 8.0
 """Nodes in the nucleation length, along x and along y, below which there is a warning."""
@@ -58,7 +57,7 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
 def warn_if_coarse(problem: Problem, rate: float) -> None:
     """Warn where few nodes lie in the nucleation length of a weakening rate (Pa/m)."""
     across = {"x": problem.effective_modulus, "y": problem.solid.shear_modulus}
-    unit = problem.nucleation_length_of(rate) / problem.effective_modulus
+    unit = problem.nucleation_lengths(rate)[0] / problem.effective_modulus
     spacings = dict(zip("xy", problem.interface.spacings, strict=True))
     nodes = {dim: unit * across[dim] / spacings[dim] for dim in "xy"}
     coarse = " and ".join(

@@ -83,7 +83,7 @@ class Setting:
 
     def refuse_too_fine(self, steepest_rate: float) -> None:
         """`InputError` where a grid is so much too fine that it would take minutes."""
-        resolution = self.problem.nucleation_length_of(steepest_rate) / self.spacing
+        resolution = self.problem.nucleation_lengths(steepest_rate)[0] / self.spacing
         if self.nodes < LARGE_GRID or resolution <= WIDEST_PATCH:
             return
         share = int(np.ceil(resolution / WIDEST_PATCH))

@@ -31,7 +31,7 @@ from stiction.equilibrium.single_patch_test import runs_away
 from stiction.equilibrium.workspace import Sample, make_sample
 from stiction.errors import warn_accuracy
 from stiction.problem import Problem
-from stiction.sample import Sample as Samples
+from stiction.problem import Sample as Samples
 
 WORST_GAP = 1e-9
 """Certificate gap, as a share of the load, from which on there is a warning."""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.elasticity.inner_product import dot
 from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.jit import jit
-from stiction.problem import SMALLEST_EIGENVALUE
 
 GROWTH = 1.04
 """Ratio of successive widths tried where the weakening rate varies."""

@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 
 from stiction.arrays import Array
 
+SMALLEST_EIGENVALUE = 0.5788869418506
+"""lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
+
 
 class Linear(NamedTuple):
     """The linear law needs no numbers but those of the sample."""

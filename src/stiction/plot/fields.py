@@ -13,8 +13,7 @@ from stiction.interface import Interface
 from stiction.plot import maps
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, series
-from stiction.problem import Problem
-from stiction.sample import PROFILES
+from stiction.problem import PROFILES, Problem
 
 MOST_LINES = 6
 _SYMBOLS = {

@@ -152,7 +152,7 @@ def _share_too_steep(problem: Problem, random: RandomInterface, scale: str) -> f
     else:
         residual = _everywhere(friction.residual_strength)
     rate = friction.rate(np.maximum(strength - residual, 0.0), scale, found[scale])
-    highest = problem.nodes_in_nucleation_length(1.0) / FEWEST_NODES  # Pa/m
+    highest = min(problem.nodes_in_nucleation_length(1.0)) / FEWEST_NODES  # Pa/m
     return float(weight[rate > highest].sum())
 
 

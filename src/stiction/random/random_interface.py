@@ -17,10 +17,10 @@ from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.model import describe, model
+from stiction.problem import PROFILES
 from stiction.random.modes import Modes
 from stiction.random.random_field import RandomField, check_counts
 from stiction.random.synthesis import block_of, standard_normal
-from stiction.sample import PROFILES
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
@@ -190,7 +190,7 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """What is random, by name, in the order of `stiction.sample.PROFILES`."""
+        """What is random, by name, in the order of `stiction.problem.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property

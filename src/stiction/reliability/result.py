@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.errors import warn_accuracy
 from stiction.methods import label, study_attributes
+from stiction.problem import PROFILES
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, along
-from stiction.sample import PROFILES
 
 
 @dataclass(frozen=True, eq=False)
