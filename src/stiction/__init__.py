@@ -36,16 +36,11 @@ _HOMES = {
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",
     "open_rupture": "dynamics.stream",
-    "misfit": "dynamics.misfit",
     "RuptureMisfit": "dynamics.compared",
     "read_profile": "profiles",
     "onset": "methods",
     "monte_carlo": "ensemble.monte_carlo",
-    "combined_mean": "statistics.control_variates",
-    "density": "statistics.densities",
-    "quantiles": "statistics.quantiles",
     "fit_field": "inference.fit",
-    "quantile_distance": "statistics.quantiles",
     "failure_probability": "reliability.estimate",
     "FailureProbability": "reliability.result",
     "DesignStress": "reliability.design",
@@ -63,7 +58,13 @@ _HOMES = {
     "AccuracyWarning": "errors",
     "UnitWarning": "errors",
 }
-_MODULES = {"external": "external", "paper": "paper", "plot": "plot", "theory": "theory"}
+_MODULES = {
+    "external": "external",
+    "paper": "paper",
+    "plot": "plot",
+    "statistics": "statistics",
+    "theory": "theory",
+}
 
 __all__ = ["__version__", *_HOMES, *_MODULES]
 

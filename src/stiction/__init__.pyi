@@ -4,11 +4,11 @@
 from stiction import external as external
 from stiction import paper as paper
 from stiction import plot as plot
+from stiction import statistics as statistics
 from stiction import theory as theory
 from stiction.criterion.local import LocalCriterion as LocalCriterion
 from stiction.dynamics.compared import RuptureMisfit as RuptureMisfit
 from stiction.dynamics.method import Rupture as Rupture
-from stiction.dynamics.misfit import misfit as misfit
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
@@ -79,10 +79,6 @@ from stiction.reliability.design import (
 from stiction.reliability.estimate import failure_probability as failure_probability
 from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
-from stiction.statistics.control_variates import combined_mean as combined_mean
-from stiction.statistics.densities import density as density
-from stiction.statistics.quantiles import quantile_distance as quantile_distance
-from stiction.statistics.quantiles import quantiles as quantiles
 from stiction.study.study import Ensemble as Ensemble
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run

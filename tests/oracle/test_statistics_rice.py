@@ -1,5 +1,7 @@
 """The distribution of the critical stress from crossing rates, against Monte Carlo."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -29,6 +31,35 @@ def test_lower_tail_agrees_with_monte_carlo(problem, make_strength, ratio):
     # Beyond its range it is too low, by a few per cent at the median.
     median = found.failure_probability(np.median(stress))
     assert 0.44 < median < 0.5
+
+
+@pytest.mark.parametrize("load", [st.Load(initial_stress=2e5), st.Load(profile=2.0)])
+def test_it_is_the_critical_stress_and_not_the_load(problem, make_strength, load):
+    """With an initial stress it was shifted by it, with p = 2 every sample failed."""
+    loaded = dataclasses.replace(problem, load=load)
+    field = make_strength(1.0)
+    found = st.monte_carlo(
+        loaded, field, method=st.LocalCriterion(), samples=4000, seed=5, pilot=False
+    )
+    level = float(found.critical_stress.quantile(0.1))
+    rice = rice_distribution(loaded, field, profiles=2000, seed=9)
+    # 400 samples and as many crossings: 5 % each, three times over, and 5 % of the approximation.
+    assert rice.failure_probability(level) == pytest.approx(0.1, rel=0.25)
+
+
+def test_friction_coefficients_count_in_pascals(problem):
+    """0.22 was taken for 0.22 Pa."""
+    pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
+    spectrum = st.PowerLawSpectrum(5e-3)
+    in_pascals = st.RandomField(st.Beta(alpha=2.0, beta=3.0, low=0.4e6, high=1.2e6), spectrum)
+    coefficient = st.RandomField(
+        st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6), spectrum, of="friction_coefficient"
+    )
+    found, expected = (
+        rice_distribution(pressed, field, profiles=64) for field in (coefficient, in_pascals)
+    )
+    np.testing.assert_allclose(found.stress, expected.stress, rtol=1e-9)
+    assert np.mean(found.probability == expected.probability) > 0.99
 
 
 def test_says_where_to_trust_it(problem, make_strength):

@@ -100,18 +100,6 @@ def test_statistics_want_a_uniform_load():
         st.theory.nucleation_statistics(problem, st.paper.strength(PLAIN))
 
 
-def test_quantile_distance():
-    """Of a normal distribution: 1.349 deviations, with the error that repetition shows."""
-    generator = np.random.default_rng(0)
-    found = [st.quantile_distance(row, 0.25, 0.75) for row in generator.normal(size=(200, 2000))]
-    values = np.array([each.value for each in found])
-    # 200 repetitions know the mean to 0.002 and the scatter to 5 %.
-    assert values.mean() == pytest.approx(1.349, abs=0.01)
-    assert np.mean([each.error for each in found]) == pytest.approx(values.std(), rel=0.2)
-    with pytest.raises(st.InputError, match="low, high"):
-        st.quantile_distance(values, 0.5, 0.5)
-
-
 @register
 @model(kw_only=True)
 class BumpLoad(LoadShape):
@@ -135,9 +123,7 @@ def test_a_load_of_ones_own():
     for sample in (tau_p, from_file.sample(tau_p)):
         found = st.onset(from_file, sample, method=st.LocalCriterion())
         assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
-    with pytest.raises(
-        st.InputError, match=r"BumpLoad.width: must be greater than 0"
-    ):
+    with pytest.raises(st.InputError, match=r"BumpLoad.width: must be greater than 0"):
         st.Load(profile={"type": "bump", "width": 0.0})
     with pytest.raises(st.InputError, match=r"Bump.* must be positive everywhere"):
         loaded(NegativeBump(width=0.02))

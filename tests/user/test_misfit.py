@@ -8,6 +8,7 @@ import xarray as xr
 
 import stiction as st
 from stiction.dynamics.misfit import read_record
+from stiction.statistics import misfit
 
 LENGTH, NODES = 0.1, 200
 X = np.arange(NODES) * LENGTH / NODES
@@ -34,7 +35,7 @@ def record(shift=0.0, scale=1.0, places=(0.03, 0.05), name="slip"):
 
 @pytest.mark.parametrize("shift", [-3e-5, 0.0, 4.4e-5])
 def test_a_shifted_record_fits_and_its_shift_is_found(shift):
-    found = st.misfit(RUN, record(shift))
+    found = misfit(RUN, record(shift))
     # Frames 1 us apart for a front of 20 us, linear in between: 1e-3 of the slip.
     assert found.misfit < 2e-3
     assert found.time_shift == pytest.approx(0.97e-3 + shift, abs=1e-7)
@@ -43,24 +44,24 @@ def test_a_shifted_record_fits_and_its_shift_is_found(shift):
 
 def test_without_alignment_times_are_those_of_the_run():
     own = record().assign_coords(time=np.linspace(0.0, 0.2e-3, 150) + 0.97e-3)
-    assert st.misfit(RUN, own, align=False).misfit < 2e-3
-    assert st.misfit(RUN, record(), align=False).misfit == pytest.approx(1.0, abs=0.01)
+    assert misfit(RUN, own, align=False).misfit < 2e-3
+    assert misfit(RUN, record(), align=False).misfit == pytest.approx(1.0, abs=0.01)
 
 
 def test_what_is_measured_half_as_large_is_off_by_its_own_size():
     own = record(scale=0.5).assign_coords(time=np.linspace(0.0, 0.2e-3, 150) + 0.97e-3)
-    assert st.misfit(RUN, own, align=False).misfit == pytest.approx(1.0, abs=2e-3)
+    assert misfit(RUN, own, align=False).misfit == pytest.approx(1.0, abs=2e-3)
 
 
 def test_units_gaps_and_single_gauges():
     stated = record() * 1e6
     stated.attrs["units"] = "um"
     stated.name = "slip"
-    assert st.misfit(RUN, stated).misfit < 2e-3
+    assert misfit(RUN, stated).misfit < 2e-3
     holes = record()
     holes[10:20, 0] = np.nan
-    assert st.misfit(RUN, holes).misfit < 2e-3
-    assert st.misfit(RUN, record().isel(x=0)).by_gauge.shape == (1,)
+    assert misfit(RUN, holes).misfit < 2e-3
+    assert misfit(RUN, record().isel(x=0)).by_gauge.shape == (1,)
 
 
 def test_strain_is_half_the_derivative_of_slip():
@@ -75,7 +76,7 @@ def test_strain_is_half_the_derivative_of_slip():
     measured = xr.DataArray(
         strain, coords={"time": times, "x": [0.02, 0.06]}, dims=("time", "x"), name="strain"
     )
-    assert st.misfit(run, measured, align=False).misfit < 1e-9
+    assert misfit(run, measured, align=False).misfit < 1e-9
 
 
 def write(path, text):
@@ -93,14 +94,23 @@ def test_a_record_from_a_file(tmp_path):
 
 
 BAD = {
-    "no such quantity": (lambda: st.misfit(RUN, record(name="speed")), ["one of slip", "'speed'"]),
-    "not in the run": (lambda: st.misfit(RUN, record(name="slip_rate")), ["holds no slip_rate"]),
-    "gauge elsewhere": (lambda: st.misfit(RUN, record(places=(30.0, 50.0))), ["x = 30 m", "unit"]),
-    "too short": (lambda: st.misfit(RUN, record()[:3]), ["at least 5"]),
-    "zero": (lambda: st.misfit(RUN, record(scale=0.0)), ["zero throughout"]),
-    "unsorted": (lambda: st.misfit(RUN, record()[::-1]), ["rising"]),
-    "a table": (lambda: st.misfit(RUN, [1, 2, 3]), ["measured", "DataArray"]),
-    "no run": (lambda: st.misfit(record(), record()), ["run", "Dataset"]),
+    "no such quantity": (
+        lambda: misfit(RUN, record(name="speed")),
+        ["one of slip", "'speed'"],
+    ),
+    "not in the run": (
+        lambda: misfit(RUN, record(name="slip_rate")),
+        ["holds no slip_rate"],
+    ),
+    "gauge elsewhere": (
+        lambda: misfit(RUN, record(places=(30.0, 50.0))),
+        ["x = 30 m", "unit"],
+    ),
+    "too short": (lambda: misfit(RUN, record()[:3]), ["at least 5"]),
+    "zero": (lambda: misfit(RUN, record(scale=0.0)), ["zero throughout"]),
+    "unsorted": (lambda: misfit(RUN, record()[::-1]), ["rising"]),
+    "a table": (lambda: misfit(RUN, [1, 2, 3]), ["measured", "DataArray"]),
+    "no run": (lambda: misfit(record(), record()), ["run", "Dataset"]),
 }
 
 

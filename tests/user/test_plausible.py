@@ -129,5 +129,5 @@ def test_representations_fit_on_a_screen(tmp_path):
     study.run(out=tmp_path / "run")
     assert repr(st.open_run(tmp_path / "run")).endswith("run': 3 samples>")
     assert len(repr(st.open_run(tmp_path / "run").status())) < 200
-    assert len(repr(st.density(np.random.default_rng(0).random(1000)))) < 300
+    assert len(repr(st.statistics.density(np.random.default_rng(0).random(1000)))) < 300
     assert issubclass(st.StoreError, st.RunError)

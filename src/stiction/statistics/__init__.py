@@ -1,1 +1,21 @@
-"""Statistics of strength and onset: moments and limits, densities, quantiles, extremes."""
+"""Statistics of samples: densities, quantiles, combined means, and the misfit of two ruptures."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "density": "stiction.statistics.densities",
+    "quantiles": "stiction.statistics.quantiles",
+    "combined_mean": "stiction.statistics.control_variates",
+    "misfit": "stiction.dynamics.misfit",
+}
+
+__all__ = ["combined_mean", "density", "misfit", "quantiles"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'stiction.statistics' has no attribute {name!r}")

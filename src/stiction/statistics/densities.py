@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.special import betainc
+from scipy.stats import beta
 
-from stiction._checks import is_real
+from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.jit import jit
-from stiction.model import brief, describe
+from stiction.model import Real, brief, checked
 from stiction.statistics.estimates import as_sample
-
-Array = NDArray[np.float64]
 
 CELLS = 4096
 STAGES = 7
+STEEPEST = 3.0
+"""Largest exponent with which a distribution function is taken to rise from its bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class Density:
     Attributes
     ----------
     x : (m,) array
-        Where, in the unit of the values.
+        Centres of equal cells, in the unit of the values.
     value : (m,) array
         The density, 1/unit. It integrates to 1 over the support.
     error : (m,) array
         Its standard error from sampling; smoothing over `bandwidth` is not part of it.
     bandwidth : float
-        Standard deviation of the smoothing kernel, in the unit of the values.
+        Standard deviation of the smoothing kernel at the median, in the unit of the values.
     """
 
     x: Array
@@ -48,23 +48,9 @@ class Density:
     __repr__ = brief
 
 
-@jit
-def count_into(values: Array, low: float, high: float, counts: NDArray[np.int64]) -> None:
-    """Add flat `values` to counts in equal cells of [low, high]; the ends take what is beyond."""
-    cells = counts.size
-    scale = cells / (high - low)
-    for i in range(values.size):
-        cell = int((values[i] - low) * scale)
-        counts[min(max(cell, 0), cells - 1)] += 1
-
-
-def density(
-    values: Any,
-    *,
-    bounds: tuple[float | None, float | None] = (None, None),
-    smoothing: float = 1.0,
-) -> Density:
-    """Density of independent values, smoothed without crossing the bounds.
+@checked
+def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, None)) -> Density:
+    """Estimate the density of independent values, smoothed without crossing the bounds.
 
     Parameters
     ----------
@@ -72,9 +58,6 @@ def density(
     bounds : (float or None, float or None)
         Lower and upper bound of the distribution where it has them, in the unit of the values:
         for strength those of its marginal.
-    smoothing : float
-        Factor on the bandwidth, positive: more than one where a curve shall not show what the
-        sample cannot tell.
 
     Returns
     -------
@@ -91,39 +74,71 @@ def density(
     Diffusion estimator of Botev, Grotowski and Kroese (2010): the histogram on a fine grid evolves
     by the heat equation with no flux through the ends, which is a Gaussian kernel reflected at the
     bounds; the time of diffusion, and so the bandwidth, solves their fixed-point equation (14)
-    without reference to a normal distribution. No mass leaves the support and the density may be
-    positive at a bound; what it does within about a bandwidth of the bound is smoothed away.
-    Where there is no bound the grid reaches beyond the sample. Stretching the bound to infinity
-    with a logarithm resolves more there but spikes wherever a few values crowd on the bound.
+    without reference to a normal distribution.
+
+    A density that vanishes at a bound would be made positive there. So the share of values within
+    a distance d of a bound is first fitted by d^b, with b from the logarithms of the smallest
+    distances (Hill, 1975). If b is significantly above 1, the estimate is that of the values
+    mapped by the beta distribution function with these exponents, for which the density of the
+    mapped values neither vanishes nor has a slope. Where there is no bound the grid reaches beyond
+    the sample.
 
     Examples
     --------
     >>> import numpy as np
     >>> import stiction as st
-    >>> found = st.density(np.random.default_rng(0).normal(size=2000))
+    >>> found = st.statistics.density(np.random.default_rng(0).normal(size=2000))
     >>> bool(abs(found.value.max() - 0.4) < 0.03)  # 1/sqrt(2 pi)
     True
     """
     sample = as_sample(values, 16)
     low, high = _ends(sample, bounds)
-    counts = np.zeros(CELLS, dtype=np.int64)
-    count_into(sample, low, high, counts)
-    return density_of_counts(counts, low, high, effective=sample.size, smoothing=smoothing)
+    shape = tuple(
+        _exponent(np.abs(sample - end)) if bound == end else 1.0
+        for end, bound in zip((low, high), bounds, strict=True)
+    )
+    width = high - low
+    mapped = betainc(*shape, np.clip((sample - low) / width, 0.0, 1.0))
+    counts = np.bincount(np.minimum((mapped * CELLS).astype(int), CELLS - 1), minlength=CELLS)
+    cosine = scipy.fft.dct(counts / sample.size, type=2)  # a_k, k = 0..cells-1
+    time = _diffusion_time(cosine, float(sample.size), CELLS)
+    k = np.arange(CELLS)
+    smooth = scipy.fft.idct(cosine * np.exp(-0.5 * (k * math.pi) ** 2 * time), type=2)
+    # Where the bandwidth is down to a cell the cosine series rings below zero.
+    cumulative = np.append(0.0, np.cumsum(np.maximum(smooth, 0.0)))
+    edges = np.linspace(0.0, 1.0, CELLS + 1)
+    below = np.interp(betainc(*shape, edges), edges, cumulative / cumulative[-1])
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    stretch = beta.pdf(middles, *shape) / width  # of the mapped values
+    value = np.diff(below) * (CELLS / width)
+    bandwidth = math.sqrt(time)
+    # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
+    error = np.sqrt(value * stretch / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
+    middle = (float(np.median(sample)) - low) / width
+    return Density(
+        x=low + middles * width,
+        value=value,
+        error=error,
+        bandwidth=bandwidth * width / float(beta.pdf(middle, *shape)),
+    )
+
+
+def _exponent(distances: Array) -> float:
+    """Return b of a share d^b of values within a distance d of a bound; 1 unless surely above."""
+    count = max(8, int(distances.size**0.6))
+    nearest = np.partition(distances, count)[: count + 1]
+    nearest = nearest[nearest > 0.0]
+    logarithms = float(np.mean(np.log(nearest.max() / nearest))) if nearest.size else 0.0
+    found = 1.0 / logarithms if logarithms > 0.0 else 1.0
+    return min(found, STEEPEST) if found > 1.0 + 3.0 / math.sqrt(count) else 1.0
 
 
 def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:
+    """Return the ends of the grid."""
     smallest, largest = float(sample.min()), float(sample.max())
     spread = largest - smallest
     if spread == 0.0:
         raise InputError(f"values: all are equal to {smallest:g}; they have no density")
-    if (
-        not isinstance(bounds, tuple | list)
-        or len(bounds) != 2
-        or not all(end is None or (is_real(end) and end == end) for end in bounds)
-    ):
-        raise InputError(
-            f"bounds: must be two numbers or None, (low, high), got {describe(bounds)}"
-        )
     low, high = bounds
     problems = []
     if low is not None and smallest < low:
@@ -140,55 +155,8 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     )
 
 
-def density_of_counts(
-    counts: Any, low: float, high: float, *, effective: float, smoothing: float = 1.0
-) -> Density:
-    """The same from counts in equal cells of [low, high], where values do not fit into memory.
-
-    Parameters
-    ----------
-    counts : (cells,) array
-        How many values fell into each cell.
-    low, high : float
-        Ends of the support. No mass diffuses through them, which reflects the kernel there.
-    effective : float
-        How many independent values the counts are worth; fewer than their number where
-        neighbouring points of one field were counted.
-    smoothing : float
-        Factor on the bandwidth.
-
-    Returns
-    -------
-    Density
-        At the centres of the cells.
-    """
-    counts = np.asarray(counts, dtype=np.float64)
-    total = counts.sum()
-    if counts.ndim != 1 or total <= 0.0 or not low < high or not effective > 1.0:
-        raise InputError("counts: must be a (cells,) array with values in it, low < high")
-    cells = counts.size
-    cosine = scipy.fft.dct(counts / total, type=2)  # a_k, k = 0..cells-1
-    if not (is_real(smoothing) and smoothing > 0.0):
-        raise InputError(f"smoothing: must be a positive number, got {describe(smoothing)}")
-    time = _diffusion_time(cosine, float(effective), cells) * smoothing**2
-    k = np.arange(cells)
-    smooth = scipy.fft.idct(cosine * np.exp(-0.5 * (k * math.pi) ** 2 * time), type=2) * cells
-    width = high - low
-    bandwidth = math.sqrt(time) * width
-    # Where the bandwidth is down to a cell the cosine series rings below zero.
-    value = np.maximum(smooth, 0.0)
-    value *= cells / (value.sum() * width)
-    roughness = 1.0 / (2.0 * math.sqrt(math.pi) * bandwidth)  # integral of the kernel squared
-    return Density(
-        x=low + (np.arange(cells) + 0.5) * (width / cells),
-        value=value,
-        error=np.sqrt(value * roughness / effective),
-        bandwidth=bandwidth,
-    )
-
-
 def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
-    """Squared bandwidth on the unit interval (Botev et al., 2010, Algorithm 1)."""
+    """Return the squared bandwidth on the unit interval (Botev et al., 2010, Algorithm 1)."""
     squares = (np.arange(1, cells) ** 2).astype(np.float64)
     power = (0.5 * cosine[1:]) ** 2
     log_squares = np.log(squares)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction._checks import numbers
+from stiction.arrays import Array
 from stiction.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,12 +32,12 @@ class Estimate:
         return Estimate(self.value - other.value, math.hypot(self.error, other.error))
 
     def scaled(self, factor: float) -> Estimate:
-        """The estimate of a multiple."""
+        """Return the estimate of a multiple."""
         return Estimate(self.value * factor, self.error * abs(factor))
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
-    """Independent, finite values as a flat array.
+    """Return independent, finite values as a flat array.
 
     Raises
     ------
@@ -56,7 +54,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
 
 
 def mean(values: Any) -> Estimate:
-    """Mean of independent values.
+    """Estimate the mean of independent values.
 
     Parameters
     ----------
@@ -71,7 +69,7 @@ def mean(values: Any) -> Estimate:
 
 
 def standard_deviation(values: Any) -> Estimate:
-    """Standard deviation of independent values; its error needs no Gaussian assumption.
+    """Estimate the standard deviation of independent values, without a Gaussian assumption.
 
     Parameters
     ----------
@@ -93,34 +91,8 @@ def standard_deviation(values: Any) -> Estimate:
     return Estimate(s, math.sqrt(max(fourth - s**4, 0.0) / sample.size) / (2.0 * s))
 
 
-def skewness(values: Any) -> Estimate:
-    """Skewness of independent values, E[(x - mean)^3]/std^3.
-
-    Parameters
-    ----------
-    values : (samples,) array
-
-    Returns
-    -------
-    Estimate, dimensionless
-
-    Notes
-    -----
-    Error by the influence function u^3 - 3 u - g (1 + 3 (u^2 - 1)/2) of the standardised u, g the
-    skewness.
-    """
-    sample = as_sample(values, 3)
-    s = float(sample.std())
-    if s == 0.0:
-        return Estimate(0.0, 0.0)
-    u = (sample - sample.mean()) / s
-    g = float(np.mean(u**3))
-    influence = u**3 - g - 3.0 * u - 1.5 * g * (u * u - 1.0)
-    return Estimate(g, float(influence.std(ddof=1)) / math.sqrt(sample.size))
-
-
 def share(events: Any) -> Estimate:
-    """Share of independent events that happened.
+    """Estimate the share of independent events that happened.
 
     Parameters
     ----------
@@ -140,43 +112,3 @@ def share(events: Any) -> Estimate:
     n = happened.size
     adjusted = (happened.sum() + 2.0) / (n + 4.0)
     return Estimate(float(happened.mean()), math.sqrt(adjusted * (1.0 - adjusted) / (n + 4.0)))
-
-
-def pooled_moments(sums: Any) -> tuple[Estimate, Estimate, Estimate]:
-    """Mean, standard deviation and skewness of a stationary field from means over each sample.
-
-    The values within a sample are correlated, the samples are not; the errors come from the
-    scatter between samples.
-
-    Parameters
-    ----------
-    sums : (samples, 3) array
-        Of each sample the means over x of d, d^2 and d^3, d the deviation from a fixed reference
-        near the mean.
-
-    Returns
-    -------
-    mean of d, standard deviation, skewness : Estimate
-    """
-    sums = np.asarray(sums, dtype=np.float64)
-    if sums.ndim != 2 or sums.shape[1] != 3 or sums.shape[0] < 2:
-        raise InputError(f"sums: must have shape (samples, 3), samples >= 2, got {sums.shape}")
-    n = sums.shape[0]
-    a1, a2, a3 = sums.mean(axis=0)
-    variance = a2 - a1 * a1
-    third = a3 - 3.0 * a1 * a2 + 2.0 * a1**3
-    deviation = math.sqrt(variance)
-    g = third / deviation**3
-    d1, d2, d3 = (sums - sums.mean(axis=0)).T
-    of_variance = d2 - 2.0 * a1 * d1
-    of_third = d3 - 3.0 * a2 * d1 - 3.0 * a1 * d2 + 6.0 * a1 * a1 * d1
-    of_skewness = of_third / deviation**3 - 1.5 * g * of_variance / variance
-
-    def error(influence: Array) -> float:
-        return float(influence.std(ddof=1)) / math.sqrt(n)
-
-    return (
-        Estimate(float(a1), error(d1)),
-        Estimate(deviation, error(of_variance) / (2.0 * deviation)),
-        Estimate(float(g), error(of_skewness)),
-    )

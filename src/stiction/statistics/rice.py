@@ -8,22 +8,22 @@ level is the expected number of its parts less that of their holes, which low do
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import check_count, numbers, too_many_samples
+from stiction._checks import too_many_samples
+from stiction.arrays import Array
 from stiction.criterion.local import nucleation_stress
 from stiction.errors import InputError
 from stiction.jit import jit
-from stiction.model import brief
+from stiction.model import Count, Numbers, brief, checked
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
-from stiction.statistics.moments import stationary as _uniform_load
-
-Array = NDArray[np.float64]
+from stiction.statistics.moments import stationary
 
 LEVELS = 1024
 BATCH = 256
@@ -44,13 +44,13 @@ class RiceDistribution:
     Attributes
     ----------
     stress : (m,) array
-        Levels x, Pa, rising.
+        Levels x of the critical stress, tau_i + tau_0 p, Pa, rising.
     probability : (m,) array
         P(tau_cr <= x).
     crossing_rate : (m,) array
-        Down-crossings of x by tau_n per metre of interface; on a plane dips below x per m².
+        Down-crossings of x per metre of interface; on a plane dips below x per m².
     point_survival : (m,) array
-        P(tau_n > x) at a point.
+        P(a point holds more than x).
     relative_error : (m,) array
         Sampling error of the crossing rate, one over the root of the crossings that were seen.
     trusted : (m,) array of bool
@@ -65,7 +65,7 @@ class RiceDistribution:
         more than 1.1 of them for each sample that has any, since dips that come together, as with
         a mean mode and a long correlation, make P too high by as much.
     profiles : int
-        How many profiles were sampled.
+        Number of sampled profiles.
     """
 
     stress: Array
@@ -79,7 +79,7 @@ class RiceDistribution:
     __repr__ = brief
 
     def failure_probability(self, stress: Any) -> Any:
-        """P(tau_cr <= stress) by interpolation, for a number or an array, Pa.
+        """Return P(tau_cr <= stress) by interpolation, for a number or an array, Pa.
 
         Zero below the lowest value that was sampled: nothing is extrapolated.
         """
@@ -87,33 +87,35 @@ class RiceDistribution:
         return float(result) if np.ndim(stress) == 0 else result
 
     def quantile(self, probability: float) -> float:
-        """The stress at which P(tau_cr <= stress) reaches `probability`, Pa."""
+        """Return the stress at which P(tau_cr <= stress) reaches `probability`, Pa."""
         if not 0.0 < probability < 1.0:
             raise InputError(f"probability: must be between 0 and 1, got {probability!r}")
-        index = int(np.searchsorted(self.probability, probability))
-        index = min(max(index, 1), self.stress.size - 1)
-        left, right = self.probability[index - 1], self.probability[index]
-        share = (probability - left) / (right - left) if right > left else 1.0
-        step = self.stress[index] - self.stress[index - 1]
-        return float(self.stress[index - 1] + min(max(share, 0.0), 1.0) * step)
+        return float(np.interp(probability, *self._rising))
+
+    @property
+    def _rising(self) -> tuple[Array, Array]:
+        """Probabilities without repetition, each with the highest stress that has it."""
+        chance, last = np.unique(self.probability[::-1], return_index=True)
+        return chance, self.stress[::-1][last]
 
 
+@checked
 def rice_distribution(
     problem: Problem,
     strength: RandomField,
     *,
-    profiles: int = 512,
+    profiles: Count = 512,
     seed: int = 0,
-    stress: Any = None,
+    stress: Numbers | None = None,
 ) -> RiceDistribution:
-    """Distribution of the critical stress of the local criterion from a few hundred profiles.
+    """Approximate the distribution of the critical stress of the local criterion.
 
-    P(tau_cr > x) ~ S_n(x) exp(-L nu(x)/S_n(x)): the stress at one point survives, and from there
+    P(tau_cr > x) ~ S(x) exp(-L nu(x)/S(x)): the stress at one point survives, and from there
     crossings of the level x come as a Poisson process at the rate nu (Rice, 1945; Cramer and
-    Leadbetter, 1967). S_n and nu are pooled from sampled profiles of tau_n, every position of
-    which counts; so a few hundred profiles tell as much of the lower tail as many more minima
-    would. With a Gaussian tau_n of the right moments the same formula would be useless: the lower
-    tail of tau_n is bounded.
+    Leadbetter, 1967). S and nu are pooled from sampled profiles of the nucleation stress, every
+    position of which counts; so a few hundred profiles tell as much of the lower tail as many more
+    minima would. With a Gaussian tau_n of the right moments the same formula would be useless: the
+    lower tail of tau_n is bounded.
 
     On a plane P(tau_cr > x) ~ exp(-chi(x)), with chi the expected Euler characteristic of what lies
     below x in the nucleation stress, that is the number of dips; tau_n is the least over the shapes
@@ -125,89 +127,89 @@ def rice_distribution(
     problem : Problem
         With uniform weakening rate, load and initial stress.
     strength : RandomField
+        Peak strength, Pa; or friction coefficients under a uniform normal pressure.
     profiles : int
         How many profiles to sample, at least 16.
     seed : int
         The profiles are samples 0.. of this seed.
     stress : (m,) array, optional
-        Levels x, Pa, rising; by default 1024 from the lowest to the highest tau_n sampled.
+        Levels of the critical stress, Pa, rising; by default 1024 over the range sampled.
 
     Returns
     -------
     RiceDistribution
-        Its `trusted` says where to believe it.
+        Its `trusted` says where the approximation holds.
 
     Raises
     ------
     InputError
         If the problem has no nucleation stress, its load is not uniform, the profiles are few or
         the levels do not rise.
-    """
-    scale, _, _ = _uniform_load(problem, strength)
-    profiles = check_count("profiles", profiles, 16)
-    too_many = too_many_samples(profiles, 0)
-    if too_many:
-        raise InputError([text.replace("samples", "profiles", 1) for text in too_many])
 
-    plane = problem.interface.is_plane
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> found = st.theory.rice_distribution(problem, strength, profiles=64)
+    >>> bool(found.quantile(0.05) < found.quantile(0.5))
+    True
+    """
+    unit, load, initial = stationary(problem, strength)
+    problems = [f"profiles: must be at least 16, got {profiles}"] if profiles < 16 else []
+    if stress is not None and (
+        stress.ndim != 1 or stress.size == 0 or not np.all(np.diff(stress) > 0.0)
+    ):
+        problems.append("stress: must be a (m,) array of rising levels, Pa")
+    problems += [t.replace("samples", "profiles", 1) for t in too_many_samples(profiles, 0)]
+    if problems:
+        raise InputError(problems)
+
+    interface, plane = problem.interface, problem.interface.is_plane
     # A dip that only just reaches down between two nodes is a crossing as well. The onset of a
     # plane is at a node.
-    fine = ENOUGH_POINTS * problem.interface.spacing / problem.nucleation_length
+    fine = ENOUGH_POINTS * interface.spacing / problem.nucleation_length
     factor = 1 if plane else math.ceil(fine)
-    points = factor * problem.interface.size
-    together = BATCH if not plane else max(1, MOST_NODES // problem.interface.size)
+    points = factor * interface.size
+    together = BATCH if not plane else max(1, MOST_NODES // interface.size)
 
-    def batches() -> Any:
+    def batches() -> Iterator[Array]:
         for first in range(0, profiles, together):
             count = min(together, profiles - first)
-            tau_p = strength.sample(problem.interface, samples=count, seed=seed, first=first)
-            tau_n = nucleation_stress(problem, scale * tau_p)
-            yield tau_n if factor == 1 else _refined(tau_n, points)
+            tau_p = unit * strength.sample(interface, samples=count, seed=seed, first=first)
+            tau = initial + load * nucleation_stress(problem, tau_p)
+            yield tau if factor == 1 else _refined(tau, points)
 
-    if stress is None:
+    levels = stress
+    if levels is None:
         # Two passes over the same samples instead of keeping them: memory does not grow with them.
-        low, high = np.inf, -np.inf
-        for tau_n in batches():
-            low, high = min(low, float(tau_n.min())), max(high, float(tau_n.max()))
-        levels = np.linspace(low, high, LEVELS)
-    else:
-        levels = numbers("stress", stress)
-        if levels.ndim != 1 or levels.size == 0 or not np.all(np.diff(levels) > 0.0):
-            raise InputError("stress: must be a (m,) array of rising levels, Pa")
-    crossings = np.zeros(levels.size + 1, dtype=np.int64)
-    below = np.zeros(levels.size + 1, dtype=np.int64)
-    reached = np.zeros(levels.size + 1, dtype=np.int64)
-    for tau_n in batches():
+        ends = [(float(tau.min()), float(tau.max())) for tau in batches()]
+        levels = np.linspace(min(low for low, _ in ends), max(high for _, high in ends), LEVELS)
+    crossings, below, reached = np.zeros((3, levels.size + 1), dtype=np.int64)
+    for tau in batches():
         if plane:
-            _count_dips(np.searchsorted(levels, tau_n), crossings, below, reached)
+            _count_dips(np.searchsorted(levels, tau), crossings, below, reached)
         else:
-            _count_crossings(tau_n, levels, crossings, below)
+            _count_crossings(tau, levels, crossings, below)
     seen = np.cumsum(crossings)[:-1]
     survival = 1.0 - np.cumsum(below)[:-1] / (profiles * points)
-    rate = seen / (profiles * problem.interface.extent)
     if plane:
         # High up, holes outnumber parts; but an interface is below a level if any node is.
         chance = np.maximum(-np.expm1(-np.maximum(seen, 0) / profiles), 1.0 - survival)
-        chance = np.maximum.accumulate(chance)
-        alone = seen <= MOST_DIPS * np.cumsum(reached)[:-1]
-        trusted = (chance <= TRUSTED_PROBABILITY) & (seen >= FEWEST_CROSSINGS) & alone
-        error = 1.0 / np.sqrt(np.maximum(seen, 1))
-        return RiceDistribution(levels, chance, rate, survival, error, trusted, profiles)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        exponent = np.where(survival > 0.0, problem.interface.extent * rate / survival, np.inf)
-    probability = np.maximum.accumulate(1.0 - np.clip(survival, 0.0, 1.0) * np.exp(-exponent))
-    trusted = (
-        (probability <= TRUSTED_PROBABILITY)
-        & (seen >= FEWEST_CROSSINGS)
-        & (1.0 - survival <= MOST_BELOW * probability)
-    )
+        good = seen <= MOST_DIPS * np.cumsum(reached)[:-1]
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            exponent = np.where(survival > 0.0, seen / profiles / survival, np.inf)
+        chance = 1.0 - np.clip(survival, 0.0, 1.0) * np.exp(-exponent)
+        good = 1.0 - survival <= MOST_BELOW * np.maximum.accumulate(chance)
+    chance = np.maximum.accumulate(chance)
     return RiceDistribution(
         stress=levels,
-        probability=probability,
-        crossing_rate=rate,
+        probability=chance,
+        crossing_rate=seen / (profiles * interface.extent),
         point_survival=survival,
         relative_error=1.0 / np.sqrt(np.maximum(seen, 1)),
-        trusted=trusted,
+        trusted=(chance <= TRUSTED_PROBABILITY) & (seen >= FEWEST_CROSSINGS) & good,
         profiles=profiles,
     )
 
