@@ -1,0 +1,158 @@
+"""A claim is a row: what the paper says, where, what is computed for it, and the rule."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from reproduction import setting
+from reproduction.numbers_with_errors import Number
+from reproduction.rules import Rule, Verdict
+from reproduction.runner import Size
+from reproduction.setting import RATIOS
+
+MINUS = "\N{MINUS SIGN}"
+
+
+@dataclass(frozen=True)
+class Series:
+    """One computed quantity over keys: values of xi_0/h_n, or names of cases."""
+
+    label: str
+    unit: str
+    rows: Sequence[tuple[float | str, Number]]
+
+    def text(self) -> str:
+        """Return the numbers in a line."""
+        parts = []
+        for key, number in self.rows:
+            shown = rounded(number) + (f" {self.unit}" if self.unit else "")
+            where = f"{key:g}: " if isinstance(key, float) else f"{key}: " if key else ""
+            parts.append(where + shown)
+        head = f"{self.label} at xi_0/h_n = " if self._over_ratios else f"{self.label}: "
+        return head + ", ".join(parts)
+
+    @property
+    def _over_ratios(self) -> bool:
+        return bool(self.rows) and isinstance(self.rows[0][0], float)
+
+
+class Data:
+    """The studies by name, with short ways to their numbers."""
+
+    def __init__(self, studies: Mapping[str, xr.Dataset], size: Size) -> None:
+        self.studies, self.size = studies, size
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.studies
+
+    def __getitem__(self, name: str) -> xr.Dataset:
+        return self.studies[name]
+
+    def at(self, study: str, name: str, ratio: float) -> np.ndarray:
+        """Return a variable of a study at one xi_0/h_n."""
+        return self.studies[study][name].sel(correlation_ratio=ratio).values
+
+    def stress(self, ratio: float, study: str = "local") -> np.ndarray:
+        """Return tau_cr of every sample, Pa."""
+        return self.at(study, "critical_stress", ratio)
+
+    def excess(self, ratio: float) -> np.ndarray:
+        """Return the first instability by the local criterion over the exact one, less one."""
+        name = "first_instability"
+        return self.at("local", name, ratio) / self.at("exact", name, ratio) - 1.0
+
+    def misplaced(self, ratio: float) -> np.ndarray:
+        """Return whether the local criterion puts the onset more than h_n/2 from where it is."""
+        one = self.at("local", "critical_position", ratio)
+        other = self.at("exact", "critical_position", ratio)
+        return setting.distance(one, other) > 0.5 * setting.H
+
+    def what_if(self, name: str, variable: str, point: int) -> np.ndarray:
+        """Return a variable of a what-if at one of its points."""
+        return self.studies[name][variable].isel(point=point).values
+
+
+Measured = tuple[Sequence[Series], Sequence[Series]]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper.
+
+    `kind` is "finding", or "arithmetic" for printed numbers, identities and what is true by the
+    definitions: those are counted apart.
+    """
+
+    name: str
+    says: str
+    where: str
+    rule: Rule
+    measure: Callable[[Data], Measured]
+    note: str = ""
+    kind: str = "finding"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim with its numbers and its verdict."""
+
+    claim: Claim
+    judged: Sequence[Series] = field(default_factory=list)
+    beside: Sequence[Series] = field(default_factory=list)
+    verdict: Verdict = Verdict.OPEN
+
+
+def judge(claim: Claim, data: Data) -> Finding:
+    """Compute the numbers of a claim and apply its rule."""
+    judged, beside = claim.measure(data)
+    verdict = claim.rule([[number for _, number in series.rows] for series in judged])
+    return Finding(claim, judged, beside, verdict)
+
+
+def over_ratios(
+    label: str, unit: str, function: Callable[[float], Number], ratios=RATIOS
+) -> Series:
+    """Return a series of function(ratio)."""
+    return Series(label, unit, [(float(ratio), function(ratio)) for ratio in ratios])
+
+
+def one(label: str, value, unit: str = "", error: float = 0.0) -> Series:
+    """Return a series of one number."""
+    number = value if isinstance(value, Number) else Number(float(value), error)
+    return Series(label, unit, [("", number)])
+
+
+def rounded(number: Number) -> str:
+    """Return a number with its error, to two digits of the error."""
+    value, error = number.value, number.error
+    if not math.isfinite(value):
+        return "not known"
+    if error > 0.0 and math.isfinite(error):
+        digits = max(1 - math.floor(math.log10(error)), 0)
+        if digits <= 7:
+            return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", MINUS)
+        return f"{value:.2g} ± {error:.1g}".replace("-", MINUS)
+    small = value != 0.0 and abs(value) < 1e-3
+    return (f"{value:.2g}" if small else f"{value:.4g}").replace("-", MINUS)
+
+
+def write_csv(findings: Sequence[Finding], path: Path) -> None:
+    """Write every number of every claim, one a row."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(("claim", "verdict", "quantity", "xi_0/h_n", "case", "value", "error",
+                        "unit", "judged"))  # fmt: skip
+        for found in findings:
+            for series in (*found.judged, *found.beside):
+                for key, number in series.rows:
+                    ratio, case = (key, "") if isinstance(key, float) else ("", key)
+                    table.writerow((found.claim.name, found.verdict.value, series.label, ratio,
+                                    case, repr(number.value), repr(number.error), series.unit,
+                                    series in found.judged))  # fmt: skip

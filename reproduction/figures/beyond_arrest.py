@@ -1,0 +1,238 @@
+"""Figures 12 to 16, beyond the paper: arrest, driving, size, what if, and which modulus."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from reproduction import setting
+from reproduction.claims import Data, Series
+from reproduction.figures.style import (
+    COLOURS,
+    GREY,
+    INK,
+    RED,
+    TAU_CR,
+    XI,
+    dots,
+    letter,
+    line,
+    new,
+)  # fmt: skip
+from reproduction.numbers_with_errors import deviation, mean
+from reproduction.setting import HIGH, MEAN, RATIOS, SIMULATED, H, L
+from reproduction.statements_rupture import arrested, shares
+from reproduction.studies import DRIVING
+
+XI_UNIT = r"$h_\mathrm{n}$"
+
+
+def _values(rows):
+    values = [number.value for _, number in rows]
+    return values, [2 * number.error for _, number in rows]
+
+
+def figure_12(d: Data):
+    """Draw the energy balance of a growing rupture, and the share of arrested ones."""
+    figure = new(5.6)
+    top, bottom = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
+    length = np.linspace(0, 4.5, 100)
+    most = HIGH**2 / (2 * setting.W)
+    for ratio in RATIOS:
+        stress = d.stress(ratio).mean()
+        rate = math.pi * 0.5 * length * H * stress**2 / (2 * setting.G_STAR)
+        top.plot(length, rate / most, **line(ratio), label=f"{ratio:g}")
+    top.axhline(1, color=RED, lw=1)
+    top.text(0.1, 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED)
+    top.axvspan(0, 1, color="#eeeeee", lw=0, zorder=0)
+    top.text(0.5, 0.6, "not yet\nunstable", ha="center", color=GREY)
+    events = d["arrest"]
+    moving = events["dynamic"].values > 0
+    for chosen, y, marker, text in (
+        (~moving, 0.04, "o", "carried through by inertia"),
+        (moving, 0.12, "X", "arrested with inertia, too"),
+    ):
+        place = events["length"].values[chosen] / H
+        top.plot(place, y + 0 * place, marker, color=INK, ms=5, mfc="none", label=text)
+    top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, 4.5), ylim=(0, 1.6),
+            ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
+    top.legend(loc="lower right", title=XI)
+    studies = [("exact", -0.06, COLOURS[0], "o", "without inertia")]
+    if "dynamic" in d:
+        studies.append(("dynamic", 0.06, RED, "D", "with inertia"))
+    for name, shift, colour, marker, text in studies:
+        found = [(r, arrested(d, r, name)) for r in RATIOS]
+        value, error = _values(found)
+        bottom.errorbar(np.log2(RATIOS) + shift, 100 * np.array(value), 100 * np.array(error),
+                        fmt=marker, color=colour, ms=5, label=text)  # fmt: skip
+    bottom.set_xticks(np.log2(RATIOS), [f"{r:g}" for r in RATIOS])
+    bottom.set(xlabel=XI, ylabel="samples with an\narrested event (%)", ylim=(0, None))
+    bottom.legend()
+    letter(top, "a", x=-0.12)
+    letter(bottom, "b", x=-0.12)
+    return figure
+
+
+def figure_13(d: Data):
+    """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
+    figure = new(5.2)
+    top, bottom = figure.subplots(2, 1, height_ratios=(0.8, 1.2))
+    problem = setting.PROBLEM
+    x = problem.interface.x / L
+    for (case, load), colour in zip(DRIVING.items(), COLOURS, strict=False):
+        found = dataclasses.replace(problem, load=load)
+        profile = np.broadcast_to(found.load_profile, x.shape)
+        top.plot(x, profile, color=colour, label=case)
+    top.set(xlabel="$x/L$", ylabel="load over its mean", xlim=(0, 1), ylim=(0, None))
+    top.legend()
+    study = d["driving"]
+    for i, case in enumerate(("edge", "gradient", "uniform")):
+        here = study.sel(case=case)
+        style = {"color": COLOURS[2 - i], "ms": 4, "ls": "none"}
+        bottom.plot(here["griffith"].values.ravel() / H, here["length"].values.ravel() / H,
+                    marker="osv"[i], label=f"{case}, without inertia", **style)  # fmt: skip
+    edge = study.sel(case="edge")
+    bottom.plot(edge["griffith"].values[:, 0] / H, edge["dynamic_length"].values / H, "D",
+                color=RED, mfc="none", ms=5, label="edge, first event, with inertia")  # fmt: skip
+    limit = 24
+    bottom.plot([0, limit], [0, limit], color=GREY, lw=0.8)
+    bottom.set(xlim=(0, limit), ylim=(0, limit), xlabel=r"Griffith's length over $h_\mathrm{n}$",
+               ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
+    bottom.legend(loc="upper left")
+    letter(top, "a", x=-0.12)
+    letter(bottom, "b", x=-0.12)
+    return figure
+
+
+def _shares(axes, d: Data, name: str, title: str) -> None:
+    static, moving = shares(d, name), shares(d, name, inertia=True)
+    places = {case: i for i, (case, _) in enumerate(static.rows)}
+    for series, shift, colour, marker, text in (
+        (static, -0.12, COLOURS[0], "o", "without inertia"),
+        (moving, 0.12, RED, "D", "with inertia"),
+    ):
+        _bars(axes, series, places, shift, colour, marker, text)
+    axes.set_yticks(range(len(places)), [case.replace("h_n", XI_UNIT) for case in places])
+    axes.set(xlim=(-3, 103), title=title, ylim=(len(places) - 0.5, -0.5))
+
+
+def _bars(axes, series: Series, places, shift: float, colour, marker: str, text: str) -> None:
+    y = [places[case] + shift for case, _ in series.rows]
+    value, error = (100 * np.array(found) for found in _values(series.rows))
+    lower = np.minimum(error, value)
+    axes.errorbar(value, y, xerr=(lower, np.minimum(error, 100 - value)), fmt=marker, color=colour,
+                  ms=4, label=text)  # fmt: skip
+
+
+def figure_14(d: Data):
+    """Draw the share of arrested samples where more is random, with and without inertia."""
+    figure = new(8.6)
+    axes = figure.subplots(4, 1, height_ratios=(4, 6, 6, 12), sharex=True)
+    for panel, (name, title) in zip(axes, (
+        ("wide_strength", "range of the strength"),
+        ("random_load", "random initial stress"),
+        ("random_residual", "random residual strength"),
+        ("correlation", "residual strength correlated with the strength"),
+    ), strict=True):  # fmt: skip
+        _shares(panel, d, name, title)
+    axes[1].legend(loc="upper right")
+    axes[-1].set_xlabel("samples with an arrested event (%)")
+    for text, panel in zip("abcd", axes, strict=True):
+        letter(panel, text, x=-0.25)
+    return figure
+
+
+def figure_15(d: Data):
+    """Draw the effect of length, pressure and ends, and the failure probability."""
+    figure = new(8.0)
+    length, pressure, end, tail = figure.subplots(4, 1)
+    extents = np.array((12.5, 25, 50, 100, 200, 400, 800))
+    rows = d["length"]["critical_stress"].values
+    found = [deviation(row / row.mean()) * 100 for row in rows]
+    length.errorbar(extents, [n.value for n in found], [2 * n.error for n in found],
+                    color=COLOURS[0], marker="o", ms=4)  # fmt: skip
+    length.set(xscale="log", yscale="log", xlabel="length of the interface (mm)",
+               ylabel=f"variation of {TAU_CR} (%)")  # fmt: skip
+    length.set_xticks(extents, [f"{x:g}" for x in extents])
+    length.set_xticks([], minor=True)
+    length.set_yticks((2, 3, 5), ("2", "3", "5"))
+    length.set_yticks([], minor=True)
+    for chosen, colour, marker, text in (
+        ((0, 1, 2), COLOURS[0], "o", r"$\xi_0$ fixed"),
+        ((3, 1, 4), COLOURS[2], "^", r"$\xi_0/h_\mathrm{n}$ fixed"),
+    ):
+        rows = [d.what_if("normal_load", "friction_coefficient", i) for i in chosen]
+        pressure.errorbar((1, 2, 4), [row.mean() for row in rows], [row.std() for row in rows],
+                          color=colour, marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
+    pressure.set(xlabel="normal pressure (MPa)", ylabel="friction coefficient", xlim=(0.5, 4.5))
+    pressure.legend(title="mean, and its deviation")
+    change = d["free_end"]["change"].values * 100
+    found = [mean(row) for row in change[:4]]
+    end.errorbar(np.log2(RATIOS), [n.value for n in found], [2 * n.error for n in found],
+                 color=COLOURS[0], marker="o", ms=4, label="$L$")  # fmt: skip
+    for i, text, marker in ((5, "$L/2$", "s"), (4, "$L/4$", "^")):
+        number = mean(change[i])
+        end.errorbar(-2, number.value, 2 * number.error, color=COLOURS[2], marker=marker, ms=4,
+                     label=text)  # fmt: skip
+    end.axhline(0, color=GREY, lw=0.8)
+    end.set_xticks(np.log2(RATIOS), [f"{r:g}" for r in RATIOS])
+    end.set(xlabel=XI, ylabel=f"{TAU_CR} by free ends (%)")
+    end.legend(loc="lower right", ncols=3)
+    study = d["failure"]
+    tail.semilogy(study["stress"] * 1e-6, study["probability"], color=COLOURS[0],
+                  label="subset simulation")  # fmt: skip
+    ordered = np.sort(d.stress(RATIOS[1])) * 1e-6
+    counted = np.arange(1, ordered.size + 1) / ordered.size
+    tail.semilogy(ordered[: ordered.size // 2], counted[: ordered.size // 2], ".", color=RED, ms=2,
+                  label="counting", zorder=0)  # fmt: skip
+    tail.set(xlabel="stress (MPa)", ylabel="probability of failure", ylim=(5e-7, 1))
+    tail.legend(loc="lower right")
+    for text, panel in zip("abcd", (length, pressure, end, tail), strict=True):
+        letter(panel, text, x=-0.12)
+    return figure
+
+
+def figure_16(d: Data):
+    """Draw what other strengths, spectra and laws do to the onset."""
+    figure = new(6.4)
+    skew, spectrum, law = figure.subplots(3, 1)
+    x = np.log2(RATIOS)
+    for start, colour, marker, text in (
+        (0, COLOURS[0], "o", "the paper's strength"),
+        (4, COLOURS[2], "^", "its mirror image"),
+    ):
+        rows = [d.what_if("skewness", "critical_stress", start + i) / MEAN for i in range(4)]
+        skew.errorbar(x, [row.mean() for row in rows], [row.std() for row in rows], color=colour,
+                      marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
+    skew.set(ylabel=r"$\tau_\mathrm{cr}/\langle\tau_\mathrm{p}\rangle$")
+    skew.set_ylim(0.65, 1.35)
+    skew.legend(title="mean, and its deviation", loc="upper right")
+    for k, ratio in enumerate(SIMULATED):
+        usual = d.what_if("exponent", "critical_stress", 4 * k + 2).mean()
+        rows = [d.what_if("exponent", "critical_stress", 4 * k + j) / usual - 1 for j in range(4)]
+        spectrum.plot((1.5, 2, 4, 8), [100 * row.mean() for row in rows],
+                      **{**dots(ratio), "linestyle": "-"}, ms=4, label=f"{ratio:g}")  # fmt: skip
+    spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",
+                 ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
+    spectrum.set_xticks((1.5, 2, 4, 8), ("1.5", "2", "4", "8"))
+    spectrum.set_xticks([], minor=True)
+    spectrum.legend(title=XI, loc="upper right")
+    for start, colour, marker, text in (
+        (0, COLOURS[0], "o", "uniform $W$"),
+        (4, COLOURS[2], "^", r"uniform $d_\mathrm{c}$"),
+    ):
+        rows = [
+            mean(d.what_if("uniform_dc", "critical_stress", start + i) / MEAN) for i in range(4)
+        ]
+        law.errorbar(x, [n.value for n in rows], [2 * n.error for n in rows], color=colour,
+                     marker=marker, ms=4, label=text)  # fmt: skip
+    law.set(ylabel=r"$\langle\tau_\mathrm{cr}\rangle/\langle\tau_\mathrm{p}\rangle$")
+    law.legend()
+    for panel in (skew, law):
+        panel.set_xticks(x, [f"{r:g}" for r in RATIOS])
+        panel.set_xlabel(XI)
+    for text, panel in zip("abc", (skew, spectrum, law), strict=True):
+        letter(panel, text, x=-0.12)
+    return figure

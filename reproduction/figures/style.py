@@ -1,0 +1,46 @@
+"""What all figures share: width, colours, letters of panels."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from reproduction.setting import RATIOS
+
+WIDTH = 4.5
+"""Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
+INK, GREY, PALE, RED = "#1a1a1a", "#7a7a7a", "#d0d0d0", "#b5322a"
+COLOURS = ("#14213d", "#2a6f97", "#c8553d", "#e0a030")
+DASHES = ("-", (0, (5.0, 1.4)), (0, (3.5, 1.2, 1.0, 1.2)), (0, (1.2, 1.0)))
+MARKERS = ("o", "s", "^", "D")
+XI = r"$\xi_0/h_\mathrm{n}$"
+TAU_CR = r"$\tau_\mathrm{cr}$"
+MEAN_P = r"$\langle\tau_\mathrm{p}\rangle$"
+OVER_MEAN = r"/\langle\tau_\mathrm{p}\rangle$"
+
+
+def new(height: float) -> Figure:
+    """Return an empty figure of one column."""
+    return Figure(figsize=(WIDTH, height), layout="constrained")
+
+
+def line(ratio: float) -> dict:
+    """Return colour and dashes of a correlation length."""
+    i = RATIOS.index(ratio)
+    return {"color": COLOURS[i], "linestyle": DASHES[i]}
+
+
+def dots(ratio: float) -> dict:
+    """Return colour and marker of a correlation length."""
+    i = RATIOS.index(ratio)
+    return {"color": COLOURS[i], "marker": MARKERS[i], "linestyle": "none"}
+
+
+def letter(axes, text: str, *, x: float = 0.0) -> None:
+    """Letter a panel, above its upper left corner."""
+    axes.text(x, 1.02, f"({text})", transform=axes.transAxes, fontweight="bold", va="bottom")
+
+
+def thin(axes) -> None:
+    """Take away the frame and the ticks of a narrow panel of densities."""
+    axes.set_xticks([])
+    axes.tick_params(labelleft=False)

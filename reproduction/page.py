@@ -1,0 +1,151 @@
+"""The page: findings first, then departures, figures, statements and provenance."""
+
+from __future__ import annotations
+
+import base64
+import platform
+import re
+from collections import Counter
+from importlib.metadata import version
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup, escape
+
+import stiction as st
+from reproduction import setting, texts
+from reproduction.claims import Data, Finding, rounded
+from reproduction.modulus import compare
+from reproduction.rules import Verdict
+
+STYLES = {
+    Verdict.FAILS: "fails",
+    Verdict.CORRECTED: "corrected",
+    Verdict.OPEN: "open",
+    Verdict.HOLDS: "holds",
+}
+_SYMBOLS = {"xi": "ξ", "tau": "τ", "nu": "\N{GREEK SMALL LETTER NU}", "delta": "δ", "lambda": "λ"}
+_NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
+
+
+def physics(text: str) -> Markup:
+    """Return text as HTML, with symbols such as xi_0 and <tau_p> as they are printed."""
+    plain = str(escape(text)).replace("&lt;", "⟨").replace("&gt;", "⟩").replace("G*", "<i>G</i>*")
+
+    def symbol(match: re.Match) -> str:
+        name, index = match.groups()
+        return f"<i>{_SYMBOLS.get(name, name)}</i><sub>{index}</sub>"
+
+    plain = _NAME.sub(symbol, plain)
+    plain = re.sub(r"\b(nu|lambda)\b", lambda m: f"<i>{_SYMBOLS[m.group()]}</i>", plain)
+    return Markup(plain.replace(" +- ", " ± "))
+
+
+def write(path: Path, data: Data, groups, images, runner, warned) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    path : Path
+    data : Data
+    groups : dict of str to list of Finding
+    images : dict of int to Path
+    runner : Runner
+    warned : list of str
+    """
+    found = [finding for rows in groups.values() for finding in rows]
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True)
+    environment.filters |= {"physics": physics, "number": rounded}
+    template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
+    readings = compare(data)
+    exceptions = [f for f in found if f.verdict in (Verdict.FAILS, Verdict.CORRECTED)]
+    exceptions.sort(key=lambda f: f.verdict is not Verdict.FAILS)
+    sections = [("What does not hold, or only with a correction", exceptions, True)]
+    sections += [(title, rows, False) for title, rows in groups.items()]
+    text = template.render(
+        version=st.__version__,
+        samples=f"{data.size.samples:,}",
+        ruptures=data.size.ruptures,
+        short=texts.in_short(data),
+        counts=_counts(found),
+        departures=texts.DEPARTURES,
+        figures=[_figure(number, image, data) for number, image in images.items()],
+        few=texts.few_and_many(data),
+        readings=readings,
+        best=max(reading.likelihood for reading in readings) or 1.0,
+        claims=[(title, [_claim(f) for f in rows], opened) for title, rows, opened in sections],
+        not_judged=texts.NOT_JUDGED,
+        errata=texts.ERRATA,
+        provenance=_provenance(data, runner),
+        warnings=warned,
+    )
+    unfinished = path.with_suffix(".unfinished")
+    unfinished.write_text(text, encoding="utf-8")
+    unfinished.replace(path)
+
+
+def _counts(found) -> dict:
+    findings = [f for f in found if f.claim.kind == "finding"]
+    arithmetic = [f for f in found if f.claim.kind == "arithmetic"]
+    numbers = Counter(f.verdict for f in findings)
+    others = Counter(f.verdict for f in arithmetic)
+    return {
+        "total": len(found),
+        "findings": len(findings),
+        "arithmetic": len(arithmetic),
+        "rows": [(v.value, STYLES[v], numbers[v]) for v in STYLES],
+        "arithmetic_text": ", ".join(f"{n} {v.value}" for v, n in others.items()),
+    }
+
+
+def _figure(number: int, image: Path, data: Data) -> dict:
+    about = texts.CAPTIONS[number]
+    encoded = base64.b64encode(image.read_bytes()).decode()
+    return {
+        "number": number,
+        "title": about.title,
+        "paper": about.paper,
+        "ours": about.ours(data),
+        "caption": about.caption,
+        "image": f"data:image/png;base64,{encoded}",
+    }
+
+
+def _claim(found: Finding) -> dict:
+    claim = found.claim
+    return {
+        "name": claim.name,
+        "says": claim.says,
+        "where": claim.where,
+        "rule": claim.rule.text,
+        "note": claim.note,
+        "verdict": found.verdict.value,
+        "style": STYLES[found.verdict],
+        "judged": [series.text() for series in found.judged] or ["nothing: too few samples"],
+        "beside": [series.text() for series in found.beside],
+    }
+
+
+def _provenance(data: Data, runner) -> list[tuple[str, str]]:
+    problem, size = setting.PROBLEM, data.size
+    spacing = problem.interface.spacing
+    packages = ("numpy", "scipy", "numba", "xarray", "matplotlib")
+    seconds = sorted(runner.seconds.items(), key=lambda item: -item[1])
+    return [
+        ("Solid", "G = 1 GPa, nu = 0.33, rho = 1170 kg/m³, plane stress, mode II;"
+         f" G* = {setting.G_STAR * 1e-9:.3f} GPa"),
+        ("Interface", f"L = {setting.L:g} m, {problem.interface.size} nodes;"
+         f" h_n = {setting.H * 1e3:.3f} mm, {setting.H / spacing:.1f} nodes"),
+        ("Strength", f"Beta(1.5, 3) between {setting.LOW * 1e-6:g} and {setting.HIGH * 1e-6:g} MPa;"
+         f" mean {setting.MEAN * 1e-6:.4f}, standard deviation"
+         f" {setting.DEVIATION * 1e-6:.4f} MPa"),
+        ("Samples", f"{size.samples:,} at each of four correlation lengths, seed {runner.seed};"
+         f" {size.trend:,} a point over the wide range; {size.what_if} a what-if by equilibrium"),
+        ("Ruptures", f"{size.ruptures} at each of three correlation lengths;"
+         f" {size.arrests} a what-if; {size.dynamic:,} at each correlation length in the Monte"
+         " Carlo study by elastodynamics" + ("" if size.dynamic else " (with --full: 2,000)")),
+        ("Versions", f"stiction {st.__version__}, Python {platform.python_version()}, "
+         + ", ".join(f"{name} {version(name)}" for name in packages)),
+        ("Time", ", ".join(f"{name} {value:.0f} s" for name, value in seconds if value >= 1.0)
+         + f"; {runner.workers} threads on {platform.system()}, {platform.machine()}"),
+    ]  # fmt: skip

@@ -1,0 +1,172 @@
+"""Rules that turn numbers with errors into a verdict; three standard errors decide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import Enum
+from itertools import pairwise
+
+from reproduction.numbers_with_errors import Number
+
+SIGMAS = 3.0
+
+
+class Verdict(Enum):
+    """What the numbers say of a statement."""
+
+    HOLDS = "holds"
+    CORRECTED = "holds with a correction"
+    FAILS = "does not hold"
+    OPEN = "undecided"
+
+
+Numbers = Sequence[Number]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What must be met, in words, and as a function of the judged series."""
+
+    text: str
+    judge: Callable[[Sequence[Numbers]], Verdict]
+
+    def __call__(self, series: Sequence[Numbers]) -> Verdict:
+        return self.judge(series) if series and all(len(row) for row in series) else Verdict.OPEN
+
+
+def _range(number: Number) -> tuple[float, float]:
+    return number.value - SIGMAS * number.error, number.value + SIGMAS * number.error
+
+
+def within(low: float, high: float, why: str = "", *, partly: bool = False) -> Rule:
+    """Every number lies between two limits; `partly`: a part of them earns a correction."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        ranges = [_range(number) for row in series for number in row]
+        inside = [low <= left and right <= high for left, right in ranges]
+        outside = [left > high or right < low for left, right in ranges]
+        if all(inside):
+            return Verdict.HOLDS
+        if any(outside):
+            return Verdict.CORRECTED if partly and any(inside) else Verdict.FAILS
+        return Verdict.OPEN
+
+    text = f"between {low:g} and {high:g}"
+    if low == -float("inf"):
+        text = f"below {high:g}"
+    elif high == float("inf"):
+        text = f"above {low:g}"
+    return Rule(text + (f" ({why})" if why else ""), judge)
+
+
+def below(limit: float, why: str = "", *, partly: bool = False) -> Rule:
+    """Every number is below a limit."""
+    return within(-float("inf"), limit, why, partly=partly)
+
+
+def above(limit: float, why: str = "", *, partly: bool = False) -> Rule:
+    """Every number is above a limit."""
+    return within(limit, float("inf"), why, partly=partly)
+
+
+def printed(digits: str) -> Rule:
+    """The number rounds to the printed digits."""
+    half = 0.5 * 10.0 ** Decimal(digits).as_tuple().exponent
+    rule = within(float(digits) - half, float(digits) + half)
+    return Rule(f"{digits} to the printed digits", rule.judge)
+
+
+def _monotonic(sign: float, word: str) -> Rule:
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        row = [number * sign for number in series[0]]
+        whole = _range(row[-1] - row[0])
+        steps = [_range(right - left) for left, right in pairwise(row)]
+        wrong = any(right < 0.0 for _, right in steps)
+        if whole[0] > 0.0:
+            return Verdict.CORRECTED if wrong else Verdict.HOLDS
+        return Verdict.FAILS if whole[1] < 0.0 or wrong else Verdict.OPEN
+
+    return Rule(f"{word} from the first to the last, with no step the other way", judge)
+
+
+def falling() -> Rule:
+    """The numbers fall."""
+    return _monotonic(-1.0, "falls")
+
+
+def rising() -> Rule:
+    """The numbers rise."""
+    return _monotonic(1.0, "rises")
+
+
+_WORST = (Verdict.FAILS, Verdict.OPEN, Verdict.CORRECTED, Verdict.HOLDS)
+
+
+def each(*rules: Rule) -> Rule:
+    """One rule for each judged series; the worst verdict counts."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        found = [rule([row]) for rule, row in zip(rules, series, strict=True)]
+        return min(found, key=_WORST.index)
+
+    return Rule("; and ".join(rule.text for rule in rules), judge)
+
+
+def graded(strict: Rule, weak: Rule) -> Rule:
+    """Holds by the first rule, with a correction by the second only."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        verdict = strict(series)
+        if verdict is Verdict.FAILS and weak(series) is not Verdict.FAILS:
+            return Verdict.CORRECTED if weak(series) is Verdict.HOLDS else Verdict.OPEN
+        return verdict
+
+    return Rule(f"{strict.text}; with a correction {weak.text}", judge)
+
+
+def main(first: Rule, *others: Rule) -> Rule:
+    """The first series decides; a failure of another one earns a correction."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        verdict = first(series[:1])
+        rest = [rule([row]) for rule, row in zip(others, series[1:], strict=True)]
+        if verdict is Verdict.HOLDS and any(found is not Verdict.HOLDS for found in rest):
+            return Verdict.OPEN if Verdict.FAILS not in rest else Verdict.CORRECTED
+        return verdict
+
+    text = "; else with a correction: ".join(rule.text for rule in (first, *others))
+    return Rule(text, judge)
+
+
+def never(limit: float) -> Rule:
+    """It happens in no sample; with a correction in few."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        if all(number.value == 0.0 for row in series for number in row):
+            return Verdict.HOLDS
+        verdict = below(limit)(series)
+        return Verdict.CORRECTED if verdict is Verdict.HOLDS else verdict
+
+    return Rule(f"never; with a correction below {limit:g}", judge)
+
+
+def by_chance(level: float = 0.01) -> Rule:
+    """The smallest of several probabilities, times their number, is above a level."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        values = [number.value for row in series for number in row]
+        return Verdict.HOLDS if min(values) * len(values) > level else Verdict.FAILS
+
+    return Rule(f"smallest p-value times their number above {level:g}", judge)
+
+
+def corrected(rule: Rule) -> Rule:
+    """What the rule finds holds only with the correction that stands beside it."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        verdict = rule(series)
+        return Verdict.CORRECTED if verdict is Verdict.HOLDS else verdict
+
+    return Rule(f"{rule.text} (with the correction beside it)", judge)

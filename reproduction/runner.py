@@ -1,0 +1,131 @@
+"""Where studies are run and kept: a folder that a second call only completes."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import inspect
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import xarray as xr
+
+import stiction as st
+from reproduction import setting
+
+
+@dataclasses.dataclass(frozen=True)
+class Size:
+    """How much of each kind is computed."""
+
+    samples: int
+    ruptures: int
+    readings: int
+    trend: int
+    what_if: int
+    arrests: int
+    dynamic: int
+    few: int
+
+
+QUICK = Size(samples=500, ruptures=4, readings=200, trend=300, what_if=40, arrests=2, dynamic=0,
+             few=6)  # fmt: skip
+USUAL = Size(samples=10_000, ruptures=20, readings=1000, trend=2500, what_if=200, arrests=6,
+             dynamic=0, few=24)  # fmt: skip
+FULL = Size(samples=10_000, ruptures=20, readings=4000, trend=10_000, what_if=1000, arrests=200,
+            dynamic=2000, few=60)  # fmt: skip
+
+
+class Runner:
+    """Runs studies into a folder.
+
+    Parameters
+    ----------
+    out : Path
+    size : Size
+    seed : int
+    workers : int
+        Threads.
+    """
+
+    def __init__(self, out: Path, size: Size, seed: int, workers: int) -> None:
+        self.folder = out / "studies"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.size, self.seed, self.workers = size, seed, workers
+        self.started = time.monotonic()
+        self.seconds: dict[str, float] = {}
+
+    def say(self, text: str) -> None:
+        """Print a line of progress."""
+        print(f"{time.monotonic() - self.started:5.0f} s  {text}", flush=True)
+
+    def study(self, name: str, study: st.Study) -> xr.Dataset:
+        """Run a study into its folder, or what is missing of it."""
+        plain = study.to_dict()
+        plain["ensemble"] = {k: v for k, v in plain["ensemble"].items() if k != "samples"}
+        plain.pop("title", None)
+        place = self.folder / f"{name}-{_digest(plain)}"
+        return study.run(out=place, workers=self.workers, progress=False)
+
+    def sweep(self, name: str, problem, field_of, method, samples: int, ratios=setting.RATIOS):
+        """Run one study at each xi_0/h_n, with draws of its own, along 'correlation_ratio'."""
+        parts = []
+        for ratio in ratios:
+            study = st.Study(
+                problem=problem,
+                random=field_of(ratio),
+                method=method,
+                ensemble=st.Ensemble(samples=samples, seed=self.seed_of(ratio)),
+                title=f"{name} at xi_0/h_n = {ratio:g}",
+            )
+            parts.append(self.study(f"{name}-{ratio:g}", study))
+        return along("correlation_ratio", ratios, parts)
+
+    def seed_of(self, ratio: float) -> int:
+        """Return the seed of a correlation length: each has draws of its own, as in the paper."""
+        return self.seed * 1000 + round(100 * ratio)
+
+    def what_if(self, name: str, *, samples: int | None = None, method=None, **ensemble):
+        """Run a study file of `what_if/`, with fewer samples or by another method."""
+        study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
+        count = min(samples or self.size.what_if, study.ensemble.samples)
+        changes = {"ensemble": st.Ensemble(samples=count, seed=self.seed, **ensemble)}
+        if method is not None:
+            changes["method"] = method
+        label = name if method is None else f"{name}-{method.type}"
+        return self.study(label, dataclasses.replace(study, **changes))
+
+    def kept(self, name: str, function, **inputs) -> xr.Dataset:
+        """Return function(self, **inputs), kept with a digest of its inputs and its source."""
+        about = {
+            "seed": self.seed,
+            "version": st.__version__,
+            "source": inspect.getsource(function),
+        }
+        mark = _digest({"name": name, **about, **inputs})
+        place = self.folder / f"{name}-{mark}.nc"
+        if place.exists():
+            return xr.load_dataset(place)
+        result = function(self, **inputs)
+        unfinished = place.with_suffix(".unfinished")
+        result.to_netcdf(unfinished)
+        unfinished.replace(place)
+        return result
+
+    def map(self, function, items) -> list:
+        """Return [function(item) for item in items], computed by all threads."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            return list(pool.map(function, items))
+
+
+def along(dim: str, values, parts) -> xr.Dataset:
+    """Join datasets along a new dimension."""
+    joined = xr.concat(parts, dim=dim, combine_attrs="drop")
+    return joined.assign_coords({dim: list(values)})
+
+
+def _digest(plain) -> str:
+    text = json.dumps(plain, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:10]

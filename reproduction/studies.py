@@ -1,0 +1,733 @@
+"""What is computed: each study is a function of a runner and returns a labelled dataset."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import xarray as xr
+from scipy.stats import ks_2samp
+
+import stiction as st
+from reproduction import setting
+from reproduction.numbers_with_errors import mean
+from reproduction.runner import Runner, along
+from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
+
+LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
+RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
+RUNAWAY = dataclasses.replace(RUPTURE, stop="runaway")
+CELLS = 2048
+TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
+WINDOWS = (1.0, 2.0, 4.0, 8.0)
+LEVELS = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
+RATES = (0.1, 0.3, 1.0, 3.0, 10.0)
+READINGS = {
+    "a": "plane stress throughout",
+    "b": "plane strain throughout",
+    "c": "plane-stress simulations, printed modulus in the prediction and in xi_0/h_n",
+    "c'": "plane-stress simulations, printed modulus in the prediction only",
+}
+
+
+def local(run: Runner) -> xr.Dataset:
+    """Onset by the local criterion: the paper's Monte Carlo study."""
+    return run.sweep("local", PROBLEM, strength, LOCAL, run.size.samples)
+
+
+def exact(run: Runner) -> xr.Dataset:
+    """Exact quasi-static onset of the same samples, with every interaction between patches."""
+    return run.sweep("exact", PROBLEM, strength, EXACT, run.size.samples)
+
+
+def printed(run: Runner) -> xr.Dataset:
+    """The local criterion with the printed modulus, on the first of the same samples."""
+    return run.sweep("printed", STRAIN, strength, LOCAL, run.size.readings, SIMULATED)
+
+
+def ruptures(run: Runner) -> xr.Dataset:
+    """Elastodynamic ruptures of the first samples, until the whole interface slides."""
+    return run.sweep("ruptures", PROBLEM, strength, RUPTURE, run.size.ruptures, SIMULATED)
+
+
+def dynamic(run: Runner) -> xr.Dataset:
+    """Monte Carlo study by elastodynamics, until nothing can stop the rupture."""
+    return run.sweep("dynamic", PROBLEM, strength, RUNAWAY, run.size.dynamic)
+
+
+def moments(run: Runner) -> xr.Dataset:
+    """Weakest point, moments and histogram of tau_n, and the bound that is strict on the grid."""
+    return run.kept("moments", _moments, samples=run.size.samples)
+
+
+def _moments(run: Runner, samples: int) -> xr.Dataset:
+    interface = PROBLEM.interface
+    weights = setting.discrete_weights()
+    kernel = np.zeros(interface.size)
+    kernel[: weights.size] = weights
+    transform = np.conj(np.fft.rfft(kernel))
+    edges = np.linspace(setting.LOW, setting.HIGH, CELLS + 1)
+
+    def batch(item):
+        ratio, first = item
+        count = min(250, samples - first)
+        seed = run.seed_of(ratio)
+        tau_p = strength(ratio).sample(interface, samples=count, seed=seed, first=first)
+        tau_n = setting.nucleation_stress(PROBLEM, tau_p)
+        bound = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * transform, interface.size, axis=1)
+        d = tau_n / MEAN - 1.0
+        powers = [d.mean(axis=1), (d * d).mean(axis=1), (d * d * d).mean(axis=1)]
+        counts = np.histogram(tau_n[:, ::16], edges)[0]
+        weakest = tau_p.argmin(axis=1)
+        # Least tau_n away from its minimum by more than h_n.
+        where = tau_n.argmin(axis=1) * interface.spacing
+        near = setting.distance(interface.x[None, :], where[:, None]) < H
+        second = np.where(near, np.inf, tau_n).min(axis=1)
+        return {
+            "weakest_strength": tau_p.min(axis=1),
+            "weakest_position": weakest * interface.spacing,
+            "largest_tau_n": tau_n.max(axis=1),
+            "second_tau_n": second,
+            "least_tau_n": tau_n.min(axis=1),
+            "bound": bound.min(axis=1),
+            "powers": np.array(powers).T,
+            "counts": counts,
+        }
+
+    parts = []
+    for ratio in RATIOS:
+        found = run.map(batch, [(ratio, first) for first in range(0, samples, 250)])
+        part = {
+            name: ("sample", np.concatenate([each[name] for each in found]))
+            for name in found[0] if name not in ("powers", "counts")
+        }  # fmt: skip
+        part["powers"] = (("sample", "order"), np.concatenate([each["powers"] for each in found]))
+        part["counts"] = ("cell", sum(each["counts"] for each in found))
+        parts.append(xr.Dataset(part))
+    return along("correlation_ratio", RATIOS, parts)
+
+
+def theory(run: Runner) -> xr.Dataset:
+    """Correlations, and the variance of tau_n on this interface and on an infinite one."""
+    return run.kept("theory", _theory)
+
+
+def _theory(run: Runner) -> xr.Dataset:
+    interface = PROBLEM.interface
+    ratios = np.geomspace(0.02, 20.0, 41)
+    usable = ratios[ratios > 0.1]
+    own = [setting.nucleation_statistics(PROBLEM, strength(r)).variance_ratio for r in usable]
+    fields = [strength(ratio) for ratio in RATIOS]
+    return xr.Dataset(
+        {
+            "correlation": (("correlation_ratio", "x"), [f.correlation(interface) for f in fields]),
+            "gaussian_correlation": (
+                ("correlation_ratio", "x"),
+                [f.correlation(interface, of="z") for f in fields],
+            ),
+            "variance_ratio": (
+                "correlation_ratio",
+                [setting.nucleation_statistics(PROBLEM, f).variance_ratio for f in fields],
+            ),
+            "periodic": ("usable", own),
+            "infinite": ("ratio", [infinite_variance_ratio(ratio) for ratio in ratios]),
+        },
+        coords={"ratio": ratios, "usable": usable, "correlation_ratio": list(RATIOS),
+                "x": interface.x},
+    )  # fmt: skip
+
+
+def infinite_variance_ratio(ratio: float) -> float:
+    """Return Var[tau_n]/Var[tau_p] on an interface so long that it could be infinite."""
+    length = 60.0 * H * max(ratio, 1.0)
+    nodes = 2 ** math.ceil(math.log2(length / H * max(16.0, 8.0 / ratio)))
+    problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=length, nodes=nodes))
+    field = strength(ratio, mean_mode=True)
+    return float(setting.nucleation_statistics(problem, field).variance_ratio)
+
+
+def readings(run: Runner) -> xr.Dataset:
+    """What each reading of the modulus predicts for all that is printed and depends on it."""
+    count = run.size.readings
+
+    def in_printed(ratio: float):
+        return strength(ratio, nucleation_length=setting.PRINTED_H)
+
+    def first(dataset: xr.Dataset) -> xr.Dataset:
+        return dataset.sel(correlation_ratio=list(SIMULATED)).isel(sample=slice(count))
+
+    own = first(exact(run)), first(local(run))
+    strain = run.sweep("strain-exact", STRAIN, in_printed, EXACT, count, SIMULATED)
+    strain_local = run.sweep("strain-local", STRAIN, in_printed, LOCAL, count, SIMULATED)
+    mixed = run.sweep("mixed-exact", PROBLEM, in_printed, EXACT, count, SIMULATED)
+    mixed_own = run.sweep("mixed-local", PROBLEM, in_printed, LOCAL, count, SIMULATED)
+    # Of each reading: the simulation, its prediction, and the prediction with its own modulus.
+    cases = {
+        "a": (*own, own[1], H),
+        "b": (strain, strain_local, strain_local, setting.PRINTED_H),
+        "c": (mixed, strain_local, mixed_own, setting.PRINTED_H),
+        "c'": (own[0], printed(run), own[1], setting.PRINTED_H),
+    }
+    parts = []
+    for simulated, predicted, consistent, length in cases.values():
+        stress = simulated["first_instability"]
+        gap = setting.distance(predicted["critical_position"], simulated["critical_position"])
+        parts.append(
+            xr.Dataset(
+                {
+                    "excess": predicted["first_instability"] / stress - 1.0,
+                    "consistent_excess": consistent["first_instability"] / stress - 1.0,
+                    "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
+                    "patches": simulated["slip_patches"],
+                    "length": length / setting.L,
+                }
+            ).drop_vars("sample", errors="ignore")
+        )
+    return along("reading", list(READINGS), parts)
+
+
+def representative(run: Runner) -> xr.Dataset:
+    """One rupture in space and time at the shortest correlation length."""
+    return run.kept("representative", _representative)
+
+
+def _representative(run: Runner) -> xr.Dataset:
+    ratio = SIMULATED[0]
+    tau_p = strength(ratio).sample(PROBLEM.interface, seed=run.seed_of(ratio))[0]
+    found = st.simulate_rupture(
+        PROBLEM, tau_p, method=RUPTURE, variables=("slip_rate", "slip"), every=6, steps=False,
+        progress=False,
+    )  # fmt: skip
+    slip, interface = found["slip"].values, PROBLEM.interface
+    # Share of the slipping area at its residual strength once it is 6 h_n long.
+    node = round(float(found["critical_position"]) / interface.spacing)
+    turn = interface.size // 2 - node
+    residual = np.roll(tau_p / setting.W, turn)
+    weakened = np.nan
+    for row in np.roll(slip, turn, axis=1):
+        stopped = np.flatnonzero(row <= 1e-3 * row.max())
+        left = stopped[stopped < interface.size // 2].max(initial=-1)
+        right = stopped[stopped > interface.size // 2].min(initial=interface.size)
+        if (right - left - 1) * interface.spacing >= 6.0 * H:
+            inside = slice(left + 1, right)
+            weakened = float(np.mean(row[inside] >= 0.999 * residual[inside]))
+            break
+    # The patch around the onset when the mean stress is largest.
+    labels = patches(slip[int(found["mean_stress"].argmax())] > 0.0)
+    here = labels[node % interface.size]
+    patch_length = np.sum(labels == here) * interface.spacing if here >= 0 else np.nan
+    return xr.Dataset(
+        {
+            "slip_rate": (("time", "x"), found["slip_rate"].values.astype(np.float32)),
+            "load": ("time", found["load"].values),
+            "mean_stress": ("time", found["mean_stress"].values),
+            "critical_position": float(found["critical_position"]),
+            "critical_stress": float(found["critical_stress"]),
+            "weakened": weakened,
+            "patch_length": patch_length,
+            "strength": ("x", tau_p),
+            "tau_n": ("x", np.ravel(setting.nucleation_stress(PROBLEM, tau_p))),
+        },
+        coords={"time": found["time"].values, "x": PROBLEM.interface.x},
+    )
+
+
+def convergence(run: Runner) -> xr.Dataset:
+    """Ruptures with other grids, loading rates and time steps, on the same samples."""
+    count = 8 if run.size.ruptures >= 20 else 2
+    return run.kept("convergence", _convergence, count=count)
+
+
+def _convergence(run: Runner, count: int) -> xr.Dataset:
+    onset = dataclasses.replace(RUPTURE, stop="onset")
+    half = dataclasses.replace(
+        onset, courant=onset.courant / 2, load_step=onset.load_step / 2,
+        slip_step=onset.slip_step / 2,
+    )  # fmt: skip
+    cases = {
+        f"rate {rate:g}": (
+            PROBLEM, dataclasses.replace(onset, loading_rate=rate * setting.LOADING_RATE)
+        ) for rate in RATES
+    }  # fmt: skip
+    cases |= {
+        "half the nodes": (setting.grid(PROBLEM, nodes=0.5), onset),
+        "twice the nodes": (setting.grid(PROBLEM, nodes=2.0), onset),
+        "half the time step": (PROBLEM, half),
+    }
+    ratio = SIMULATED[0]
+
+    def one(item):
+        (problem, method), sample = item
+        count_now = count if problem is PROBLEM and method is not half else min(count, 4)
+        if sample >= count_now:
+            return np.nan, np.nan, np.nan
+        tau_p = strength(ratio).sample(problem.interface, seed=run.seed_of(ratio), first=sample)
+        found = st.onset(problem, tau_p, method=method, progress=False)
+        static = st.onset(problem, tau_p, method=EXACT, progress=False)
+        stress = float(found["critical_stress"][0])
+        return (stress, float(found["critical_position"][0]),
+                stress / float(static["first_instability"][0]) - 1.0)  # fmt: skip
+
+    items = [(case, sample) for case in cases.values() for sample in range(count)]
+    found = np.array(run.map(one, items)).reshape(len(cases), count, 3)
+    names = ("critical_stress", "critical_position", "offset")
+    dims = ("case", "sample")
+    return xr.Dataset(
+        {name: (dims, found[:, :, i]) for i, name in enumerate(names)}, coords={"case": list(cases)}
+    )
+
+
+def trend(run: Runner) -> xr.Dataset:
+    """Critical stress far beyond the paper's range, with L or L/xi_0 held fixed.
+
+    `mean_mode` 0 and 1 have L fixed, without and with a random mean of z.
+    """
+    parts = []
+    for mode in (False, True):
+        random = strength(1.0, mean_mode=mode)
+        study = st.Study(
+            problem=PROBLEM,
+            random=random,
+            method=LOCAL,
+            ensemble=st.Ensemble(samples=run.size.trend, seed=run.seed),
+            sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
+            title="Critical stress against correlation length",
+        )
+        found = run.study(f"trend-{int(mode)}", study).rename(correlation_length="ratio")
+        parts.append(found[["critical_stress"]].assign_coords(ratio=list(TREND)))
+    return along("mean_mode", (0, 1), parts)
+
+
+def window(run: Runner) -> xr.Dataset:
+    """One field and ever smaller h_n: xi_0/h_n grows with L/xi_0 held fixed."""
+    return run.kept("window", _window, samples=run.size.trend // 2)
+
+
+def _window(run: Runner, samples: int) -> xr.Dataset:
+    ratio = RATIOS[-1]
+    fine = setting.grid(PROBLEM, nodes=2.0)
+
+    def batch(item):
+        factor, first = item
+        count = min(250, samples - first)
+        friction = dataclasses.replace(fine.friction, weakening_rate=setting.W * factor)
+        problem = dataclasses.replace(fine, friction=friction)
+        tau_p = strength(ratio).sample(fine.interface, samples=count, seed=run.seed, first=first)
+        tau_n = setting.nucleation_stress(problem, tau_p)
+        return tau_n.min(axis=1), tau_p.min(axis=1)
+
+    firsts = range(0, samples, 250)
+    found = run.map(batch, [(factor, first) for factor in WINDOWS for first in firsts])
+    table = np.concatenate([np.array(each) for each in found], axis=1)
+    stress, weakest = table.reshape(2, len(WINDOWS), samples)
+    excess = [mean(row - low) for row, low in zip(stress, weakest, strict=True)]
+    half = samples // 2  # the two distributions from different samples
+    tests = [ks_2samp(row[:half], low[half:]) for row, low in zip(stress, weakest, strict=True)]
+    return xr.Dataset(
+        {
+            "excess": ("ratio", [each.value for each in excess]),
+            "excess_error": ("ratio", [each.error for each in excess]),
+            "distance": ("ratio", [float(each.statistic) for each in tests]),
+            "chance": ("ratio", [float(each.pvalue) for each in tests]),
+            "stress": (("ratio", "sample"), stress),
+            "weakest": ("sample", weakest[0]),
+        },
+        coords={"ratio": [ratio * factor for factor in WINDOWS]},
+    )
+
+
+def modes(run: Runner) -> xr.Dataset:
+    """Changes of tau_cr by rounded weights, by the modes left out, and by Eq. 11 cut off."""
+    return run.kept("modes", _modes)
+
+
+def _modes(run: Runner) -> xr.Dataset:
+    parts = []
+    for ratio in RATIOS:
+        field, interface = strength(ratio), PROBLEM.interface
+        spectrum = dataclasses.replace(field.spectrum, truncation=None, power_kept=1.0 - 1e-7)
+        more = dataclasses.replace(field, spectrum=spectrum)
+        tau_p = field.sample(interface, samples=200, seed=run.seed)
+        usual = setting.nucleation_stress(PROBLEM, tau_p).min(axis=1)
+        rounded = setting.nucleation_stress(PROBLEM, tau_p, weights="rounded").min(axis=1)
+        cut = np.fft.rfft(tau_p, axis=1)
+        highest = 2.0 * 2.5 * 2.0 * np.pi / (ratio * H)
+        cut[:, 2.0 * np.pi * np.fft.rfftfreq(interface.size, interface.spacing) > highest] = 0.0
+        others = {
+            "untruncated": more.sample(interface, samples=200, seed=run.seed),
+            "cut": np.fft.irfft(cut, interface.size, axis=1),
+        }
+        changes = {
+            name: setting.nucleation_stress(PROBLEM, rows).min(axis=1) / usual - 1.0
+            for name, rows in others.items()
+        } | {"rounded": rounded / usual - 1.0}
+        parts.append(xr.Dataset({name: ("sample", found) for name, found in changes.items()}))
+    return along("correlation_ratio", RATIOS, parts)
+
+
+def growth(run: Runner) -> xr.Dataset:
+    """How slip patches appear, grow and merge while the load rises to the onset."""
+    return run.kept("growth", _growth, count=run.size.few)
+
+
+def patches(slipping):
+    """Return the number of the patch that each node belongs to, -1 where it sticks."""
+    starts = slipping & ~np.roll(slipping, 1)
+    count = max(int(starts.sum()), 1)
+    # Nodes before the first start belong to the last patch, round the corner.
+    return np.where(slipping, (np.cumsum(starts) - 1) % count, -1)
+
+
+def _growth(run: Runner, count: int) -> xr.Dataset:
+    interface = PROBLEM.interface
+
+    def one(item):
+        ratio, sample = item
+        tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
+        onset = st.onset(PROBLEM, tau_p, method=EXACT, progress=False)
+        load = float(onset["first_instability"][0])
+        path = st.equilibrium_path(PROBLEM, tau_p, load * np.array(LEVELS))
+        labels = [patches(row > 0.0) for row in np.nan_to_num(path["slip"].values)]
+        mergers, total = [0], 0
+        for before, now in itertools.pairwise(labels):
+            for patch in range(now.max() + 1):
+                inside = before[(now == patch) & (before >= 0)]
+                total += max(np.unique(inside).size - 1, 0)
+            mergers.append(total)
+        node = round(float(onset["critical_position"][0]) / interface.spacing) % interface.size
+        slipping = np.flatnonzero(labels[-1] >= 0)
+        if slipping.size == 0:  # the critical patch begins less than 0.1 % below its onset
+            near = setting.distance(tau_p.argmin(), node, interface.size) * interface.spacing
+            return [row.max() + 1 for row in labels], mergers, False, near < 0.5 * H
+        away = setting.distance(slipping, node, interface.size)
+        critical = labels[-1] == labels[-1][slipping[away.argmin()]]
+        merged = any(np.unique(row[critical & (row >= 0)]).size > 1 for row in labels[:-1])
+        return [row.max() + 1 for row in labels], mergers, merged, critical[tau_p.argmin()]
+
+    items = [(ratio, sample) for ratio in RATIOS for sample in range(count)]
+    found = run.map(one, items)
+    dims, shape = ("correlation_ratio", "sample"), (len(RATIOS), count)
+    return xr.Dataset(
+        {
+            "patches": ((*dims, "level"), np.array([f[0] for f in found]).reshape(*shape, -1)),
+            "mergers": ((*dims, "level"), np.array([f[1] for f in found]).reshape(*shape, -1)),
+            "merged": (dims, np.array([int(f[2]) for f in found]).reshape(shape)),
+            "holds_weakest": (dims, np.array([int(f[3]) for f in found]).reshape(shape)),
+        },
+        coords={"correlation_ratio": list(RATIOS), "level": list(LEVELS)},
+    )
+
+
+def dips(*places):
+    """Return the mean strength with smooth dips; places are (centre in h_n, relative depth)."""
+    x = (PROBLEM.interface.x - 0.5 * setting.L) / H
+    shape = sum(depth * np.exp(-2.0 * ((x - centre) / 0.8) ** 2) for centre, depth in places)
+    return MEAN * (1.0 - shape)
+
+
+def mechanism(run: Runner) -> xr.Dataset:
+    """How patches act on each other: one, two, a pair with a helper, and misplaced samples."""
+    return run.kept("mechanism", _mechanism, samples=run.size.samples)
+
+
+def _mechanism(run: Runner, samples: int) -> xr.Dataset:
+    def onset(profile, problem=PROBLEM):
+        return st.onset(problem, profile, method=EXACT, progress=False)
+
+    def local_stress(profile):
+        return float(setting.nucleation_stress(PROBLEM, profile).min())
+
+    result = xr.Dataset(coords={"x": PROBLEM.interface.x})
+    one = dips((0.0, 0.30))
+    single = float(onset(one)["first_instability"][0])
+    path = st.equilibrium_path(PROBLEM, one, [0.999 * single]).isel(load=0)
+    result["one_strength"], result["one_stress"] = ("x", one), ("x", path["stress"].values)
+    result["one_load"] = 0.999 * single
+    slipping = path["slip"].values > 0.0
+    change = path["stress"].values / (0.999 * single) - 1.0
+    x = PROBLEM.interface.x - 0.5 * setting.L
+    edge = np.abs(x[slipping]).max()
+    result["inside"] = change[slipping].mean()
+    result["beside"] = np.interp(edge + 0.25 * H, x, change)
+    apart = (1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
+    lowering = []
+    for distance in apart:
+        two = dips((-0.5 * distance, 0.30), (0.5 * distance, 0.30))
+        stress = float(onset(two)["first_instability"][0])
+        # What a single dip misses is no interaction.
+        own = (local_stress(one) - single) / single
+        lowering.append((local_stress(two) - stress) / stress - own)
+    result["lowering"] = ("distance", lowering)
+    result = result.assign_coords(distance=list(apart))
+    pair = dips((-8.0, 0.30), (6.0, 0.298), (7.5, 0.28))
+    tau_n = np.ravel(setting.nucleation_stress(PROBLEM, pair))
+    result["pair_strength"], result["pair_tau_n"] = ("x", pair), ("x", tau_n)
+    result["pair_local"] = PROBLEM.interface.x[tau_n.argmin()]
+    found = onset(pair)
+    result["pair_exact"] = float(found["critical_position"][0])
+    result["pair_stress"] = float(found["first_instability"][0])
+    # Load and strength exchanged: tau_p(x), and max tau_p with an initial stress in its place.
+    field, gaps = strength(RATIOS[1]), []
+    for tau_p in field.sample(PROBLEM.interface, samples=16, seed=run.seed):
+        highest = tau_p.max()
+        loaded = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=highest - tau_p))
+        level = onset(np.full(tau_p.size, highest), loaded)["first_instability"][0]
+        usual = float(onset(tau_p)["first_instability"][0])
+        gaps.append((float(level) - (highest - tau_p).mean()) / usual - 1.0)
+    result["exchange"] = float(np.abs(gaps).max())
+    for key, values in _contest(run).items():
+        result[key] = (key, values)
+    return result
+
+
+def _contest(run: Runner) -> dict:
+    """Return, where the local criterion misplaces the onset and where not, how close the two
+    places are and how far interaction lowers the onset at the true one, relative to it."""
+    ratio = RATIOS[0]
+    one, other = (found.sel(correlation_ratio=ratio) for found in (local(run), exact(run)))
+    place, stress = other["critical_position"].values, other["first_instability"].values
+    wrong = setting.distance(one["critical_position"].values, place) > 0.5 * H
+    result = {}
+    for key, numbers in (("wrong", np.flatnonzero(wrong)), ("right", np.flatnonzero(~wrong))):
+        contest, helped = [], []
+        for number in numbers[:100]:
+            tau_p = strength(ratio).sample(
+                PROBLEM.interface, seed=run.seed_of(ratio), first=int(number)
+            )
+            tau_n = np.ravel(setting.nucleation_stress(PROBLEM, tau_p))
+            near = setting.distance(PROBLEM.interface.x, place[number]) < 0.5 * H
+            there = tau_n[near].min()
+            contest.append(there / tau_n.min() - 1.0)
+            helped.append(there / stress[number] - 1.0)
+        result |= {f"contest_{key}": np.array(contest), f"helped_{key}": np.array(helped)}
+    return result
+
+
+def arrest(run: Runner) -> xr.Dataset:
+    """Samples whose first instability comes to rest by equilibrium, run again with inertia."""
+    return run.kept("arrest", _arrest, samples=run.size.samples, most=10)
+
+
+def _arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
+    found = exact(run)["arrested_events"]
+    interface = PROBLEM.interface
+    chosen = [
+        (ratio, int(number))
+        for ratio in RATIOS
+        for number in np.flatnonzero(found.sel(correlation_ratio=ratio).values > 0)[:most]
+    ]
+
+    def beside(tau_p, centre, length):
+        """Largest strength within h_n/2 of each end of a patch; the smaller of the two."""
+        sides = []
+        for sign in (-1.0, 1.0):
+            middle = centre + sign * (0.5 * length + 0.25 * H)
+            near = setting.distance(interface.x, middle) <= 0.25 * H
+            sides.append(tau_p[near].max())
+        return min(sides)
+
+    def again(item):
+        ratio, number = item
+        tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=number)[0]
+        static = st.onset(PROBLEM, tau_p, method=st.Equilibrium(events=1), progress=False)
+        length = float(static["event_length"][0, 0])
+        centre = float(static["event_position"][0, 0])
+        at = beside(tau_p, centre, length)
+        by_chance = [beside(tau_p, place, length) for place in interface.x[::8]]
+        moving = st.onset(PROBLEM, tau_p, method=RUNAWAY, progress=False)
+        rank = float(np.mean(np.array(by_chance) < at))
+        return ratio, number, length, rank, float(moving["arrested_events"][0])
+
+    rows = np.array(run.map(again, chosen), dtype=float).reshape(-1, 5)
+    names = ("ratio", "number", "length", "rank", "dynamic")
+    return xr.Dataset({name: ("event", rows[:, i]) for i, name in enumerate(names)})
+
+
+DRIVING = {
+    "uniform": st.Load(),
+    "gradient": st.Load(profile=st.GradientLoad(amplitude=0.9, centre=0.5)),
+    "edge": st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.1 * setting.L, edge=0.5)),
+}
+"""Loads of the study of non-uniform driving; tau_0 is the mean of each."""
+
+
+def driven(case: str):
+    """Return the problem under one of these loads, with a residual strength of 0.6 tau_p,min."""
+    problem = setting.grid(PROBLEM, nodes=0.5)
+    friction = dataclasses.replace(problem.friction, residual_strength=0.6 * setting.LOW)
+    return dataclasses.replace(problem, friction=friction, load=DRIVING[case])
+
+
+def driving(run: Runner) -> xr.Dataset:
+    """Arrested events under non-uniform loads, by equilibrium and with inertia."""
+    return run.kept("driving", _driving, count=16 if run.size.few >= 24 else 4)
+
+
+def _driving(run: Runner, count: int) -> xr.Dataset:
+    field = strength(RATIOS[1])
+
+    def one(item):
+        case, sample = item
+        problem = driven(case)
+        tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
+        found = st.onset(problem, tau_p, method=st.Equilibrium(events=12), progress=False)
+        length, stress = found["event_length"].values[0], found["event_stress"].values[0]
+        drop = tau_p - problem.friction.residual_strength
+        energy = float(np.mean(drop**2)) / (2.0 * setting.W)
+        griffith = np.full(length.size, np.nan)
+        there = np.isfinite(length)
+        if there.any():
+            centre = 0.5 * problem.interface.extent
+            griffith[there] = setting.griffith_length(
+                problem, stress[there], energy, centre=centre, arrest=True
+            )
+        dynamic = np.nan
+        if case == "edge" and there[0]:
+            dynamic = _held(problem, tau_p, float(stress[0]))
+        return length, griffith, dynamic
+
+    found = run.map(one, [(case, sample) for case in DRIVING for sample in range(count)])
+    shape = (len(DRIVING), count)
+    return xr.Dataset(
+        {
+            "length": (("case", "sample", "event"), _table(found, 0, shape)),
+            "griffith": (("case", "sample", "event"), _table(found, 1, shape)),
+            "dynamic_length": (("case", "sample"), _table(found, 2, shape)),
+        },
+        coords={"case": list(DRIVING)},
+    )
+
+
+def _table(found, column: int, shape):
+    values = np.array([row[column] for row in found], dtype=float)
+    return values.reshape(*shape, *values.shape[1:])
+
+
+def _held(problem, tau_p, stress: float) -> float:
+    """Return the length of the patch in which a rupture comes to rest under a load that is held
+    just above that of the first arrested event, m."""
+    rise = 1.005 * stress / setting.LOADING_RATE
+    found = st.simulate_rupture(
+        problem, tau_p, method=RUPTURE, stop="rest", end_time=rise + 1e-3,
+        load=([0.0, rise, rise + 1.0], [0.0, 1.005 * stress, 1.005 * stress]),
+        variables=("slip",), every=100_000, every_implicit=100_000, steps=False, progress=False,
+    )  # fmt: skip
+    slip = found["slip"].values[-1]
+    labels = patches(slip > 1e-2 * slip.max())
+    longest = np.bincount(labels[labels >= 0]).max(initial=0)
+    return float(longest) * problem.interface.spacing
+
+
+def free_end(run: Runner) -> xr.Dataset:
+    """Onset on interfaces with free ends in mode III, where a mirrored field has them exactly.
+
+    A field mirrored at x = 0 and L makes antiplane displacement even there: no stress acts on
+    these planes, as if the solids ended.
+    """
+    return run.kept("free_end", _free_end, count=min(run.size.what_if, 400))
+
+
+def _free_end(run: Runner, count: int) -> xr.Dataset:
+    base = dataclasses.replace(PROBLEM, mode="III")
+    length = base.nucleation_length
+    cases = [(ratio, 1.0) for ratio in RATIOS] + [(RATIOS[0], 0.25), (RATIOS[0], 0.5)]
+
+    def one(item):
+        (ratio, factor), first = item
+        problem = setting.grid(base, length=factor, nodes=factor)
+        double = setting.grid(base, length=2.0 * factor, nodes=2.0 * factor)
+        field = strength(ratio, nucleation_length=length)
+        tau_p = field.sample(
+            problem.interface, samples=min(50, count - first), seed=run.seed, first=first
+        )
+        mirrored = np.concatenate([tau_p, tau_p[:, ::-1]], axis=1)
+        periodic = st.onset(problem, tau_p, method=EXACT, progress=False)
+        free = st.onset(double, mirrored, method=EXACT, progress=False)
+        extent = problem.interface.extent
+        # Nodes are half a spacing from the mirror planes.
+        place = (free["critical_position"].values + 0.5 * problem.interface.spacing) % extent
+        change = free["first_instability"].values / periodic["first_instability"].values - 1.0
+        return change, np.minimum(place, extent - place) / length
+
+    firsts = list(range(0, count, 50))
+    found = run.map(one, [(case, first) for case in cases for first in firsts])
+    rows = [found[i * len(firsts) : (i + 1) * len(firsts)] for i in range(len(cases))]
+    change, end = (
+        np.array([np.concatenate([part[k] for part in row]) for row in rows]) for k in (0, 1)
+    )
+    return xr.Dataset(
+        {"change": (("case", "sample"), change), "end": (("case", "sample"), end)},
+        coords={
+            "ratio": ("case", [c[0] for c in cases]),
+            "factor": ("case", [c[1] for c in cases]),
+        },
+    )
+
+
+def failure(run: Runner) -> xr.Dataset:
+    """P(tau_cr < s) down to one in a million at xi_0 = h_n/2, by the local criterion."""
+    return run.kept("failure", _failure)
+
+
+def _failure(run: Runner) -> xr.Dataset:
+    return st.failure_curve(
+        PROBLEM, strength(RATIOS[1]), method=LOCAL, smallest=1e-6, target_cv=0.2,
+        seed=run.seed, progress=False,
+    ).drop_attrs()  # fmt: skip
+
+
+WHAT_IFS = {
+    "skewness": "strength skewed to low and to high values",
+    "exponent": "spectral exponent at equal decay length",
+    "length": "length of the interface",
+    "normal_load": "normal pressure",
+    "wide_strength": "range of the strength",
+    "random_load": "random initial stress",
+    "random_residual": "random residual strength",
+    "correlation": "residual strength correlated with the strength",
+    "uniform_dc": "uniform d_c instead of uniform weakening rate",
+}
+CHEAP = ("skewness", "exponent", "length")
+"""What-ifs by the local criterion, which afford many samples."""
+ARRESTS = {
+    "wide_strength": ((1, 3),),
+    "random_load": ((3, 5),),
+    "random_residual": ((2,), (0,)),
+    "correlation": ((0, 2, 5), (0,)),
+}
+"""What-ifs in which arrest is the question: of each axis, the values that are run with inertia."""
+
+
+def what_if(run: Runner, name: str) -> xr.Dataset:
+    """A study file of `what_if/`, its swept points stacked along 'point'."""
+    samples = run.size.trend if name in CHEAP else None
+    return stacked(run.what_if(name, samples=samples))
+
+
+def stacked(found: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with its swept axes stacked along 'point', in the order of the file."""
+    swept = [dim for dim in found["critical_stress"].dims if dim != "sample"]
+    numbered = found.drop_vars([name for name in found.coords if name != "sample"])
+    return numbered.stack(point=swept, create_index=False).transpose("point", ...)
+
+
+def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
+    """The points of a what-if in which arrest is the question, with inertia."""
+    plain = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml").to_dict()
+    plain["sweep"] = [
+        {key: [values[i] for i in chosen] for key, values in axis.items()}
+        for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
+    ]
+    plain["method"] = {"type": "rupture", "loading_rate": setting.LOADING_RATE, "stop": "runaway"}
+    plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
+    return stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
+
+
+def points(name: str) -> list[int]:
+    """Return the points of a what-if, numbered as in `stacked`, that are run with inertia."""
+    plain = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml").to_dict()
+    sizes = [len(next(iter(axis.values()))) for axis in plain["sweep"]]
+    grid = np.arange(math.prod(sizes)).reshape(sizes)
+    return [int(point) for point in grid[np.ix_(*ARRESTS[name])].ravel()]
