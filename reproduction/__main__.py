@@ -85,7 +85,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
                        help="also ruptures by the thousand; some ten minutes more")  # fmt: skip
     parser.add_argument("--figures", type=_numbers, default=(), metavar="N,N",
                         help="only these figures, without the page, such as 5,6")  # fmt: skip
-    parser.add_argument("--out", default="reproduction-of-the-paper", metavar="FOLDER")
+    parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
     parser.add_argument("--samples", type=int, metavar="N",
                         help="samples at each correlation length, 10,000 if left out")  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)

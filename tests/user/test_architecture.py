@@ -19,7 +19,6 @@ PAGE = ROOT / "docs" / "architecture.md"
 DEFERRED = {
     ("stiction.study.study", "stiction.study_run"),
     ("stiction.ensemble.distributed", "stiction.ensemble.slurm"),
-    ("stiction.papers.albertini2020.studies.study_cache", "stiction.papers.albertini2020.studies"),
 }
 """Imports of own modules inside functions, outside the commands; the page says why of each."""
 

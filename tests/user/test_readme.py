@@ -12,7 +12,7 @@ import stiction as st
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 COMMANDS = (
-    "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/stiction paper",
+    "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/python reproduction",
     'python3 -m venv .venv && .venv/bin/python -m pip install -e ".[test]"'
     " && .venv/bin/python -m pytest",
 )
