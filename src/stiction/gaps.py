@@ -11,8 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.errors import InputError, warn_accuracy
-from stiction.profile_nodes import Gaps, gaps_of
-from stiction.profiles import at_nodes
+from stiction.profiles import Gaps, at_nodes, gaps_of
 
 Mask = NDArray[np.bool_]
 

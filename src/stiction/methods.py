@@ -17,7 +17,7 @@ from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.model import Progress, checked, describe, to_plain
 from stiction.problem import Problem, Sample, named_profiles
-from stiction.profile_nodes import Gaps
+from stiction.profiles import Gaps
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
     DIRECTION,

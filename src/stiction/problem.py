@@ -16,9 +16,7 @@ from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, describe, is_unplaced, model, real_array
-from stiction.placed import on_nodes
-from stiction.profile_nodes import describe_gaps
-from stiction.profiles import at_nodes
+from stiction.profiles import at_nodes, describe_gaps, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
 
@@ -536,7 +534,7 @@ def _check_finite(name: str, array: Array, interface: Interface, infinite: bool)
     missing = np.isnan(array)
     unless = ", or inf where nothing breaks" if infinite else ""
     if len(interface.shape) == 1 and array.shape[-1:] == interface.shape and missing.any():
-        where = describe_gaps(np.atleast_2d(missing), interface)
+        where = describe_gaps(missing, interface)
         raise InputError(
             f"{name}: must be finite{unless}: there {where}; st.onset(..., gaps='fill') and"
             " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"

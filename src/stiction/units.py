@@ -7,15 +7,12 @@ from typing import NamedTuple
 
 from stiction.errors import InputError
 
-Dimension = tuple[int, int, int]
-"""Powers of kilogram, metre and second."""
-
 
 class Unit(NamedTuple):
-    """A unit as a factor to SI and a dimension."""
+    """A unit: its factor to SI, and its powers of kilogram, metre and second."""
 
     factor: float
-    dimension: Dimension
+    dimension: tuple[int, int, int]
 
 
 _BASE = {
@@ -23,69 +20,77 @@ _BASE = {
     "s": Unit(1.0, (0, 0, 1)),
     "g": Unit(1e-3, (1, 0, 0)),
     "N": Unit(1.0, (1, 1, -2)),
+    "J": Unit(1.0, (1, 2, -2)),
     "Pa": Unit(1.0, (1, -1, -2)),
     "bar": Unit(1e5, (1, -1, -2)),
 }
-_PREFIXES = {"": 1.0, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3}
-_PREFIXES |= {"u": 1e-6, "\N{MICRO SIGN}": 1e-6, "\N{GREEK SMALL LETTER MU}": 1e-6, "n": 1e-9}
-_LONG_PREFIXES = {"giga": "G", "mega": "M", "kilo": "k", "centi": "c", "milli": "m"}
-_LONG_PREFIXES |= {"micro": "u", "nano": "n", "": ""}
-_LONG_BASE = {"meter": "m", "metre": "m", "pascal": "Pa", "newton": "N", "second": "s"}
-_SINGLE = {
-    prefix + name: Unit(scale * unit.factor, unit.dimension)
-    for prefix, scale in _PREFIXES.items()
-    for name, unit in _BASE.items()
-}
-_SINGLE |= {
-    long_prefix + long_name + plural: _SINGLE[prefix + name]
-    for long_prefix, prefix in _LONG_PREFIXES.items()
-    for long_name, name in _LONG_BASE.items()
-    for plural in ("", "s")
-}
-_SINGLE |= {
-    "micron": _SINGLE["um"],
-    "microns": _SINGLE["um"],
-    "psi": Unit(6894.757293168, (1, -1, -2)),
+_WORDS = {"meter": "m", "metre": "m", "second": "s", "newton": "N", "joule": "J", "pascal": "Pa"}
+_PREFIXES = {
+    "": ("", 1.0), "T": ("tera", 1e12), "G": ("giga", 1e9), "M": ("mega", 1e6),
+    "k": ("kilo", 1e3), "c": ("centi", 1e-2), "m": ("milli", 1e-3), "u": ("micro", 1e-6),
+    "\N{MICRO SIGN}": ("micro", 1e-6), "\N{GREEK SMALL LETTER MU}": ("micro", 1e-6),
+    "n": ("nano", 1e-9),
+}  # fmt: skip
+_UNITS = {
     "%": Unit(0.01, (0, 0, 0)),
     "1": Unit(1.0, (0, 0, 0)),
     "-": Unit(1.0, (0, 0, 0)),
     "dimensionless": Unit(1.0, (0, 0, 0)),
+    "in": Unit(0.0254, (0, 1, 0)),
+    "inch": Unit(0.0254, (0, 1, 0)),
+    "micron": Unit(1e-6, (0, 1, 0)),
+    "microns": Unit(1e-6, (0, 1, 0)),
+    "psi": Unit(6894.757293168, (1, -1, -2)),
+    "ksi": Unit(6894757.293168, (1, -1, -2)),
 }
+for _short, (_long, _scale) in _PREFIXES.items():
+    for _name, _unit in _BASE.items():
+        _UNITS[_short + _name] = Unit(_scale * _unit.factor, _unit.dimension)
+    for _word, _name in _WORDS.items():
+        _UNITS[_long + _word] = _UNITS[_long + _word + "s"] = _UNITS[_short + _name]
+_KNOWN = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
+_MEANING = {"Pa": "stress", "m": "length", "Pa/m": "a weakening rate", "1": "a pure number"}
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
-_FACTOR = re.compile(r"(?P<name>[^\W\d_]+|%|1(?!\d))(?:\^?(?P<power>[+-]?\d+))?$")
+_FACTOR = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d+))?$")
 
 
 def parse(text: str) -> Unit | None:
-    """The unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), or None if it is not known."""
+    """Return the unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), None if it is unknown.
+
+    Units are powers of the known ones, separated by blanks or dots, and one of them or several in
+    turn after a slash.
+    """
     text = text.strip()
-    whole = _SINGLE.get(text) or _SINGLE.get(text.lower() if len(text) > 4 else text)
+    whole = _UNITS.get(text) or _UNITS.get(text.lower() if len(text) > 4 else text)
     if whole is not None:
         return whole
     plain = re.sub(r"[⁻⁰¹²³⁴]+", lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text)
-    plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^")).replace("/", " / ")
-    factor, dimension, sign = 1.0, (0, 0, 0), 1
-    for word in plain.split():
-        if word == "/":
-            if sign < 0:
-                return None
-            sign = -1
-            continue
-        match = _FACTOR.match(word)
-        unit = _SINGLE.get(match["name"]) if match else None
-        if match is None or unit is None:
+    plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^"))
+    factor, dimension = 1.0, (0, 0, 0)
+    for place, part in enumerate(plain.split("/")):
+        words = part.split()
+        if not words:
             return None
-        power = sign * int(match["power"] or 1)
-        factor *= unit.factor**power
-        a, b, c = dimension
-        d, e, f = unit.dimension
-        dimension, sign = (a + power * d, b + power * e, c + power * f), 1
-    return Unit(factor, dimension) if plain.split() and sign > 0 else None
+        for number, word in enumerate(words):
+            match = _FACTOR.match(word)
+            unit = _UNITS.get(match[1]) if match else None
+            if match is None or unit is None:
+                return None
+            power = int(match[2] or 1) * (-1 if place and number == 0 else 1)
+            factor *= unit.factor**power
+            a, b, c = (d + power * e for d, e in zip(dimension, unit.dimension, strict=True))
+            dimension = (a, b, c)
+    return Unit(factor, dimension)
+
+
+def is_in(text: str | None, si: str) -> bool:
+    """Whether a text names a unit of the same dimension as an SI unit."""
+    given, wanted = None if text is None else parse(text), parse(si)
+    return given is not None and wanted is not None and given.dimension == wanted.dimension
 
 
 def factor_to(si: str, text: str) -> float:
-    """What a value in the unit `text` is multiplied by to be in the SI unit `si`.
-
-    Units that the small table here does not know are looked up with pint where it is installed.
+    """Return what a value in the unit `text` is multiplied by to be in the SI unit `si`.
 
     Raises
     ------
@@ -95,37 +100,13 @@ def factor_to(si: str, text: str) -> float:
     wanted, given = parse(si), parse(text)
     assert wanted is not None
     if given is None:
-        return _by_pint(si, text)
+        near = [name for name in _KNOWN.split(", ") if name.lower() == text.strip().lower()]
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(
+            f"unknown unit {text!r}{hint} (known: {_KNOWN}, products and quotients of them such as"
+            " MPa/mm)"
+        )
     if given.dimension != wanted.dimension:
-        raise InputError(f"is in {text}, which is no unit of {_meaning(si)}; give it in {si}")
+        raise InputError(f"is in {text}, which is no unit of {_MEANING.get(si, si)}; give it in"
+                         f" {si}")  # fmt: skip
     return given.factor / wanted.factor
-
-
-def _by_pint(si: str, text: str) -> float:
-    try:
-        import pint
-    except ImportError:
-        pass
-    else:
-        try:
-            return float(pint.UnitRegistry().Quantity(1.0, text).to(si).magnitude)
-        except pint.DimensionalityError:
-            raise InputError(
-                f"is in {text}, which is no unit of {_meaning(si)}; give it in {si}"
-            ) from None
-        except Exception:  # pint's parser raises many kinds for text that is no unit
-            pass
-    near = [name for name in _COMMON if name.lower() == text.strip().lower()]
-    hint = f"; did you mean {near[0]}?" if near else ""
-    raise InputError(
-        f"unknown unit {text!r}{hint} (known: {', '.join(_COMMON)}, products and quotients of them"
-        " such as MPa/mm, and all that pint knows if it is installed)"
-    )
-
-
-_COMMON = ("m", "cm", "mm", "um", "nm", "km", "Pa", "kPa", "MPa", "GPa", "bar", "psi", "N", "kN")
-
-
-def _meaning(si: str) -> str:
-    names = {"Pa": "stress", "m": "length", "Pa/m": "a weakening rate", "1": "a pure number"}
-    return names.get(si, si)

@@ -36,7 +36,7 @@ def test_maps_as_text_honour_units_and_places(tmp_path, units):
 def test_a_millimetre_taken_for_a_metre_is_refused(tmp_path):
     path = text(tmp_path / "map.csv")
     path.write_text(path.read_text().replace("(mm)", "(m)"))
-    with pytest.raises(st.InputError, match="x must lie at the nodes|check its unit"):
+    with pytest.raises(st.InputError, match="if x is in mm, say so"):
         st.read_profile(path, interface=PLANE)
 
 
@@ -119,7 +119,7 @@ def test_heights_whose_axes_changed_places_are_refused(tmp_path):
     with pytest.raises(st.InputError, match="x and y have changed places"):
         st.read_profile(tmp_path / "turned.npy", interface=PLANE, strength=lambda h: h, unit="um")
     array = xr.DataArray(VALUES.T, dims=("x", "y"), coords={"x": turned[1], "y": turned[0]})
-    with pytest.raises(st.InputError, match="has 16 values along x, the plane has 32 nodes"):
+    with pytest.raises(st.InputError, match="y reaches from 0 to 0.019375 m"):
         st.read_profile(array, interface=PLANE, strength=lambda h: h)
 
 
@@ -178,7 +178,7 @@ def test_coordinates_of_a_map_decide_and_not_the_order(tmp_path, order):
     for source in (array, tmp_path / "map.nc"):
         np.testing.assert_array_equal(st.read_profile(source, interface=PLANE), values)
     unknown = array.assign_coords(x=np.where(array.x == 0.0, np.nan, array.x))
-    with pytest.raises(st.InputError, match="x reaches from .* to nan"):
+    with pytest.raises(st.InputError, match="x must be finite"):
         st.read_profile(unknown, interface=PLANE)
 
 

@@ -125,8 +125,9 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     np.testing.assert_array_equal(problem.load.profile, 1.0 + x)
     with pytest.raises(st.InputError, match="load.profile: x lies elsewhere"):
         st.Problem(system.solid, interface, friction, st.Load(profile=labelled(1.0 + x, x * 0.99)))
+    load = st.Load(profile=labelled(1.0 + x, x, units="Pa"))
     with pytest.raises(st.InputError, match="profile: load_profile is in Pa"):
-        st.Load(profile=labelled(1.0 + x, x, units="Pa"))
+        st.Problem(system.solid, interface, friction, load)
     run = st.simulate_rupture(
         system, labelled(strength[::-1], x[::-1]), method=st.Rupture(loading_rate=1e9), stop="onset"
     )
@@ -293,7 +294,7 @@ def test_a_map_may_be_negative_of_what_may_and_leaves_gaps(interface, tmp_path):
 
 def test_heights_without_a_unit_that_make_no_strength_are_doubted(interface, tmp_path):
     np.save(tmp_path / "p.npy", 1.0 + interface.x)  # um
-    with pytest.warns(st.UnitWarning, match="1.05e\\+12 Pa.*perhaps they are in um: unit='um'"):
+    with pytest.warns(st.UnitWarning, match=r"1.05e\+12 Pa.*give it with unit="):
         st.read_profile(tmp_path / "p.npy", strength=lambda h: 1e12 * h)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -475,10 +476,10 @@ def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (npy((10**15,)), "damaged: shape"),
-        (npy((-4,), b"x" * 32), "damaged"),
-        (npy((4,), b"x" * 31), "damaged"),
-        (npy((2,), b"x" * 16, dtype="|O"), "must hold numbers, got object"),
+        (npy((10**15,)), "not a .npy file"),
+        (npy((-4,), b"x" * 32), "not a .npy file"),
+        (npy((4,), b"x" * 31), "not a .npy file"),
+        (npy((2,), b"x" * 16, dtype="|O"), "not a .npy file"),
         (npy((0,)), "shape"),
         (b"\x93NUMPY\x01\x00\xff\xff{", "not a .npy file"),
         (b"\x93NUMPY\x02\x00\xff\xff\xff\xff{", "not a .npy file"),
@@ -568,7 +569,7 @@ def test_profiles_in_a_study_file(interface, strength, tmp_path):
     study["sweep"] = [{"problem.friction.residual_strength": [0.0, "tau_r.csv"]}]
     swept = st.Study.from_dict(study, folder=tmp_path)
     np.testing.assert_allclose(
-        swept.plans[1].problem.friction.residual_strength, 1e5 + 1e6 * x, rtol=1e-11
+        swept.experiments[1].problem.friction.residual_strength, 1e5 + 1e6 * x, rtol=1e-11
     )
 
 
@@ -576,3 +577,62 @@ def test_reading_says_nothing_where_nothing_is_wrong(system, strength):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found(system, labelled(strength, system.interface.x))
+
+
+HEADINGS = [
+    "x / mm;tau / MPa", "x_mm;tau_MPa", "#x_mm tau_MPa", "x in mm;strength in MPa",
+    "\ufeffx (mm);tau (MPa)", "Wegl\u00e4nge [mm];tau [N/mm\u00b2]", "x (mm);tau (N mm-2)",
+    "x (cm);tau (bar)", "x,tau\nmm,MPa", "x (mm), tau_p (MPa)",
+    "Position (mm)\tShear strength (MPa)",
+    "distance (um);peak strength [kPa]", "x (in);tau (ksi)", "x [m];tau", "X {mm};TAU {MPa}",
+    "pos mm;taup MPa", "x (mm);N/mm^2", "position: mm;tau_p: MPa", "mm,MPa",
+    "Interferometer\nrun 14, room 3\nx (mm);tau (MPa)",
+]  # fmt: skip
+SCALES = {"cm": 1e2, "um": 1e6, "(in)": 1.0 / 0.0254, "[m]": 1.0}
+STRESSES = {"bar": 1e-5, "kPa": 1e-3, "ksi": 1.0 / 6894757.293168, "tau": 1e-6}
+
+
+@pytest.mark.parametrize("head", HEADINGS)
+@pytest.mark.filterwarnings("error")
+def test_headings_of_laboratories(interface, strength, tmp_path, head):
+    length = next((scale for text, scale in SCALES.items() if text in head), 1e3)
+    stress = next((scale for text, scale in STRESSES.items() if text in head), 1e-6)
+    if head == "x [m];tau":
+        stress = 1.0
+    separator = next((mark for mark in (";", "\t", ",") if mark in head.splitlines()[-1]), " ")
+    path = tmp_path / "p.csv"
+    encoding = "cp1252" if "\u00e4" in head else "utf-8"
+    text = text_of([interface.x * length, strength * stress], separator, head=head)
+    path.write_text(text, encoding=encoding)
+    profile = st.read_profile(path, interface=interface)
+    np.testing.assert_allclose(profile, strength, rtol=1e-9)
+
+
+def test_a_heading_names_its_column_and_units_tell_columns_apart(interface, strength, tmp_path):
+    path = tmp_path / "scan.csv"
+    head = "Position along interface (mm);Local friction strength [MPa];quality"
+    columns = [interface.x * 1e3, strength * 1e-6, 0.0 * strength]
+    path.write_text(text_of(columns, comma=True, head=head))
+    for options in ({}, {"value": "Local friction strength [MPa]"}, {"value": 1, "x": 0}):
+        profile = st.read_profile(path, interface=interface, **options)
+        np.testing.assert_allclose(profile, strength, rtol=1e-9)
+
+
+def test_one_message_names_all_that_is_to_be_decided(interface, strength):
+    x = np.sort(np.random.default_rng(0).uniform(0.0, 0.1, 60))
+    values = np.where(np.arange(60) % 9 == 4, np.nan, 1e6)
+    with pytest.raises(st.InputError, match=r"(?s)interpolate=True.*gaps='fill'"):
+        st.read_profile(labelled(values, x), interface=interface)
+    with pytest.raises(st.InputError, match=r"x=\.\.\. names its column.*interpolate=True"):
+        st.read_profile(xr.DataArray(values, dims="x"), interface=interface)
+
+
+def test_records_longer_and_shorter_than_the_interface(interface, strength):
+    longer = labelled(np.r_[strength, strength], np.arange(2 * NODES) * interface.spacing)
+    with pytest.raises(st.InputError, match=r"crop the record.*or make interface.length 0.199"):
+        st.read_profile(longer, interface=interface)
+    shorter = labelled(strength[: NODES // 2], interface.x[: NODES // 2])
+    with pytest.raises(
+        st.InputError, match=r"covers 0.05 m of the interface.*interface.length 0.05"
+    ):
+        st.read_profile(shorter, interface=interface)

@@ -13,8 +13,7 @@ from stiction._checks import as_path, check_flag, check_instance
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
-from stiction.profile_files import decoded
-from stiction.profile_text import read_table
+from stiction.profiles import read_table
 from stiction.units import factor_to
 
 UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa", "strain": "1"}
@@ -66,7 +65,7 @@ def read_record(path: str | Path) -> xr.DataArray:
         If a unit or a place is missing, or quantities are mixed.
     """
     path = as_path("path", path)
-    table = read_table(decoded(path))
+    table = read_table(path)
     if not table.names[0] or not table.names[0].lower().startswith(("time", "t")):
         raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
     columns: list[Array] = []

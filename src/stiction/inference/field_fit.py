@@ -13,7 +13,7 @@ from stiction.inference.bootstrap import RANGES
 from stiction.inference.estimate import Estimate, Setting
 from stiction.inference.records import Record
 from stiction.inference.whittle import Observed
-from stiction.quantities import UNITS
+from stiction.profiles import UNITS
 from stiction.random.random_field import RandomField
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from stiction._checks import as_path, is_finite, numbers
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
-from stiction.profile_files import decoded
-from stiction.profile_text import read_table
+from stiction.profiles import read_table
 from stiction.units import factor_to
 
 FEWEST = 3
@@ -188,7 +187,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     """
     path = as_path("path", path)
     try:
-        return _from_table(read_table(decoded(path)), unit)
+        return _from_table(read_table(path), unit)
     except InputError as error:
         raise InputError([f"{path}: {text}" for text in error.problems]) from None
 

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.labelled_arrays import MEASURED, is_labelled, labelled, simplified
 from stiction.model import describe, real_array
-from stiction.quantities import UNITS
+from stiction.profiles import MEASURED, UNITS, is_labelled, points_of, simplified
 from stiction.units import factor_to
 
 FEWEST = 64
@@ -73,7 +72,7 @@ def records_of(
     interface : Interface, optional
         Says how far the points of plain arrays are apart.
     quantity : str
-        One of `stiction.quantities.UNITS`.
+        One of `stiction.profiles.UNITS`.
     skip_gaps : bool
         Whether missing values are left out or refused.
     """
@@ -128,15 +127,16 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 
 
 def _of_line(source: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    points = labelled(source, quantity)
+    points = points_of(source, quantity)
     rows = np.atleast_2d(points.values)
     if points.measured is not None:  # what was filled in is no measurement
         rows = np.where(points.measured, rows, np.nan)
-    if points.x is not None:
-        place, spacing = evenly(points.x)
+    if points.places:
+        x = points.places["x"]
+        place, spacing = evenly(x)
         full = np.full((rows.shape[0], int(place[-1]) + 1), np.nan)
-        full[:, place] = rows[:, np.argsort(points.x, kind="stable")]
-        return [Record(row, (spacing,), (float(points.x.min()),)) for row in full]
+        full[:, place] = rows[:, np.argsort(x, kind="stable")]
+        return [Record(row, (spacing,), (float(x.min()),)) for row in full]
     if interface is None or rows.shape[1:] != interface.shape:
         raise InputError(
             "has no coordinate 'x' (m), so that nobody knows how far its points are apart; give it"

@@ -28,7 +28,7 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
-from stiction.quantities import UNITS
+from stiction.profiles import UNITS
 
 Array = NDArray[np.float64]
 

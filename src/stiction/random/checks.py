@@ -173,5 +173,5 @@ def _share_anywhere(field: RandomField, interface: Interface, point: float) -> f
     waves = interface.extent * math.sqrt(float(np.prod(slopes))) / (2.0 * math.pi)
     if interface.is_plane:
         waves *= max(level, 0.0) / math.sqrt(2.0 * math.pi)
-    share = point + waves * math.exp(-0.5 * level * level)
-    return min(share, interface.size * point, 1.0)
+    share = 1.0 - (1.0 - point) * math.exp(-waves * math.exp(-0.5 * level * level))
+    return min(share, interface.size * point)

@@ -9,7 +9,7 @@ from typing import Any
 import pydantic
 
 from stiction.errors import InputError
-from stiction.placed import placed_profile
+from stiction.profiles import profile_in_file
 from stiction.study.sweep import Sweep, unknown_keys
 
 
@@ -29,7 +29,7 @@ def reading(folder: str | Path | None) -> dict[str, Any]:
     """Context of validation: profiles may be names of files relative to `folder`, unless None."""
     if folder is None:
         return {"folder": None}
-    return {"folder": folder, "read": lambda given, name: placed_profile(given, name, folder)}
+    return {"folder": folder, "read": lambda given, name: profile_in_file(given, name, folder)}
 
 
 def read_sweep(given: Any, folder: str | Path | None, study: type) -> tuple[Any, list[str]]:

@@ -20,7 +20,7 @@ from stiction._checks import is_whole
 from stiction.ensemble.dataset import GridAxis
 from stiction.errors import InputError, unknown_name
 from stiction.model import _models_in, describe, to_plain
-from stiction.placed import Placed, is_profile, placed_profile
+from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
 from stiction.study.dotted_keys import CORRELATION
 
@@ -115,10 +115,10 @@ def _value(key: str, value: Any, folder: Path | None) -> Any:
     file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
     if file and folder is not None and is_profile(key):
         try:
-            found = placed_profile(value, key.rsplit(".", 1)[-1], folder)
+            found = profile_in_file(value, key, folder)
         except InputError as error:
             raise InputError([f"{key}: {text}" for text in error.problems]) from None
-        return found.plain() if isinstance(found, Placed) else found.tolist()
+        return found if isinstance(found, dict) else found.tolist()
     return value
 
 
