@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from stiction.ensemble.plan import chunks, compute
 
 import stiction as st
-from stiction.ensemble.monte_carlo import make_plan
+from stiction.ensemble.experiment import Experiment
 
 SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
 
@@ -70,16 +69,18 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         st.PowerLawSpectrum(correlation_length=3e-3),
     )
-    plan = make_plan(problem, strength, st.LocalCriterion(), 3)
-    whole = compute(plan, 0, 1300)
-    part = compute(plan, first, samples)
+    experiment = Experiment(problem, strength, st.LocalCriterion())
+    whole = experiment.results(3, 0, 1300)
+    part = experiment.results(3, first, samples)
     for name, values in part.items():
         assert values.tobytes() == whole[name][first : first + samples].tobytes()
 
 
 @given(samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9))
-def test_pieces_cover_all_samples_once(samples, size, first):
-    pieces = list(chunks(samples, size, first))
+def test_batches_cover_all_samples_once(samples, size, first):
+    problem = st.paper.problem(nodes=256)
+    experiment = Experiment(problem, st.paper.strength(problem), st.LocalCriterion())
+    pieces = list(experiment.batches(first, samples, size))
     assert sum(count for _, count in pieces) == samples
     assert pieces[0][0] == first
     for (start, count), (following, _) in pairwise(pieces):

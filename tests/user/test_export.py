@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from stiction.export import SUFFIXES, columns, export
 
 import stiction as st
+from stiction.study.export import SUFFIXES, columns, export
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ def test_the_command_draws_figures_and_a_film(path, tmp_path):
 
 
 def problem_and_strength(path):
-    plan = st.Study.from_toml(path).plans[0]
+    plan = st.Study.from_toml(path).experiments[0]
     return plan.problem, plan.profiles(0, 1)
 
 

@@ -44,10 +44,10 @@ def test_stored_run_is_that_in_memory(path, tmp_path):
     stored = study.run(out=tmp_path / "run", progress=False)
     xr.testing.assert_equal(memory, stored)
     xr.testing.assert_equal(memory, st.open_run(tmp_path / "run").dataset())
-    field = study.plans[1].random.strength
-    own = field.sample(study.plans[1].problem.interface, seed=3, first=4)
+    field = study.experiments[1].random.strength
+    own = field.sample(study.experiments[1].problem.interface, seed=3, first=4)
     assert np.array_equal(own[0], memory.strength[1, 1])
-    again = st.onset(study.plans[1].problem, own, method=st.LocalCriterion())
+    again = st.onset(study.experiments[1].problem, own, method=st.LocalCriterion())
     assert again.critical_load.item() == memory.critical_load.values[1, 4]
 
 
@@ -76,15 +76,13 @@ def test_commands(path, tmp_path):
         assert found == stored.critical_position.sel(direction=dim).values.ravel()[7]
     command("export", run, tmp_path / "run.nc")
     xr.testing.assert_equal(xr.load_dataset(tmp_path / "run.nc"), stored)
-    command("plot", run)
-    assert (run / "figures" / "densities.png").stat().st_size > 10_000
     command("report", run)
     assert "30" in (run / "report.html").read_text()
 
 
 def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
     """Names decide, whatever the order; units are converted; what is elsewhere is refused."""
-    plan = st.Study.from_toml(path).plans[0]
+    plan = st.Study.from_toml(path).experiments[0]
     plane = plan.problem.interface
     tau_p = plan.random.strength.sample(plane, seed=1)[0]
     turned = xr.DataArray(
@@ -116,15 +114,13 @@ def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
     elsewhere = turned.assign_coords(y=2.0 * plane.coordinates["y"])
     with pytest.raises(st.InputError, match="y reaches from 0 to"):
         st.onset(plan.problem, elsewhere, method=st.LocalCriterion())
-    figure = tmp_path / "onset.png"
-    options = "--method", "local_criterion", "--out", figure
+    options = "--method", "local_criterion"
     text = command("onset", path, "--strength", tmp_path / "strength.nc", *options)
     assert f"{plain.critical_load.item() * 1e-6:.6f} MPa" in text
-    assert figure.stat().st_size > 10_000
 
 
 def test_failing_profiles_are_drawn(path):
-    plan = st.Study.from_toml(path).plans[0]
+    plan = st.Study.from_toml(path).experiments[0]
     found = st.failure_probability(
         plan.problem, plan.random, 0.72e6, method=plan.method, algorithm="plain",
         target_cv=0.5, max_evaluations=300, progress=False,
@@ -142,7 +138,7 @@ def test_load_of_a_plane_from_a_file(path, tmp_path):
     text = tomli_w.dumps(STUDY | {"problem": STUDY["problem"] | {"load": {"profile": "load.npy"}}})
     path.write_text(text)
     study = st.Study.from_toml(path)
-    assert np.array_equal(study.plans[0].problem.load.profile, profile)
+    assert np.array_equal(study.experiments[0].problem.load.profile, profile)
     assert st.Study.from_dict(study.to_dict()) == study
     path.write_text(text.replace("load.npy", "turned.npy"))
     with pytest.raises(st.InputError, match="load.profile.*x and y have changed places"):

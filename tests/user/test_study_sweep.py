@@ -46,7 +46,7 @@ def test_keys_of_one_table_vary_together():
     result = study.run()
     assert result["critical_stress"].dims == ("length", "seed", "sample")
     assert result["nodes"].dims == ("length",)
-    spacings = [plan.problem.interface.spacing for plan in study.plans]
+    spacings = [plan.problem.interface.spacing for plan in study.experiments]
     assert spacings == [0.1 / 128] * 6
 
 
@@ -95,7 +95,7 @@ def test_whole_tables_are_values_too():
     study = swept({"random.strength.marginal": [STUDY["random"]["strength"]["marginal"], other]})
     result = study.run()
     np.testing.assert_array_equal(result["marginal"], ["beta", "lognorm"])
-    assert study.plans[1].random.strength.mean == pytest.approx(
+    assert study.experiments[1].random.strength.mean == pytest.approx(
         scipy.stats.lognorm(0.2, scale=1e6).mean()
     )
     scales = swept({"random.strength.marginal.scale": [1e6, 2e6]}, random={"strength": {
@@ -140,7 +140,7 @@ def test_profiles_in_files_can_be_swept(tmp_path):
     study = st.Study.from_dict(
         STUDY | {"sweep": [{"problem.load.profile": ["a.npy", "b.npy"]}]}, folder=tmp_path
     )
-    assert study.plans[1].problem.load.profile.max() == pytest.approx(1.1)
+    assert study.experiments[1].problem.load.profile.max() == pytest.approx(1.1)
     assert study.run()["critical_stress"].shape == (2, 30)
 
 
@@ -209,7 +209,7 @@ def test_kept_profiles():
     result = study.run()
     assert result["strength"].dims == ("correlation_length", "kept_sample", "x")
     np.testing.assert_array_equal(result["kept_sample"], [0, 1])
-    direct = study.plans[1].random.strength.sample(study.problem.interface, samples=2, seed=3)
+    direct = study.experiments[1].random.strength.sample(study.problem.interface, samples=2, seed=3)
     np.testing.assert_array_equal(result["strength"].values[1], direct)
     longer = swept(
         {"problem.interface.length": [0.1, 0.2]}, ensemble={"samples": 3, "keep": ["strength"]}

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Callable
 from typing import Annotated, Any
 
-import click
 import typer
 
 from stiction import __version__
@@ -46,16 +45,20 @@ def _options(
     pass
 
 
+_running: list[Callable[..., None]] = []
+"""The command, whose words warnings use."""
+
+
 def _command(function: Callable[..., None]) -> Callable[..., None]:
     """Errors in the words of the command line; Ctrl-C ends with exit code 130, as shells expect."""
 
     @functools.wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> None:
+        _running.append(function)
         try:
             function(*args, **kwargs)
         except InputError as error:
-            command = click.get_current_context().command
-            raise InputError([in_options(text, command) for text in error.problems]) from None
+            raise InputError([in_options(text, function) for text in error.problems]) from None
         except KeyboardInterrupt:
             echo("interrupted", err=True)
             raise typer.Exit(130) from None
@@ -68,9 +71,7 @@ for function in (run, check, status, export, report, schema, onset, rupture, rel
 
 
 def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-    context = click.get_current_context(silent=True)
-    command = None if context is None else context.command
-    echo(f"warning: {in_options(str(message), command)}", err=True)
+    echo(f"warning: {in_options(str(message), _running[-1] if _running else None)}", err=True)
 
 
 def _of_the_system(error: OSError) -> str:

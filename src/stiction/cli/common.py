@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from stiction.errors import InputError
 
@@ -16,7 +18,8 @@ StudyFile = Annotated[
 ]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[
-    int | None, typer.Option(help="Threads; all cores by default.", show_default=False)
+    int | None,
+    typer.Option(help="Threads; all cores by default.", show_default=False, min=1),
 ]
 TimeLimit = Annotated[
     float | None,
@@ -38,22 +41,22 @@ def echo(text: Any = "", *, err: bool = False) -> None:
     typer.echo(safe, err=err)
 
 
-def in_options(text: str, command: Any) -> str:
+def in_options(text: str, command: Callable[..., Any] | None) -> str:
     """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``.
 
     Parameters
     ----------
     text : str
         Message of a function of the package, which names its own arguments.
-    command : click.Command
-        Whose options have the names of the arguments.
+    command : callable, optional
+        The function of a command, whose options have the names of those arguments.
     """
-    for parameter in getattr(command, "params", ()):
-        option = next((name for name in parameter.opts if name.startswith("--")), None)
-        if option is not None:
-            name = rf"(?<![\w.-]){parameter.name}"
-            text = re.sub(rf"{name}=(True\b|\.\.\.)", option, text)
-            text = re.sub(rf"{name}=[\"']?([^\s\"',;)]*)[\"']?", rf"{option} \1", text)
+    hints = {} if command is None else get_type_hints(command, include_extras=True)
+    for name, hint in hints.items():
+        if any(isinstance(extra, OptionInfo) for extra in getattr(hint, "__metadata__", ())):
+            option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
+            text = re.sub(rf"{argument}=(True\b|\.\.\.)", option, text)
+            text = re.sub(rf"{argument}=[\"']?([^\s\"',;)]*)[\"']?", rf"{option} \1", text)
             text = re.sub(rf"^{name}(?=:| must)", option, text)
     return text
 

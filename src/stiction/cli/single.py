@@ -136,10 +136,12 @@ def _row(name: str, result: Any) -> list[str]:
     """The answer of one method; what it does not return is left empty."""
     row = [name]
     for column in COLUMNS:
-        stress = column != "friction_coefficient"
-        value = float(result[column][0]) if column in result else None
-        text = f"{value * 1e-6:.6f} MPa" if value is not None and stress else f"{value:.6f}"
-        row.append(text if value is not None else "")
+        if column not in result:
+            row.append("")
+        elif column == "friction_coefficient":
+            row.append(f"{float(result[column][0]):.6f}")
+        else:
+            row.append(f"{float(result[column][0]) * 1e-6:.6f} MPa")
     place = np.atleast_1d(result["critical_position"][0].values) * 1e3
     labels = [""] if place.size == 1 else ["x = ", "y = "]
     place_text = ", ".join(f"{label}{at:.4f} mm" for label, at in zip(labels, place, strict=True))

@@ -1,0 +1,389 @@
+"""The commands: what they print and write, how they end, and what they make of mistakes."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray as xr
+from small_study import lengths, small_study
+
+import stiction as st
+from stiction import files
+from stiction.cli.common import in_options
+from stiction.cli.single import onset
+from stiction.ensemble.experiment import Experiment
+from stiction.files import private_folder
+
+STUDY = small_study(
+    title="a small sweep",
+    nodes=256,  # 16 in a nucleation length
+    ensemble={"samples": 100, "seed": 3},
+    sweep=lengths(4e-3, 6e-3, 8e-3),
+)
+STUDY["problem"]["load"] = {"normal_pressure": 5e6}
+TEXT = tomli_w.dumps(STUDY)
+
+
+@pytest.fixture(autouse=True)
+def study(monkeypatch, tmp_path):
+    """Commands run in a folder of their own, which holds a study."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(TEXT)
+    return tmp_path / "study.toml"
+
+
+def strength():
+    loaded = st.Study.from_dict(STUDY)
+    interface = loaded.problem.interface
+    return interface, loaded.random.strength.sample(interface, seed=8)[0]
+
+
+# -- studies and runs ----------------------------------------------------------------------------
+
+
+def test_check_says_what_will_be_done(command):
+    code, out, _ = command("check", "study.toml")
+    assert code == 0
+    for words in (
+        "valid, 'a small sweep'",
+        "100 (seed 3) at each of 3 points: 300 in all",
+        "strength.spectrum.correlation_length: 3 values, 0.004 to 0.008",
+        "nucleation length",
+        "xi_0 / h_n",
+        "a sample, probed at 3 of 3 points",
+        "size",
+        "% of the exact onset on average",
+        "equilibrium          exact",
+    ):
+        assert words in out
+    code, out, _ = command("check", "study.toml", "--no-probe")
+    assert (code, "on one core" in out) == (0, False)
+
+
+def test_check_lists_every_mistake(command, study):
+    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace("samples = 100", "samples=0")
+    study.write_text(text + '\n[[sweep]]\n"ensemble.sed" = [1]\n')
+    code, out, err = command("check", study)
+    assert (code, out) == (2, "")
+    for words in ("densty", "ensemble.samples", "did you mean 'seed'", "problem.solid.density"):
+        assert words in err
+    assert all(line.startswith("error: ") for line in err.splitlines())
+
+
+def test_run_grow_look_export_report(command, study):
+    assert command("run", study, "--out", "run", "--workers", 1)[0] == 0
+    study.write_text(TEXT.replace("samples = 100", "samples = 150"))
+    code, out, _ = command("run", study, "--out", "run")
+    assert code == 0
+    assert "450 of 450 samples in run" in out
+    assert out.count("friction_coefficient") == 3
+    code, out, _ = command("status", "run", "--verify")
+    assert code == 0
+    assert "450 of 450 (100.0 %)" in out
+    assert "everything that is stored is what was written" in out
+    assert command("export", "run", "result.nc")[0] == 0
+    with xr.open_dataset("result.nc") as result:
+        assert result.load().identical(st.Study.from_toml(study).run())
+    assert command("report", "run")[0] == 0
+    page = (study.parent / "run" / "report.html").read_text()
+    for words in ("a small sweep", "numpy", "correlation_length", "450 of 450 samples"):
+        assert words in page
+
+
+def test_parts_and_the_time_limit(command):
+    code, out, _ = command("run", "study.toml", "--out", "run", "--part", "1/2")
+    assert code == 0
+    assert "part 1/2: 156 of 300 samples in run" in out
+    code, _, err = command("run", "study.toml", "--out", "run", "--time-limit", "1e-9")
+    assert code == 3
+    assert "the same command goes on" in err
+    code, out, _ = command("run", "study.toml", "--out", "run", "--part", "2/2")
+    assert "300 of 300" in command("status", "run")[1]
+
+
+def test_failed_samples_make_exit_code_one(command, monkeypatch):
+    original = Experiment.results
+
+    def results(self, seed, first, count):
+        if first <= 17 < first + count:
+            raise FloatingPointError("not finite")
+        return original(self, seed, first, count)
+
+    run = ["run", "study.toml", "--out", "run", "--workers", 1]
+    with monkeypatch.context() as patch:
+        patch.setattr(Experiment, "results", results)
+        code, out, err = command(*run)
+    assert code == 1
+    assert "297 of 300 samples in" in out
+    assert "sample 17 of point 2 (seed 3): FloatingPointError: not finite" in err
+    assert "sample 17 (seed 3)" in command("status", "run")[1]
+    assert command(*run)[0] == 1
+    assert command(*run, "--retry")[0] == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+def test_interrupted_from_outside(command, study, number):
+    # A shell that starts tests in the background lets them, and what they start, ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    study.write_text(TEXT.replace("samples = 100", "samples = 3_000_000"))
+    chunks = study.parent / "run" / "chunks"
+    with subprocess.Popen(
+        [sys.executable, "-m", "stiction", "run", str(study), "--out", "run"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"COLUMNS": "200"},
+    ) as process:
+        deadline = time.monotonic() + 120.0
+        while not list(chunks.glob("*.npz")):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        process.send_signal(number)
+        err = process.communicate(timeout=60.0)[1]
+    assert process.returncode == 130
+    assert "interrupted:" in err
+    assert "of 9000000 samples are stored" in err
+    assert "Traceback" not in err
+    assert "of 9000000" in command("status", "run")[1]
+
+
+# -- one interface, and the tail -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["npy", "csv", "nc"])
+def test_onset_of_ones_own_profile(command, study, form):
+    interface, profile = strength()
+    if form == "npy":
+        np.save("p.npy", profile)
+    elif form == "csv":
+        table = np.column_stack([interface.x, profile])
+        np.savetxt("p.csv", table, fmt="%.17g", delimiter=",", header="x,strength", comments="")
+    else:
+        xr.Dataset({"strength": ("x", profile)}, {"x": interface.x}).to_netcdf("p.nc")
+    study.write_text(TEXT[: TEXT.index("[random.strength.marginal]")])  # a problem is enough
+    ask = ("onset", study, "--strength", f"p.{form}", "--method", "local_criterion")
+    code, out, _ = command(*ask)
+    assert code == 0
+    expected = st.onset(st.Study.from_dict(STUDY).problem, profile, method=st.LocalCriterion())
+    line = next(line for line in out.splitlines() if line.startswith("local_criterion"))
+    assert f"{float(expected['critical_stress'][0]) * 1e-6:.6f} MPa" in line
+    assert f"{float(expected['critical_position'][0]) * 1e3:.4f} mm" in line
+    assert f"{float(expected['friction_coefficient'][0]):.6f}" in line
+    study.write_text("title = 'nothing'\n[randon]\na = 1\n")
+    code, _, err = command(*ask)
+    assert code == 2
+    assert "problem: missing" in err
+    assert "unknown 'randon'; did you mean 'random'?" in err
+
+
+def test_messages_are_in_the_words_of_the_command_line(command):
+    interface, profile = strength()
+    profile[20:31] = np.nan
+    np.savetxt("p.csv", np.column_stack([interface.x, profile]), delimiter=",")
+    ask = ("onset", "study.toml", "--strength", "p.csv", "--method", "local_criterion")
+    code, _, err = command(*ask)
+    assert code == 2
+    assert "(11 of 256 nodes)" in err
+    assert "--gaps fill" in err
+    assert "gaps=" not in err
+    code, out, err = command(*ask, "--gaps", "fill")
+    assert (code, "local_criterion" in out) == (0, True)
+    np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
+    err = command("onset", "study.toml", "--strength", "three.csv")[2]
+    assert "say which are meant: --x, --value" in err
+    assert in_options('pass gaps="skip" or interpolate=True', onset) == (
+        "pass --gaps skip or --interpolate"
+    )
+
+
+def test_a_method_that_does_not_apply_says_why(command, study):
+    text = TEXT.replace("weakening_rate = 250000000000.0", "critical_slip = 8e-6")
+    study.write_text(text.replace('"local_criterion"', '"equilibrium"'))
+    np.save("p.npy", strength()[1])
+    ask = ("onset", study, "--strength", "p.npy", "--method", "local_criterion")
+    code, out, _ = command(*ask)
+    assert code == 1
+    assert "local_criterion does not apply" in out
+    assert "varies along the interface" in out
+
+
+@pytest.mark.slow
+def test_onset_by_every_method(command):
+    np.save("p.npy", strength()[1])
+    code, out, _ = command("onset", "study.toml", "--strength", "p.npy")
+    assert code == 0
+    lines = out.splitlines()[1:]
+    assert [line.split()[0] for line in lines] == ["local_criterion", "equilibrium", "rupture"]
+    stresses = [float(line.split()[1]) for line in lines]
+    # 16 nodes in h_n: discretisation and interaction leave the methods within one per cent.
+    assert max(stresses) / min(stresses) < 1.01
+
+
+@pytest.mark.slow
+def test_rupture_writes_result_figures_and_film(command, study, tmp_path):
+    plain = small_study(length=0.05, correlation_length=6e-3, ensemble={"samples": 2, "seed": 3})
+    plain["problem"]["solid"]["plane"] = "stress"
+    study.write_text(tomli_w.dumps(plain))
+    code, text, _ = command("rupture", study, "--out", "rupture", "--film", "--sample", 1)
+    assert code == 0
+    assert "onset at" in text
+    assert "ended by: sliding" in text
+    for name in ("rupture.png", "rupture.pdf", "front.png", "front.pdf", "rupture.gif"):
+        assert (tmp_path / "rupture" / name).stat().st_size > 5000, name
+    loaded = st.Study.from_toml(study)
+    tau_p = loaded.random.strength.sample(loaded.problem.interface, samples=1, seed=3, first=1)
+    with xr.open_dataset("rupture/rupture.nc") as result:
+        np.testing.assert_array_equal(result.peak_strength, tau_p[0])
+
+
+def test_reliability_writes_the_curve(command, study, tmp_path):
+    study.write_text(tomli_w.dumps({k: v for k, v in STUDY.items() if k != "sweep"}))
+    code, out, _ = command(
+        "reliability", study, "--smallest", "0.1", "--stress", "0.7e6", "--probability", "0.2"
+    )
+    assert code == 0
+    assert "P = " in out
+    for name in ("csv", "nc", "png", "pdf"):
+        assert (tmp_path / "stiction-reliability" / f"failure_curve.{name}").stat().st_size > 100
+
+
+# -- mistakes and faults -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["run", "study.toml", "--out", "nowhere/run"], 1, "does not exist"),
+        (["run", "study.toml"], 2, "--out"),
+        (["run", "missing.toml", "--out", "run"], 2, "missing.toml"),
+        (["run", "study.toml", "--out", "run", "--workers", "0"], 2, "--workers"),
+        (["run", "study.toml", "--out", "run", "--part", "3/2"], 2, "--part"),
+        (["run", "study.toml", "--out", "run", "--workers", "1", "--scheduler", "x"], 2, "one of"),
+        (["run", "study.toml", "--out", "study.toml"], 1, "is a file"),
+        (["run", "study.toml", "--outt", "run"], 2, "--out"),
+        (["status", "nothing"], 1, "there is no run here"),
+        (["status", "."], 1, "holds no run"),
+        (["export", "nothing", "result.nc"], 1, "there is no run here"),
+        (["export", "nothing", "nowhere/result.nc"], 2, "does not exist"),
+        (["report", "study.toml"], 1, "there is no run here"),
+        (["onset", "study.toml", "--strength", "missing.npy"], 2, "missing.npy"),
+        (["onset", "study.toml", "--strength", "missing.tif"], 2, ".npy"),
+        (["onset", "study.toml", "--strength", "p.npy", "--method", "local"], 2, "local_criterion"),
+        (["rupture", "study.toml", "--out", "study.toml"], 2, "--out"),
+        (["rupture", "study.toml", "--loading-rate", "-1"], 2, "loading_rate"),
+        (["rupture", "study.toml", "--sample", "-1"], 2, "--sample"),
+        (["reliability", "study.toml"], 2, "takes one interface"),
+        (["nothing"], 2, "nothing"),
+    ],
+)
+def test_mistakes_end_with_a_message(command, arguments, code, words):
+    found, _, err = command(*arguments)
+    assert found == code
+    assert words in err
+
+
+def test_help_of_every_command(command):
+    for name in (
+        "run", "check", "status", "export", "report", "schema", "onset", "rupture", "reliability"
+    ):  # fmt: skip
+        code, out, _ = command(name, "--help")
+        assert code == 0
+        assert len(out.splitlines()) > 5
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["report", "run", "--out", "page.html"], ["export", "run", "out.nc"]],
+    ids=["report", "export"],
+)
+def test_a_full_disk_is_called_so_and_leaves_nothing_half(command, monkeypatch, arguments):
+    assert command("run", "study.toml", "--out", "run")[0] == 0
+
+    def fail(handle):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(files.os, "fsync", fail)  # as of a file system that allocates late
+    code, _, errors = command(*arguments)
+    assert code == 1
+    assert "cannot be written: the disk is full" in errors
+    assert sorted(os.listdir()) == ["run", "study.toml"]
+
+
+def test_an_empty_run(command, tmp_path):
+    command("run", "study.toml", "--out", "run")
+    for chunk in (tmp_path / "run" / "chunks").iterdir():
+        chunk.unlink()
+    code, _, errors = command("report", "run")
+    assert (code, "no sample is stored yet" in errors) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "not-utf8-\udcff"], ids=["long", "bytes"])
+def test_names_that_no_file_can_have(command, name):
+    command("run", "study.toml", "--out", "run")
+    for arguments in (
+        ["check", f"{name}.toml"],
+        ["status", name],
+        ["run", "study.toml", "--out", name],
+        ["report", "run", "--out", f"{name}.html"],
+        ["export", "run", f"{name}.nc"],
+        ["rupture", "study.toml", "--out", name],
+    ):
+        code, _, errors = command(*arguments)
+        assert code == 2
+        assert errors.startswith("error: ")
+
+
+def test_escape_sequences_of_a_run_are_not_printed_raw(command):
+    hostile = st.Study.from_dict(STUDY | {"title": "\x1b[2Jnice\x07\nsamples 9 of 9"})
+    hostile.to_toml("hostile.toml")
+    command("run", "hostile.toml", "--out", "run")
+    for name in ("check", "status"):
+        code, out, errors = command(name, "hostile.toml" if name == "check" else "run")
+        assert code == 0
+        assert "\x1b" not in out + errors
+        assert "\x07" not in out + errors
+        assert "\\x1b[2Jnice" in out
+        assert "\nsamples 9" not in out
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="Windows has other means")
+def test_a_cache_that_others_can_write_is_refused(tmp_path):
+    open_to_all = tmp_path / "shared"
+    open_to_all.mkdir()
+    open_to_all.chmod(0o777)
+    with pytest.raises(st.InputError, match="can be written by others.*STICTION_CACHE_DIR.*go-w"):
+        private_folder(open_to_all, "compiled")
+    open_to_all.chmod(0o755)
+    made = private_folder(open_to_all, "compiled", "digest")
+    assert made.stat().st_mode & 0o077 == 0
+    (open_to_all / "compiled").chmod(0o770)  # planted below a folder that is closed
+    with pytest.raises(st.InputError, match="compiled can be written by others"):
+        private_folder(open_to_all, "compiled", "digest")
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"random.strength.spectrum.correlation_length": 1e-308}, "check the units of the lengths"),
+        ({"ensemble.samples": 10**13}, r"samples: must be at most 1e\+10"),
+        ({"problem.interface.nodes": 10**30}, "at most 2\\^24"),
+        ({"problem.interface.length": 1e-308}, "length: the nodes must be at least"),
+        ({"ensemble.keep_samples": 10**13}, "keep_samples.*at most 1000000"),
+    ],
+)
+def test_numbers_out_of_this_world_are_refused(changed, words):
+    plain = json.loads(json.dumps({k: v for k, v in STUDY.items() if k != "sweep"}))
+    for key, value in changed.items():
+        *path, last = key.split(".")
+        table = plain
+        for name in path:
+            table = table[name]
+        table[last] = value
+    with pytest.raises(st.InputError, match=words):
+        st.Study.from_dict(plain)
