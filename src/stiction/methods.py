@@ -16,7 +16,7 @@ from pydantic import WrapValidator
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.model import Progress, checked, describe, to_plain
-from stiction.problem import Problem, Sample, named_profiles
+from stiction.problem import Problem, Sample, named_profiles, refusals
 from stiction.profiles import Gaps
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
@@ -137,14 +137,6 @@ def _as_method(value: Any, _: Any) -> Any:
 
 MethodObject: TypeAlias = Annotated[Any, WrapValidator(_as_method)]
 """Annotation of an argument that is a method; see `stiction.model.checked`."""
-
-
-def refusals(problem: Problem, method: Method) -> list[str]:
-    """Return why a method does not take a problem; no texts if it does."""
-    return [
-        f"method: the {method.label} cannot take this: {reason}"
-        for reason in method.supports(problem)
-    ]
 
 
 def accepted(method: Method) -> tuple[str, ...]:

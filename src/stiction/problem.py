@@ -558,3 +558,11 @@ def _turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
     if len(shape) == 2 and given == shape[::-1]:
         return "; x and y have changed places: the first axis of a profile is x"
     return ""
+
+
+def refusals(problem: Problem, method: Any) -> list[str]:
+    """Return why a method does not take a problem; no texts if it does."""
+    return [
+        f"method: the {method.label} cannot take this: {reason}"
+        for reason in method.supports(problem)
+    ]

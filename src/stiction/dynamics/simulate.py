@@ -37,9 +37,8 @@ from stiction.dynamics.stream import Stream, chunk_dataset, open_rupture
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.gaps import gather, with_gaps
-from stiction.methods import refusals
 from stiction.model import describe, real_array, to_plain
-from stiction.problem import Problem, named_profiles
+from stiction.problem import Problem, named_profiles, refusals
 from stiction.profiles import at_nodes
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.methods import Values, accepted, check_method, prepared, refusals, variables_of
+from stiction.methods import Values, accepted, check_method, prepared, variables_of
 from stiction.model import describe
-from stiction.problem import PROFILES, Problem, Sample
+from stiction.problem import PROFILES, Problem, Sample, refusals
 from stiction.random.checks import check_residual, warn_if_unresolved
 from stiction.random.pressure import (
     check_pressure,

@@ -13,13 +13,13 @@ import scipy.stats
 
 from stiction._checks import is_finite
 from stiction.arrays import Array
+from stiction.ensemble.dotted_keys import with_values
 from stiction.errors import InputError
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.marginals import marginal_of
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.dotted_keys import with_values
 
 TAIL = 1e-4
 """Probability that is cut from either end of a prior without bounds."""

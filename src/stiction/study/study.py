@@ -23,6 +23,7 @@ from stiction._checks import (
     too_many_samples,
 )
 from stiction.ensemble.dataset import GridAxis
+from stiction.ensemble.dotted_keys import part_with_values
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import (
     KEEP_LIMIT,
@@ -50,7 +51,6 @@ from stiction.problem import Problem
 from stiction.progress import Meter, Show
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.dotted_keys import part_with_values
 from stiction.study.run import StoredRun, result_of, run_into
 from stiction.study.study_file import completed, read_sweep, read_toml, reading
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of

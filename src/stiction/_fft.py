@@ -1,5 +1,0 @@
-import sys
-
-import stiction.arrays
-
-sys.modules[__name__] = stiction.arrays

@@ -1,5 +1,0 @@
-import sys
-
-import stiction.jit
-
-sys.modules[__name__] = stiction.jit

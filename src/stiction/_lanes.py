@@ -1,5 +1,0 @@
-import sys
-
-import stiction.lanes
-
-sys.modules[__name__] = stiction.lanes

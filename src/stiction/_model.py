@@ -1,5 +1,0 @@
-import sys
-
-import stiction.model
-
-sys.modules[__name__] = stiction.model

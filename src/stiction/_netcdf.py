@@ -1,5 +1,0 @@
-import sys
-
-import stiction.files
-
-sys.modules[__name__] = stiction.files

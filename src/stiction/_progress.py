@@ -1,5 +1,0 @@
-import sys
-
-import stiction.progress
-
-sys.modules[__name__] = stiction.progress

@@ -1,5 +1,0 @@
-import sys
-
-import stiction.methods
-
-sys.modules[__name__] = stiction.methods

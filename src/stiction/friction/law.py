@@ -1,5 +1,0 @@
-import sys
-
-import stiction.friction.laws
-
-sys.modules[__name__] = stiction.friction.laws

@@ -1,5 +1,0 @@
-import sys
-
-import stiction.problem
-
-sys.modules[__name__] = stiction.problem
