@@ -1,10 +1,15 @@
 """Marginals in engineers' parameters: mean and coefficient of variation are those of the field."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.stats
 
 import stiction as st
+from stiction.model import model, to_plain
+from stiction.random.marginals import MARGINALS, Marginal
+from stiction.random.spectra import SPECTRA, ScaledSpectrum
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
 EACH = [
@@ -83,3 +88,57 @@ def test_strength_below_the_residual_strength_is_said_before_anything_is_compute
     share = 100.0 * strength.marginal.distribution.cdf(0.6e6)
     with pytest.warns(st.AccuracyWarning, match=f"strength: {share:.3g} % of its marginal"):
         st.monte_carlo(problem, strength, method=st.LocalCriterion(), samples=2, seed=0)
+
+
+def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
+    @model
+    class Triangular(Marginal):
+        low: float
+        high: float
+        type: str = "triangular"
+
+        def _freeze(self):
+            return scipy.stats.triang(0.5, self.low, self.high - self.low)
+
+    @model
+    class Band(ScaledSpectrum):
+        type: str = "band"
+
+        def density(self, wavenumber, dimensions=1):
+            return np.where(np.asarray(wavenumber) < self.scale, 1.0, 0.0)
+
+        def power_within(self, wavenumber, dimensions=1):
+            return min(wavenumber / self.scale, 1.0) ** dimensions
+
+        def quantile(self, share, dimensions=1):
+            return self.scale * share ** (1.0 / dimensions)
+
+    monkeypatch.setitem(MARGINALS, "triangular", Triangular)
+    monkeypatch.setitem(SPECTRA, "band", Band)
+    table = {
+        "marginal": {"type": "triangular", "low": 1e6, "high": 2e6},
+        "spectrum": {"type": "band", "correlation_length": 1e-3},
+    }
+    field = st.RandomField(**table)
+    assert field.mean == pytest.approx(1.5e6)
+    assert to_plain(field)["marginal"] == table["marginal"]
+    values = field.sample(st.Interface(length=0.1, nodes=256), samples=200, seed=1)[:, ::16]
+    # 3,200 values, of which neighbours are correlated: 0.04 is exceeded once in a thousand times.
+    assert scipy.stats.kstest(values.ravel(), field.marginal.distribution.cdf).statistic < 0.04
+    # sin(x/xi)/(x/xi) of a band falls to 1/e at 2.2006 xi, a little further without 0.03 % of it.
+    assert field.efolding_length(of="z") == pytest.approx(2.2006e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "marginal",
+    [*EACH, st.Lognormal(mean=1e6, cv=0.2), st.Beta(alpha=2.0, beta=3.0, low=1.0, high=4.0)],
+)
+def test_parameters_that_shift_or_scale_are_declared(marginal):
+    a, b = marginal.location_and_scale
+    shape = (marginal.distribution.ppf([0.2, 0.9]) - a) / b
+    for name in marginal.affine:
+        moved = dataclasses.replace(marginal, **{name: 1.1 * getattr(marginal, name)})
+        c, d = moved.location_and_scale
+        np.testing.assert_allclose((moved.distribution.ppf([0.2, 0.9]) - c) / d, shape, rtol=1e-9)
+    bounded = isinstance(marginal, st.Beta)
+    assert bool(marginal.affine) == (bounded or marginal.low == 0.0)

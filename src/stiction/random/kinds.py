@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pydantic
 from pydantic_core import CoreSchema, core_schema
@@ -13,18 +12,15 @@ from stiction.errors import InputError, unknown_name
 from stiction.model import to_plain
 
 
-@dataclass(frozen=True)
-class OneOf:
+class OneOf(NamedTuple):
     """Annotation of such a field.
 
     Attributes
     ----------
     kinds : dict
         The classes by `type`. A class that is added here may be named in study files.
-    convert : callable
-        Maps what was given to an object of one of the classes.
-    plain : callable
-        Maps an object to what a study file holds.
+    convert, plain : callable
+        Map what was given to an object of one of the classes, and that to what a file holds.
     also : str
         What a table may hold besides, for editors; empty if nothing.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -134,17 +134,10 @@ class Lognormal(_AboveLow):
 
     Parameters
     ----------
-    mean : float
-        Mean of the field, such as 0.6e6 Pa; above `low`.
-    cv : float
-        Standard deviation over mean, positive.
+    mean, cv : float
+        Mean of the field, above `low`, and its standard deviation over the mean.
     low : float
         Lower bound, 0 if left out.
-
-    Raises
-    ------
-    InputError
-        If the mean is not above the bound.
 
     Examples
     --------
@@ -167,17 +160,10 @@ class Weibull(_AboveLow):
 
     Parameters
     ----------
-    mean : float
-        Mean of the field; above `low`.
-    cv : float
-        Standard deviation over mean, positive.
+    mean, cv : float
+        Mean of the field, above `low`, and its standard deviation over the mean.
     low : float
         Lower bound, 0 if left out.
-
-    Raises
-    ------
-    InputError
-        If the mean is not above the bound.
 
     Examples
     --------
@@ -215,17 +201,10 @@ class Gamma(_AboveLow):
 
     Parameters
     ----------
-    mean : float
-        Mean of the field; above `low`.
-    cv : float
-        Standard deviation over mean, positive.
+    mean, cv : float
+        Mean of the field, above `low`, and its standard deviation over the mean.
     low : float
         Lower bound, 0 if left out.
-
-    Raises
-    ------
-    InputError
-        If the mean is not above the bound.
 
     Examples
     --------
@@ -251,10 +230,8 @@ class TruncatedNormal(Marginal):
         Mean of the field, that is after the cut; between `low` and `high`.
     cv : float
         Standard deviation over mean, after the cut, positive.
-    low : float
-        0 if left out.
-    high : float, optional
-        No upper bound if left out.
+    low, high : float, optional
+        0 and no upper bound if left out.
 
     Raises
     ------
@@ -415,26 +392,18 @@ def _parameter_names(family: Any) -> list[str]:
     return [*shapes, "loc", "scale"]
 
 
-@lru_cache(maxsize=1)
-def _scipy_names() -> list[str]:
-    every = (getattr(scipy.stats, name) for name in dir(scipy.stats))
-    return [one.name for one in every if isinstance(one, scipy.stats.rv_continuous)]
-
-
 def _of_scipy(name: str, parameters: dict[str, Any]) -> Marginal:
-    names = [*_scipy_names(), *MARGINALS]
-    if name not in names:
+    family = getattr(scipy.stats, name, None)
+    if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
-        text = unknown_name("type", name, names).split(" (valid:")[0]
-        raise InputError(f"{text} (valid: {', '.join(valid)} and scipy.stats' other continuous)")
-    known = _parameter_names(getattr(scipy.stats, name))
+        text = unknown_name("type", name, valid)
+        raise InputError(f"{text.removesuffix(')')} and scipy.stats' other continuous)")
+    known = _parameter_names(family)
     problems = [unknown_name(name, key, known) for key in parameters if key not in known]
-    problems += [
-        f"{name}.{key}: missing" for key in known[:-2] if key not in parameters and not problems
-    ]
+    problems += [f"{name}.{key}: missing" for key in known[:-2] if key not in parameters]
     for key, value in parameters.items():
         try:
-            finite = bool(np.isfinite(_number(value)))
+            finite = math.isfinite(_number(value))
         except ValueError:
             finite = False
         if not finite:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import cached_property, lru_cache, reduce
+from numbers import Real
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ DEFINITE = 1e-12
 """Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
 
 
-def _pairs(value: Any) -> Any:
+def _pairs(value: Any) -> dict[str, dict[str, float]]:
     """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
     if not isinstance(value, Mapping):
         raise InputError(
@@ -45,23 +46,19 @@ def _pairs(value: Any) -> Any:
         else:
             raise InputError(f"must name a pair of properties, got {describe(key)}")
     found: dict[str, dict[str, float]] = {}
-    problems = []
-    for (one, other), rho in flat.items():
-        for name in (one, other):
-            if name not in NAMES:
-                problems.append(unknown_name("correlation", str(name), NAMES))
-        number = isinstance(rho, int | float | np.number) and not isinstance(rho, bool)
-        if not number or not -1.0 <= rho <= 1.0:
-            problems.append(f"{one}, {other}: must be a number in [-1, 1], got {describe(rho)}")
-        if one == other:
-            problems.append(f"{one}, {other}: a property is not correlated with itself")
-        if not problems:
-            first, second = sorted((one, other), key=NAMES.index)
-            known = found.setdefault(first, {}).setdefault(second, float(rho))
-            if known != rho:
-                problems.append(f"{one}, {other}: given twice, as {known:g} and {rho:g}")
-    if problems:
-        raise InputError(problems)
+    for pair, rho in flat.items():
+        named = ", ".join(map(str, pair))
+        unknown = [unknown_name("correlation", str(n), NAMES) for n in pair if n not in NAMES]
+        if unknown:
+            raise InputError(unknown)
+        if pair[0] == pair[1]:
+            raise InputError(f"{named}: a property is not correlated with itself")
+        if isinstance(rho, bool) or not isinstance(rho, Real) or not -1.0 <= rho <= 1.0:
+            raise InputError(f"{named}: must be a number in [-1, 1], got {describe(rho)}")
+        first, second = sorted(pair, key=NAMES.index)
+        known = found.setdefault(first, {}).setdefault(second, float(rho))
+        if known != rho:
+            raise InputError(f"{named}: given twice, as {known:g} and {rho:g}")
     return found
 
 

@@ -99,23 +99,12 @@ class SpectralDensity:
 
 
 def integrate(
-    density: Callable[[float], float], edges: Array, lag: float = 0.0, within: float = math.inf
+    density: Callable[[float], float], edges: Array, lag: float = 0.0, power: float = math.inf
 ) -> Array:
     """Integrate a density times cos(k lag) over each interval between `edges`.
 
-    Parameters
-    ----------
-    density : callable
-    edges : (intervals + 1,) array
-        rad/m.
-    lag : float
-        m; however many periods an interval holds (QUADPACK's QAWO).
-    within : float
-        Error that is small enough, in units of the integral, besides 1e-12 of each part.
-
-    Returns
-    -------
-    (intervals,) array
+    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, says which errors
+    are small: 1e-12 of it, and of each part otherwise. Returns one integral for each interval.
 
     Raises
     ------
@@ -123,12 +112,12 @@ def integrate(
         If an integral does not settle.
     """
     options: dict[str, Any] = {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
-    options["epsabs"] = ACCURACY * within if math.isfinite(within) else 0.0
+    options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
     if lag > 0.0:
         options |= {"weight": "cos", "wvar": lag}
     parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
     found, errors = np.array(parts).T
-    size = min(within, float(np.abs(found).sum()))
+    size = min(power, float(np.abs(found).sum()))
     if not np.all(np.isfinite(found)) or errors.sum() > LARGEST_ERROR * size:
         raise InputError(
             "function: its integral over wavenumbers does not settle; name the wavenumbers at which"
@@ -194,7 +183,6 @@ class ScaledSpectrum(SpectralDensity):
         return np.concatenate(([0.0], octaves[octaves < end], [end]))
 
     def cutoff(self, dimensions: int = 1) -> float:
-        """Return the wavenumber above which the spectrum is truncated, rad/m."""
         if self.truncation is not None:
             return self.truncation * 2.0 * math.pi / self.correlation_length
         return super().cutoff(dimensions)
@@ -224,18 +212,15 @@ class _PowerOfWavenumber(ScaledSpectrum):
         raise NotImplementedError
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        """Return the density at wave vectors of length k (rad/m), relative to that at zero."""
         ratio = np.asarray(wavenumber) / self.scale
         result: Array = (1.0 + ratio * ratio) ** -(self._power + 0.5 * (dimensions - 1))
         return result
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Return the share of the power below `wavenumber`: an incomplete beta function."""
         ratio = (wavenumber / self.scale) ** 2
         return float(betainc(0.5 * dimensions, self._power - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        """Return the wavenumber (rad/m) below which a share of the power lies."""
         # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
         rest = float(betaincinv(self._power - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - rest) / rest)
@@ -285,13 +270,11 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return self.exponent
 
     def cutoff(self, dimensions: int = 1) -> float:
-        """Return the wavenumber above which the spectrum is truncated, rad/m."""
         if self.truncation is None and self.power_kept is None:
             return 2.5 * self.scale
         return super().cutoff(dimensions)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """Return the Matern correlation at `lag` (m), on a line."""
         smoothness = self.exponent - 0.5
         a = np.abs(np.asarray(lag, dtype=np.float64)) * self.scale
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -313,11 +296,10 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     Parameters
     ----------
     correlation_length : float
-        xi_0, m: here the correlation of z would be 1/e at xi_0 without truncation.
-    truncation : float, optional
-        Truncation in multiples of 2 pi/xi_0.
-    power_kept : float, optional
-        Share of the power kept by truncation; 0.9997 if neither is given.
+        xi_0, m: without truncation the correlation of z is 1/e there.
+    truncation, power_kept : float, optional
+        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.9997 of
+        the power if neither is given.
 
     Examples
     --------
@@ -330,22 +312,18 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     type: Literal["squared_exponential"] = "squared_exponential"
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        """Return exp(-(k xi_0/2)^2) at k in rad/m."""
         result: Array = np.exp(-((np.asarray(wavenumber) * self.correlation_length / 2.0) ** 2))
         return result
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Return the share of the power below `wavenumber`: an incomplete gamma function."""
         half = wavenumber * self.correlation_length / 2.0
         return float(gammainc(0.5 * dimensions, half * half))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        """Return the wavenumber (rad/m) below which a share of the power lies."""
         square = float(gammainccinv(0.5 * dimensions, 1.0 - share))
         return 2.0 / self.correlation_length * math.sqrt(square)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """Return exp(-(lag/xi_0)^2)."""
         result: Array = np.exp(-((np.asarray(lag) / self.correlation_length) ** 2))
         return result
 
@@ -357,12 +335,10 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     Parameters
     ----------
     correlation_length : float
-        xi_0, m: here the correlation of z would be 1/e at xi_0 without truncation.
-    truncation : float, optional
-        Truncation in multiples of 2 pi/xi_0.
-    power_kept : float, optional
-        Share of the power kept by truncation; 0.99 if neither is given, since the spectrum
-        falls slowly and every further nine takes ten times as many modes.
+        xi_0, m: without truncation the correlation of z is 1/e there.
+    truncation, power_kept : float, optional
+        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.99 of the
+        power if neither is given, since every further nine takes ten times as many modes.
 
     Examples
     --------
@@ -378,7 +354,6 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     _power: ClassVar[float] = 1.0
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        """Return exp(-|lag|/xi_0)."""
         result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
         return result
 
@@ -462,7 +437,6 @@ class CustomSpectrum(SpectralDensity):
         return np.unique([0.0, *(k for k in (*octaves, *self.break_points) if k < end), end])
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        """Return g(k) at k in rad/m, up to a factor: the density of what it is used for."""
         return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
 
     def power_integral(self, wavenumber: float, dimensions: int = 1) -> float:
@@ -476,24 +450,16 @@ class CustomSpectrum(SpectralDensity):
         return float(sums[before - 1] + part[0])
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Return the share of the power below `wavenumber`, of that below `max_wavenumber`."""
         whole = _cumulative(self, dimensions)[1][-1]
         return min(self.power_integral(wavenumber, dimensions) / float(whole), 1.0)
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        """Return the wavenumber (rad/m) below which a share of the power lies."""
         return _quantile(self, share, dimensions)
 
     def cutoff(self, dimensions: int = 1) -> float:
-        """Return the wavenumber above which the spectrum is truncated, rad/m."""
         if self.max_wavenumber is not None:
             return self.max_wavenumber
         return super().cutoff(dimensions)
-
-    def untruncated_correlation(self, lag: Array) -> Array:
-        """Return the correlation of the whole spectrum at `lag` (m), up to `max_wavenumber`."""
-        edges, sums = _cumulative(self, 1)
-        return self._correlation(lag, edges, float(sums[-1]))
 
 
 def _moment(spectrum: CustomSpectrum, dimensions: int) -> Callable[[float], float]:
