@@ -1,7 +1,7 @@
 """Which patches become unstable and are arrested before the interface slides as a whole?
 
-Wide strength makes strong places that stop a patch. `equilibrium_events` lists the events,
-`equilibrium_path` gives slip and stress at any load on the way.
+Wide strength makes strong places that stop a patch. `Equilibrium(events=...)` keeps the first
+events of each sample; `equilibrium_path` gives slip and stress at any load on the way.
 """
 
 import numpy as np
@@ -14,15 +14,15 @@ strength = st.RandomField(
     spectrum=st.PowerLawSpectrum(correlation_length=1.5e-3),
 )
 tau_p = strength.sample(problem.interface, samples=20, seed=0)
-events = st.equilibrium_events(problem, tau_p)
-print(f"{events.sizes['event']} arrested events in 20 samples")
-for sample, stress, length in zip(
-    events["sample"].values[:5], events.stress.values, events.length.values, strict=False
-):
-    print(f"sample {sample}: at {stress / 1e6:.3f} MPa, {length * 1e3:.1f} mm long")
+onsets = st.onset(problem, tau_p, method=st.Equilibrium(events=2))
+print(f"{int(onsets.arrested_events.sum())} arrested events in 20 samples")
+for sample in np.flatnonzero(onsets.arrested_events)[:5]:
+    first = onsets.isel(sample=sample, event=0)
+    stress, length = float(first.event_stress) / 1e6, float(first.event_length) * 1e3
+    print(f"sample {sample}: at {stress:.3f} MPa, {length:.1f} mm long")
 
-busiest = int(np.bincount(events["sample"].values).argmax())
-onset = st.onset(problem, tau_p[busiest], method=st.Equilibrium()).isel(sample=0)
+busiest = int(onsets.arrested_events.argmax())
+onset = onsets.isel(sample=busiest)
 loads = np.linspace(0.9 * float(onset.first_instability), float(onset.critical_load), 20)[:-1]
 path = st.equilibrium_path(problem, tau_p[busiest], loads)
 slipping = 100.0 * float((path.slip[-1] > 0.0).mean())

@@ -17,11 +17,10 @@ import numpy as np
 import xarray as xr
 from line_and_plane_figures import draw
 from scipy.stats import rankdata
+from stiction.ensemble.cost_estimate import probe_time
 
 import stiction as st
-from stiction.ensemble.cost_estimate import probe_time
-from stiction.equilibrium.plane_solver import first_instability, plane_of, sample_of
-from stiction.equilibrium.solver import Solver
+from stiction.equilibrium.solver import first_instabilities, make_program
 from stiction.statistics.estimates import Estimate, mean, standard_deviation
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -167,10 +166,7 @@ def neighbourhood_onset(case: Case, ratio: float, data: xr.Dataset) -> np.ndarra
         square = away[0] ** 2 if not case.plane else np.add.outer(away[0] ** 2, away[1] ** 2)
         row[square > (REACH * NUCLEATION_LENGTH) ** 2] = OUT_OF_REACH
     sample = problem.sample({"strength": tau_p})
-    if not case.plane:
-        return Solver(problem)(sample)["first_instability"]
-    plane = plane_of(problem)
-    return np.array([first_instability(plane, sample_of(sample, i), 1e-6) for i in range(count)])
+    return sample.mean_stress(first_instabilities(make_program(problem), sample))
 
 
 def split(case: Case, data: xr.Dataset) -> dict[str, list[Estimate]]:

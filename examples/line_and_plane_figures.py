@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
-from stiction.equilibrium.plane_patches import critical_patch
+from stiction.equilibrium.patches import critical_patch
 from stiction.plot.style import (
     ACCENT,
     INK,

@@ -31,7 +31,6 @@ _HOMES = {
     "CustomSpectrum": "random.spectra",
     "LocalCriterion": "criterion.local",
     "Equilibrium": "equilibrium.method",
-    "equilibrium_events": "equilibrium.events",
     "equilibrium_path": "equilibrium.path",
     "Rupture": "dynamics.method",
     "simulate_rupture": "dynamics.simulate",

@@ -12,7 +12,6 @@ from stiction.dynamics.method import Rupture as Rupture
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
-from stiction.equilibrium.events import equilibrium_events as equilibrium_events
 from stiction.equilibrium.method import Equilibrium as Equilibrium
 from stiction.equilibrium.path import equilibrium_path as equilibrium_path
 from stiction.errors import (

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from planes import WAVENUMBERS
 
-from stiction.equilibrium.plane_onset import Plane, plane_onset
+from stiction.equilibrium.transforms import plane_onset
 
 RATE = 0.5e12
 LENGTH = 8.0 * 3.46e-3
@@ -16,7 +17,7 @@ def smooth_onset(nodes, wavenumbers):
     y = np.arange(nodes)[None, :] / nodes * 2.0 * np.pi
     strength = 1e6 - 1.5e5 * np.cos(x) * np.cos(y) - 1e5 * np.cos(2.0 * x + y + 0.3)
     one = np.ones((nodes, nodes))
-    plane = Plane((LENGTH, LENGTH), 1e9, 0.33, wavenumbers)
+    plane = WAVENUMBERS[wavenumbers]((LENGTH, LENGTH), 1e9, 0.33)
     found = plane_onset(plane, strength, one, RATE * one, 1e-8)
     assert found.closed
     return found.upper

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 
 import stiction as st
-from stiction.elasticity.line_stiffness import apply_stiffness, coupling_strip, stiffness_column
+from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_column
 from stiction.equilibrium.cholesky import (
     append,
     back_substitute,
@@ -15,12 +15,13 @@ from stiction.equilibrium.cholesky import (
     row_start,
     substitute,
 )
-from stiction.equilibrium.linear_program_cg import Solution
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.follow import State
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.prepared import Setting
-from stiction.equilibrium.single_patch_test import block_factor
-from stiction.equilibrium.window_bound import smallest_window, window_mode
+from stiction.equilibrium.runaway import block_factor
+from stiction.equilibrium.sample import LINEAR, make_sample
+from stiction.equilibrium.windows import smallest_window, window_mode
 
 
 def stiffness_times(problem, field):
@@ -45,9 +46,7 @@ def test_sparse_product_with_the_stiffness(problem):
     field[members] = values
     column = stiffness_column(256, 0.1, problem.effective_modulus)
     result = np.empty(256)
-    apply_stiffness(
-        coupling_strip(column), column[0], members, 77, values, np.empty((2, 128)), result
-    )
+    apply_stiffness(make_stiffness(column), members, 77, values, np.empty((2, 128)), result)
     np.testing.assert_allclose(result, stiffness_times(problem, field), atol=1e-13 * column[0])
 
 
@@ -144,12 +143,13 @@ def test_conditions_of_optimality(problem, make_strength, ratio):
 
 def test_first_bound_is_a_bound(problem, make_strength):
     """A y <= 0 for the window chosen, where the weakening rate varies."""
-    setting = Setting(problem)
+    program = LineProgram(problem)
     tau_p = make_strength(0.5).sample(problem.interface, samples=50, seed=6)
     x = 2.0 * np.pi * np.arange(256) / 256
     for sample, excess in enumerate(tau_p):
         rate = 0.4e12 * (1.0 + 0.6 * np.sin((sample % 9 + 1) * x))
-        y = setting.bound(excess, rate).multiplier
+        sample_ = make_sample(excess, np.zeros(256), np.ones(256), rate, LINEAR)
+        _, y = program.bound(sample_)
         # The eigenvalue of the window may equal the rate: round-off of its eigenvector.
         assert (stiffness_times(problem, y) - rate * y).max() < 1e-12 * rate.max() * y.max()
         assert np.count_nonzero(y) < 128
@@ -157,14 +157,13 @@ def test_first_bound_is_a_bound(problem, make_strength):
 
 def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     """From slip and multiplier that are allowed but not optimal."""
-    setting = Setting(problem)
+    program = LineProgram(problem)
     excess = make_strength(0.5).sample(problem.interface, samples=1, seed=4)[0]
-    rate = np.full(256, problem.friction.weakening_rate)
-    bound = setting.bound(excess, rate)
-    guess = Solution(0.0, np.zeros(256), np.zeros(256), bound.multiplier)
+    sample = program.sample_of(problem.sample(excess), 0)
+    load, multiplier = program.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
-    gap = setting.gap(excess, rate, guess, np.empty(256))
-    assert gap == pytest.approx(bound.load - excess.min(), rel=1e-9)
+    gap = program.gap(sample, State(0.0, *np.zeros((3, 256))), multiplier)
+    assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 
 
 def test_gradient_is_the_sensitivity(problem, make_strength):
@@ -207,12 +206,15 @@ def wide(problem, solid):
 def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide, solid):
     """A uniform initial stress is a load that is there already."""
     problem, tau_p = wide
-    plain = st.equilibrium_events(problem, tau_p)
-    shifted = st.equilibrium_events(problem, {"strength": tau_p, "initial_stress": 5e4})
-    assert plain.sizes["event"] > 5
-    np.testing.assert_allclose(shifted["stress"], plain["stress"], rtol=1e-9)
-    np.testing.assert_allclose(shifted["load"], plain["load"] - 5e4, rtol=1e-9)
-    np.testing.assert_allclose(shifted["moment"], plain["moment"], rtol=1e-6)
+    count = 0
+    for strength in tau_p:
+        plain = st.equilibrium_path(problem, strength, [0.0])
+        shifted = st.equilibrium_path(problem, {"strength": strength, "initial_stress": 5e4}, [0.0])
+        count += plain.sizes["event"]
+        np.testing.assert_allclose(shifted["event_stress"], plain["event_stress"], rtol=1e-9)
+        np.testing.assert_allclose(shifted["event_load"], plain["event_load"] - 5e4, rtol=1e-9)
+        np.testing.assert_allclose(shifted["event_moment"], plain["event_moment"], rtol=1e-6)
+    assert count > 5
 
 
 def test_sensitivity_where_nodes_are_at_the_residual(wide):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.equilibrium.plane_patches import labelled_patches, patch_of
+from stiction.equilibrium.patches import labelled_patches, patch_of
 
 RATE = 0.5e12
 FRICTION = st.LinearWeakening(weakening_rate=RATE)

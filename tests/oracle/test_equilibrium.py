@@ -11,18 +11,15 @@ from scipy.linalg import circulant
 from scipy.optimize import linprog
 
 import stiction as st
-from stiction.elasticity.line_stiffness import stiffness_column
-from stiction.equilibrium.continuation import at_rest
-from stiction.equilibrium.events import equilibrium_events
-from stiction.equilibrium.instability_jump import SLIDING, griffith_length, jump, step_to_corner
-from stiction.equilibrium.linear_program_cg import LargeProgram
+from stiction.elasticity.line import stiffness_column
+from stiction.equilibrium.cholesky import make_workspace
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.jump import jump
+from stiction.equilibrium.long_line import LongLine, runs_away_alone
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
-from stiction.equilibrium.prepared import Setting
-from stiction.equilibrium.solver import sample_of
-from stiction.equilibrium.stable_path import UNSTABLE, advance
-from stiction.equilibrium.window_test import runs_away_frozen
-from stiction.equilibrium.workspace import make_workspace
+from stiction.equilibrium.runaway import SLIDING, unstoppable_length
+from stiction.equilibrium.sample import step_to_corner
 
 
 def by_linear_programme(problem, strength, rate=None):
@@ -122,17 +119,13 @@ def test_interface_shorter_than_a_critical_patch(solid, make_strength):
 def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
     tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=11)
     rows = problem.sample(tau_p)
-    setting = Setting(problem)
+    program = LineProgram(problem)
     loads = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
     for row in range(5):
-        sample = sample_of(rows, row)
-        state = at_rest(sample)
-        load, status = advance(
-            sample, setting.grid, state.load, np.inf, state.slip, state.stiff, state.direction,
-            make_workspace(256),
-        )  # fmt: skip
-        assert status == UNSTABLE
-        assert load == pytest.approx(loads[row], rel=1e-11)
+        sample = program.sample_of(rows, row)
+        found = program.next(sample, program.at_rest(sample))
+        assert found.unstable
+        assert found.load == pytest.approx(loads[row], rel=1e-11)
 
 
 @pytest.mark.parametrize("rough", [0.0, 0.4])
@@ -140,24 +133,19 @@ def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, r
     x = np.arange(2048) / 2048
     rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
     problem = st.Problem(solid, st.Interface(0.2, 2048), st.LinearWeakening(weakening_rate=rate))
-    setting = Setting(problem)
+    program = LineProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     for row in range(4):
-        sample = sample_of(rows, row)
-        dense = setting.programme(sample.excess, sample.rate)
-        bound = setting.bound(sample.excess, sample.rate)
-        large = LargeProgram(
-            sample.excess, sample.profile, sample.rate, setting.grid, bound.load, bound.multiplier
-        ).run()
+        sample = program.sample_of(rows, row)
+        dense = program.programme(sample)
+        bound, multiplier = program.bound(sample)
+        large = LongLine(sample, program.line.stiffness, bound, multiplier).run()
         assert large.load == pytest.approx(dense.load, rel=1e-11)
         # At the optimum slip may be steep in the load; 1e-6 of d_c is far below any use of it.
         np.testing.assert_allclose(large.slip, dense.slip, atol=1e-6 * sample.critical.max())
         below = 0.995 * dense.load
-        dense = setting.programme(sample.excess, sample.rate, below)
-        large = LargeProgram(
-            sample.excess, sample.profile, sample.rate, setting.grid, bound.load,
-            bound.multiplier, below,
-        ).run()  # fmt: skip
+        dense = program.programme(sample, below)
+        large = LongLine(sample, program.line.stiffness, bound, multiplier, below).run()
         np.testing.assert_allclose(large.slip, dense.slip, atol=1e-10 * sample.critical.max())
 
 
@@ -172,8 +160,8 @@ def test_patches_alike_on_a_long_interface(solid):
     loads = []
     for periods in (1, 32):
         problem = st.Problem(solid, st.Interface(0.0135 * periods, 128 * periods), friction)
-        sample = sample_of(problem.sample(np.tile(dip, periods)), 0)
-        found = Setting(problem).programme(sample.excess, sample.rate)
+        program = LineProgram(problem)
+        found = program.programme(program.sample_of(problem.sample(np.tile(dip, periods)), 0))
         assert found is not None
         loads.append(found.load)
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
@@ -216,22 +204,22 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
         assert last > first
         beyond = first + 0.5 * min(last - first, 1e-3 * first)
         assert by_relaxation(problem, tau_p[row], beyond) is not None
-    events = equilibrium_events(problem, tau_p)
     row = arrested[0]
     first = onset.first_instability.values[row]
-    slip = equilibrium_path(problem, tau_p[row], first * np.array([1 - 1e-12, 1 + 1e-9])).slip
-    added = (slip[1] - slip[0]).values
+    path = equilibrium_path(problem, tau_p[row], first * np.array([1 - 1e-12, 1 + 1e-9]))
+    added = (path.slip[1] - path.slip[0]).values
     moment = solid.shear_modulus * added.sum() * problem.interface.spacing
-    event = events.isel(event=int(np.argmax(events["sample"].values == row)))
+    event = path.isel(event=0)
     # Slip is steep in the load just before the event: 1e-12 of the load counts.
-    assert event.moment.item() == pytest.approx(moment, rel=1e-2)
-    assert added.max() / 5 < event.mean_slip.item() < added.max()
-    share = event.mean_slip * event.length * solid.shear_modulus / event.moment
+    assert event.event_moment.item() == pytest.approx(moment, rel=1e-2)
+    assert added.max() / 5 < event.event_mean_slip.item() < added.max()
+    share = event.event_mean_slip * event.event_length * solid.shear_modulus / event.event_moment
     assert 0.9 < share.item() <= 1.0  # the patch has most of the moment
-    assert events.sizes["event"] == onset.arrested_events.values.sum()
-    assert set(events["sample"].values) == set(arrested)
+    events = st.onset(problem, tau_p, method=Equilibrium(events=8))
+    count = np.isfinite(events.event_stress).sum("event")
+    np.testing.assert_array_equal(count, onset.arrested_events)
     np.testing.assert_allclose(
-        events.stress.values[np.searchsorted(events["sample"], arrested)],
+        events.event_stress.values[arrested, 0],
         onset.first_instability.values[arrested],
         rtol=1e-14,
     )
@@ -260,23 +248,23 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
             correlation_length=0.5 * problem.nucleation_length, exponent=4.0, truncation=2.5
         ),
     )
-    setting = Setting(problem)
+    program = LineProgram(problem)
+    stiffness = program.line.stiffness
     rows = problem.sample(strength.sample(problem.interface, samples=12, seed=4))
     outcomes = []
     for row in range(12):
-        sample = sample_of(rows, row)
-        found = setting.programme(sample.excess, sample.rate)
+        sample = program.sample_of(rows, row)
+        found = program.programme(sample)
         if np.any(found.slip > sample.critical):
             continue
         step_to_corner(sample, found.slip, found.multiplier, np.inf)
-        griffith = 1.5 * griffith_length(sample, found.load, setting.spacing, setting.modulus)
-        part = runs_away_frozen(
-            setting.grid, sample, found.load, found.slip, found.multiplier, griffith, 4000
+        griffith = 1.5 * unstoppable_length(sample, found.load, program.line.runs)
+        part = runs_away_alone(
+            sample, stiffness, found.load, found.slip, found.multiplier, griffith
         )
         whole = jump(
-            sample, setting.grid, found.load, found.slip, found.stiff, griffith, 4000,
-            make_workspace(4096),
-        )  # fmt: skip
+            sample, found.load, found.slip, found.stiff, griffith, make_workspace(stiffness)
+        )
         # Only a lower bound: what slides in the window slides.
         assert not part or whole == SLIDING
         outcomes.append((part, whole == SLIDING))

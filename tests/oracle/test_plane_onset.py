@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from planes import WAVENUMBERS, Lattice, plane_sample
 from scipy.linalg import eigh
 from scipy.optimize import linprog
 
-from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
-from stiction.elasticity.transform_operator import make_operator
-from stiction.equilibrium.follow_plane import follow_plane, plane_slip_at
-from stiction.equilibrium.least_equilibrium import BALANCED, SLIDING, PlaneSample
-from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of
+import stiction as st
+from stiction.elasticity.linear import lowest_eigenvector
+from stiction.elasticity.operator import make_operator
+from stiction.equilibrium.follow import follow
+from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
+from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
 
 RATE = 0.5e12
+SHAPE = (20, 20)
 LENGTH = 3.46e-3  # nucleation length h_n of plane strain at G = 1 GPa, nu = 0.33 and that rate
 
 
@@ -29,7 +32,7 @@ def smooth_noise(shape, correlation, rng):
 
 def dense_stiffness(plane, shape):
     """K as a matrix, from its first column."""
-    column = np.fft.irfft2(symbol_of(plane, shape), shape)
+    column = np.fft.irfft2(plane.symbol(shape), shape)
     rows = [np.roll(column, np.unravel_index(i, shape), (0, 1)).ravel() for i in range(column.size)]
     return np.array(rows)
 
@@ -54,7 +57,7 @@ def by_linear_programme(plane, strength, profile, rate):
 def test_onset_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     rng = np.random.default_rng(seed)
     shape = (24, 24) if seed % 2 else (26, 24)
-    plane = Plane((3.0 * LENGTH, 3.0 * LENGTH), 1e9, 0.33, wavenumbers)
+    plane = WAVENUMBERS[wavenumbers]((3.0 * LENGTH, 3.0 * LENGTH), 1e9, 0.33)
     strength = 0.66e6 + 1e6 * smooth_noise(shape, rng.choice([2.0, 4.0, 8.0]), rng)
     if seed % 3 == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
@@ -78,18 +81,21 @@ def test_lowest_eigenvector_equals_a_dense_one():
     nodes = np.flatnonzero(inside)
     values, vectors = eigh(matrix[np.ix_(nodes, nodes)], subset_by_index=[0, 0])
     vector = inside.astype(float)
-    operator = make_operator(symbol_of(plane, shape), RATE, shape)
-    value, _ = lowest_eigenvector(operator, inside, vector, 1e-10 * RATE, 500)
+    operator = make_operator(plane.symbol(shape), RATE, shape)
+    value, _ = lowest_eigenvector(
+        operator, inside.reshape(-1), vector.reshape(-1), 1e-10 * RATE, 500
+    )
     assert value == pytest.approx(values[0], rel=1e-10, abs=1e-10 * RATE)
     assert np.abs(vector[inside] - np.abs(vectors[:, 0])).max() < 1e-7
 
 
 def by_local_relaxation(plane, sample, load, slip, limit=60_000):
     """Every overloaded node slips a little at a time; None if the whole slides."""
-    symbol = symbol_of(plane, slip.shape)
-    step = 1.0 / np.fft.irfft2(symbol, slip.shape)[0, 0]
+    symbol = plane.symbol(SHAPE)
+    step = 1.0 / np.fft.irfft2(symbol, SHAPE)[0, 0]
     for _ in range(limit):
-        stress = load * sample.profile - np.fft.irfft2(symbol * np.fft.rfft2(slip), slip.shape)
+        pull = np.fft.irfft2(symbol * np.fft.rfft2(slip.reshape(SHAPE)), SHAPE)
+        stress = load * sample.profile - pull.reshape(-1)
         drive = stress - np.maximum(sample.excess - sample.rate * slip, sample.residual)
         if drive.max() < 1e-8 * sample.excess.mean():
             return slip
@@ -99,49 +105,56 @@ def by_local_relaxation(plane, sample, load, slip, limit=60_000):
     raise AssertionError("did not settle")
 
 
-def wide_sample(seed, shape=(20, 20)):
+def wide_sample(seed):
     """Strength over a wide range, so that ruptures are arrested."""
     rng = np.random.default_rng(seed)
-    one = np.ones(shape)
-    strength = 0.2e6 + 4.0e6 * smooth_noise(shape, 4.0, rng)
-    floor = 0.05e6 * one
-    return PlaneSample(strength, floor, one, RATE * one, (strength - floor) / RATE)
+    return plane_sample(0.2e6 + 4.0e6 * smooth_noise(SHAPE, 4.0, rng), 0.05e6, RATE)
+
+
+@pytest.fixture
+def program(solid):
+    """Equilibria of a small plane on a lattice."""
+    length = 5.0 * LENGTH
+    friction = st.LinearWeakening(weakening_rate=RATE)
+    found = PlaneProgram(st.Problem(solid, st.Interface((length, length), SHAPE), friction))
+    found.plane = Lattice((length, length), 1e9, 0.33)
+    return found
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_arrest_and_sliding_equal_local_relaxation(seed):
-    plane = Plane((5.0 * LENGTH, 5.0 * LENGTH), 1e9, 0.33, "lattice")
+def test_arrest_and_sliding_equal_local_relaxation(program, seed):
     sample = wide_sample(seed)
-    path = follow_plane(plane, sample)
-    assert path.outcome == SLIDING
+    path = follow(program, sample)
+    assert path.known
     # Before and after each instability, at some distance: near one, relaxation takes for ever.
-    marks = [path.lower] + [event.load for event in path.events] + [path.load]
+    marks = [path.first.load] + [event.before.load for event in path.events] + [path.last.load]
     loads = np.unique(np.r_[[m * (1.0 + e) for m in marks for e in (-2e-3, 2e-3)]])
-    slips, status = plane_slip_at(plane, sample, loads, accuracy=1e-10)
-    slip = np.zeros(sample.excess.shape)
-    for load, ours, outcome in zip(loads, slips, status, strict=True):
-        slip = by_local_relaxation(plane, sample, load, slip)
+    operator = make_operator(program.plane.symbol(SHAPE), RATE, SHAPE)
+    slip = ours = np.zeros(sample.excess.shape)
+    for load in loads:
+        found = least_equilibrium(operator, sample, load, ours, accuracy=1e-10)
+        ours = found.slip
+        slip = by_local_relaxation(program.plane, sample, load, slip)
         if slip is None:
-            assert load > path.load
-            assert outcome == SLIDING
+            assert load > path.last.load
+            assert found.status == SLIDING
             break
-        assert load < path.load
-        assert outcome == BALANCED
+        assert load < path.last.load
+        assert found.status == BALANCED
         # `by_local_relaxation` stops at 1e-8 of the strength, over the lowest eigenvalue
         assert np.abs(ours - slip).max() < 1e-4 * sample.critical.max()
     else:
         raise AssertionError("never slid")
 
 
-def test_events_move_the_interface_and_some_samples_have_them():
-    plane = Plane((5.0 * LENGTH, 5.0 * LENGTH), 1e9, 0.33, "lattice")
+def test_events_move_the_interface_and_some_samples_have_them(program):
     arrested = 0
     for seed in range(4):
         sample = wide_sample(seed)
-        path = follow_plane(plane, sample)
+        path = follow(program, sample)
         arrested += len(path.events)
-        assert path.load >= path.lower
-        for event in path.events:
-            assert (event.after >= event.before - 1e-12 * sample.critical.max()).all()
-            assert path.lower <= event.load <= path.load
+        assert path.last.load >= path.first.load
+        for before, after in path.events:
+            assert (after.slip >= before.slip - 1e-12 * sample.critical.max()).all()
+            assert path.first.load <= before.load <= path.last.load
     assert arrested > 0

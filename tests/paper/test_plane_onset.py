@@ -13,7 +13,7 @@ from scipy.stats import beta
 
 from stiction.criterion.average import local_onset
 from stiction.criterion.windows import ellipse_window
-from stiction.equilibrium.plane_onset import Plane, plane_onset, symbol_of
+from stiction.equilibrium.transforms import Plane, plane_onset
 
 RATE = 0.5e12
 NUCLEATION = 2.0 * 0.5788869418506 * 1e9 / 0.67 / RATE
@@ -37,7 +37,7 @@ def paper_strength(ratio, rng):
 
 @pytest.fixture(scope="module")
 def windows():
-    symbol = symbol_of(PLANE, SHAPE)
+    symbol = PLANE.symbol(SHAPE)
     aspects = (1.0, 1.25, 1.0 / 0.67)
     return [ellipse_window(symbol, SHAPE, PLANE.lengths, RATE, aspect) for aspect in aspects]
 

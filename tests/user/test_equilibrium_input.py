@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.equilibrium.events import equilibrium_events
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
 from stiction.equilibrium.solver import Solver
@@ -64,9 +63,9 @@ def test_path_of_several_samples(problem):
 
 
 def test_no_events(problem):
-    events = equilibrium_events(problem, np.full((2, 256), 0.9e6))
-    assert events.sizes["event"] == 0
-    assert events.position.attrs["units"] == "m"
+    path = equilibrium_path(problem, np.full(256, 0.9e6), [1e5])
+    assert path.sizes["event"] == 0
+    assert path.event_position.attrs["units"] == "m"
 
 
 def test_variables_are_labelled(problem, make_strength):
@@ -80,9 +79,10 @@ def test_variables_are_labelled(problem, make_strength):
 
 
 @pytest.mark.parametrize("gap", [1.0, np.nan])
-def test_bounds_that_do_not_close_are_not_passed_over(gap):
-    with pytest.warns(st.AccuracyWarning, match="did not close in 1 of 2"):
-        Solver._check(np.array([1e-6, gap]), np.full(2, 1e6))
+def test_bounds_that_do_not_close_are_not_passed_over(problem, gap):
+    yes = np.ones(2, dtype=bool)
+    with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
+        Solver(problem)._warn(np.array([1e-6, gap]), np.full(2, 1e6), yes, yes)
 
 
 def test_grid_far_too_fine(solid):

@@ -65,7 +65,6 @@ def test_equilibrium_refuses_what_has_no_pieces(with_law, tau_p):
     for call in (
         lambda: st.onset(problem, tau_p, method=st.Equilibrium()),
         lambda: st.equilibrium_path(problem, tau_p, [0.6e6]),
-        lambda: st.equilibrium_events(problem, tau_p),
     ):
         with pytest.raises(st.InputError, match=r"ExponentialWeakening has none.*from_law.*Rupt"):
             call()

@@ -56,18 +56,17 @@ def test_in_a_study_file_and_swept(tmp_path):
     assert result["critical_stress"][0].mean() > result["critical_stress"][1].mean()
 
 
-def test_events_are_those_of_equilibrium_events(tmp_path):
+def test_events_are_those_of_the_path(tmp_path):
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=4.66e6),
         spectrum=st.PowerLawSpectrum(correlation_length=1.5e-3),
     )
     tau_p = strength.sample(PLAIN.interface, samples=6, seed=0)
     found = st.onset(PLAIN, tau_p, method=st.Equilibrium(events=4), progress=False)
-    events = st.equilibrium_events(PLAIN, tau_p)
     kept = found["event_moment"].values
     assert np.isfinite(kept).sum() > 2
     for sample in range(6):
-        own = events["moment"].values[events["sample"].values == sample][:4]
+        own = st.equilibrium_path(PLAIN, tau_p[sample], [0.0])["event_moment"].values[:4]
         np.testing.assert_array_equal(kept[sample, : own.size], own)
         assert np.isnan(kept[sample, own.size :]).all()
     study = st.Study(

@@ -23,8 +23,8 @@ from scipy.optimize import nnls
 from scipy.special import jv
 
 from stiction.arrays import Array
-from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
-from stiction.elasticity.transform_operator import make_operator, stiffness_symbol
+from stiction.elasticity.linear import lowest_eigenvector
+from stiction.elasticity.operator import make_operator, stiffness_symbol
 from stiction.errors import InputError
 from stiction.problem import Problem
 
@@ -150,7 +150,7 @@ def _kept(
     rate: float,
     aspect: float,
 ) -> Window | None:
-    symbol = stiffness_symbol(shape, lengths, modulus, ratio)
+    symbol = stiffness_symbol(shape, lengths, modulus / (1.0 - ratio), modulus)
     return ellipse_window(symbol, shape, lengths, rate, aspect)
 
 
@@ -434,9 +434,10 @@ def _smallest_unstable(
         Square of a semi-axis that is known to be stable, m^2.
     """
     shape = column.shape
-    symbol = np.ascontiguousarray(np.fft.rfft2(column).real)
+    symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, rate, shape)._replace(
-        rate=np.zeros(shape), inverse=1.0 / (np.maximum(symbol, 0.0) + 0.5 * rate)
+        rate=np.zeros(column.size),
+        inverse=1.0 / (np.maximum(symbol.flatten(), 0.0) + 0.5 * rate),
     )
     distance = squared_radius(shape, spacings, aspect)
     radii = np.unique(distance)
@@ -454,7 +455,9 @@ def _smallest_unstable(
         vector = guess.copy()
         if not (vector[inside] != 0.0).any():
             vector[:] = 1.0
-        value = lowest_eigenvector(operator, inside, vector, TOLERANCE * rate, ITERATIONS)[0]
+        value, _ = lowest_eigenvector(
+            operator, inside.reshape(-1), vector.reshape(-1), TOLERANCE * rate, ITERATIONS
+        )
         if value <= rate:
             high, found, guess, probe = middle, (inside, value, vector), vector, 0
         else:

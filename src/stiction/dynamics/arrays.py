@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.compiled_transform import Transform
+from stiction.elasticity.operator import Transform
 
 Ints = NDArray[np.int64]
 Spectrum = NDArray[np.complex128]

@@ -13,18 +13,9 @@ from typing import Any
 
 from stiction.arrays import Array
 from stiction.dynamics.arrays import ImplicitTables, Setting
-from stiction.elasticity.compiled_transform import Transform, backward, forward
+from stiction.elasticity.operator import Transform, convolve
 from stiction.friction.kernels import line_at, strength_at
 from stiction.jit import jit
-
-
-@jit
-def _apply(transform: Transform, symbol: Array, vector: Array, work: Array, out: Array) -> None:
-    """`out` = the circulant of a symbol times a vector."""
-    forward(transform, vector, work)
-    for q in range(work.size):
-        work[q] *= symbol[q]
-    backward(transform, work, out)
 
 
 @jit
@@ -34,7 +25,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
     product, residual, z = tables.product, tables.residual, tables.other
     direction, work = tables.direction, tables.work
     n = u.size
-    _apply(transform, tables.symbol, u, work, product)
+    convolve(transform, tables.symbol, u, work, product)
     worst = 0.0
     for i in range(n):
         residual[i] = direction[i] = 0.0
@@ -45,7 +36,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         return worst <= accuracy
     gain_before = 1.0
     for iteration in range(400):
-        _apply(transform, tables.inverse, residual, work, z)
+        convolve(transform, tables.inverse, residual, work, z)
         gain = 0.0
         for i in range(n):
             if state[i] > 0:
@@ -53,7 +44,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         beta = gain / gain_before if iteration > 0 else 0.0
         for i in range(n):
             direction[i] = z[i] + beta * direction[i] if state[i] > 0 else 0.0
-        _apply(transform, tables.symbol, direction, work, product)
+        convolve(transform, tables.symbol, direction, work, product)
         curvature, stiff = 0.0, 0.0
         for i in range(n):
             if state[i] > 0:
@@ -115,7 +106,7 @@ def solve_increment(
     for _ in range(60):
         if not _solve(transform, tables, accuracy):
             return False
-        _apply(transform, tables.symbol, u, tables.work, product)
+        convolve(transform, tables.symbol, u, tables.work, product)
         changed = 0
         for i in range(n):
             if state[i] == 0:

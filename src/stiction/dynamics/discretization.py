@@ -12,9 +12,9 @@ from stiction._checks import check_memory
 from stiction.dynamics.arrays import Grid
 from stiction.dynamics.courant_limit import courant_limit, plane_limit
 from stiction.dynamics.memory_layout import places, step_table
-from stiction.elasticity.compiled_transform import make_transform
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError
 from stiction.friction.kernels import registered
 from stiction.interface import Interface

@@ -12,7 +12,7 @@ from stiction.dynamics.arrays import ExplicitTables, Fields, Grid, Setting
 from stiction.dynamics.finish import Taken, arrived, finish_step
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory_layout import advance_memory, pack
-from stiction.elasticity.compiled_transform import backward, forward
+from stiction.elasticity.operator import backward, forward
 from stiction.friction.kernels import strength_at
 from stiction.jit import jit
 

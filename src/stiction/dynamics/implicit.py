@@ -13,7 +13,7 @@ from stiction.dynamics.complementarity import solve_increment
 from stiction.dynamics.finish import Taken, arrived, finish_step
 from stiction.dynamics.implicit_tables import carry, remember, tabulate
 from stiction.dynamics.loading import load_at
-from stiction.elasticity.compiled_transform import backward, forward
+from stiction.elasticity.operator import backward, forward
 from stiction.friction.kernels import strength_at
 from stiction.jit import jit
 

@@ -20,11 +20,9 @@ from stiction.dynamics import monitor
 from stiction.dynamics.energies import radiated_energy
 from stiction.dynamics.implicit_tables import remember_growth
 from stiction.dynamics.integrator import Run, State
-from stiction.equilibrium.continuation import exceeds
-from stiction.equilibrium.pieces import refused
-from stiction.equilibrium.prepared import Setting
-from stiction.equilibrium.solver import sample_of
-from stiction.equilibrium.workspace import Sample as StaticSample
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.sample import Sample as StaticSample
+from stiction.equilibrium.sample import exceeds, refused
 from stiction.errors import InputError
 from stiction.problem import Problem, Sample
 
@@ -36,22 +34,24 @@ _BACK = 0.25  # of the distance to the onset, over which the rate is measured
 _TRIALS = 5
 
 
-def static_setting(problem: Problem) -> Setting | None:
+def static_setting(problem: Problem) -> LineProgram | None:
     """What finding equilibria of a problem needs; None where they are not followed."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     try:
-        return Setting(problem)
+        return LineProgram(problem)
     except InputError:  # so fine a grid that an equilibrium takes longer than a run from rest
         return None
 
 
-def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: float) -> State | None:
+def slow_start(
+    setting: LineProgram, run: Run, rows: Sample, number: int, rate: float
+) -> State | None:
     """The state closest to the onset whose error is small enough, None if there is none.
 
     Parameters
     ----------
-    setting : Setting
+    setting : LineProgram
         From `static_setting`.
     run : Run
     rows : Sample
@@ -67,8 +67,8 @@ def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: floa
         setting.refuse_too_fine(float(nodes.weakening.max()))
     except InputError:
         return None
-    static = sample_of(rows, number, setting.pieces)
-    onset = setting.programme(static.excess, static.rate)
+    static = setting.sample_of(rows, number)
+    onset = setting.programme(static)
     if onset is None:
         return None
     asked = _TOLERANCE * run.scale_at(onset.load)
@@ -90,7 +90,7 @@ def slow_start(setting: Setting, run: Run, rows: Sample, number: int, rate: floa
 
 
 def _at(
-    setting: Setting, run: Run, static: StaticSample, onset: float, distance: float, rate: float
+    setting: LineProgram, run: Run, static: StaticSample, onset: float, distance: float, rate: float
 ) -> State | None:
     """The state at a distance (Pa) below the onset; None where it is not known well enough.
 
@@ -99,9 +99,7 @@ def _at(
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     load, back = onset - distance, _BACK * distance
-    here, before = (
-        setting.programme(static.excess, static.rate, cap) for cap in (load, load - back)
-    )
+    here, before = (setting.programme(static, cap) for cap in (load, load - back))
     if here is None or before is None:
         return None
     if exceeds(static, here.slip):

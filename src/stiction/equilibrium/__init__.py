@@ -1,6 +1,7 @@
 """Exact quasi-static onset: the load, the slip and the patch at which equilibrium ends.
 
-Read `method`, then for lines `solver`, `linear_program` and `continuation`, for planes
-`plane_solver`, `plane_onset` (with `transform_operator`, `onset_bracket` and `turning_point`) and
-`follow_plane` (with `least_equilibrium`).
+Read `method`, `solver` (samples in, onsets out) and `follow` (the loop from one instability to the
+next). Two programmes find the instabilities: `dense` on lines, with `linear_program`, `windows`,
+`runaway`, `stable_path`, `jump` and, for long lines, `long_line`; `transforms` on planes, with
+`bracket`, `turning_point` and `relaxation`.
 """

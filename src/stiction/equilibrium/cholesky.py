@@ -6,15 +6,23 @@ numbers: half the memory of a square, and no two rows compete for the same cache
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.inner_product import dot
+from stiction.elasticity.line import Stiffness, apply_stiffness
+from stiction.elasticity.linear import dot
 from stiction.jit import jit
 from stiction.lanes import LANES, load, multiply_add, totals, zeros
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""
+PIVOT = 1e-13
+"""Share of the diagonal below which a pivot is round-off."""
+MOST_MEMBERS = 8192
+"""Slipping nodes for which a dense factor has space (268 MB if all of it is used)."""
 
 
 @jit
@@ -258,3 +266,102 @@ def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> 
         solution[i] = z
         for t in range(i):
             right[t] = multiply_add(-z, row[t], right[t])
+
+
+class Workspace(NamedTuple):
+    """The factor of A on the slipping nodes of one sample, and work space for it.
+
+    `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
+    them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
+    and of the strength. `order` is a list of nodes to append.
+    """
+
+    stiffness: Stiffness
+    factor: Array
+    members: NDArray[np.int64]
+    order: NDArray[np.int64]
+    inside: NDArray[np.bool_]
+    diagonal: Array
+    forward: Array
+    vectors: Array
+    halves: Array
+
+
+@jit
+def make_workspace(stiffness: Stiffness) -> Workspace:
+    """Workspace for samples of a line. Pages of the factor that are never used cost no memory."""
+    n = stiffness.column.shape[0]
+    capacity = min(n, MOST_MEMBERS)
+    return Workspace(
+        stiffness,
+        np.empty(row_start(capacity + 4)),
+        np.empty(n + 4, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.bool_),
+        np.empty(n),
+        np.empty((2, n + 4)),
+        np.empty((4, n + 4)),
+        np.empty((2, n // 2)),
+    )
+
+
+@jit
+def add_members(workspace: Workspace, size: int, count: int) -> int:
+    """Append `order[:count]`; returns the members now, fewer if a pivot failed (see `append`)."""
+    return append(
+        workspace.factor, size, workspace.members, workspace.order, count,
+        workspace.stiffness.column, workspace.diagonal, PIVOT,
+    )  # fmt: skip
+
+
+@jit
+def substitute_members(
+    workspace: Workspace, first: int, last: int, values: Array, which: int
+) -> None:
+    """Extend one of the forward substitutions by the members first..last-1."""
+    extend_forward(
+        workspace.factor, first, last, workspace.members, values, workspace.forward[which]
+    )
+
+
+@jit
+def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
+    """K times a field given on the members, at all nodes."""
+    apply_stiffness(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
+
+
+@jit
+def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
+    """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
+    right = workspace.vectors[0]
+    for t in range(size):
+        right[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
+    back_substitute(workspace.factor, size, right, solution)
+
+
+@jit
+def solve_first(workspace: Workspace, size: int, solution: Array) -> None:
+    """Solve for the right-hand side of the first of the forward substitutions alone."""
+    right = workspace.vectors[0]
+    for t in range(size):
+        right[t] = workspace.forward[0, t]
+    back_substitute(workspace.factor, size, right, solution)
+
+
+@jit
+def singular_direction(workspace: Workspace, size: int, direction: Array) -> None:
+    """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
+
+    It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
+    which slip runs away.
+    """
+    right = workspace.vectors[0]
+    solution = workspace.vectors[1]
+    start = row_start(size)
+    for t in range(size):
+        right[t] = -workspace.factor[start + t]
+    back_substitute(workspace.factor, size, right, solution)
+    direction[:] = 0.0
+    for t in range(size):
+        direction[workspace.members[t]] = max(solution[t], 0.0)
+    direction[workspace.members[size]] = 1.0

@@ -9,21 +9,41 @@ there. A load that is an upper bound and has an equilibrium is the critical one.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from stiction.arrays import Array
-from stiction.elasticity.line_stiffness import apply_stiffness
-from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, row_start
-from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Workspace
+from stiction.equilibrium.cholesky import (
+    MOST_MEMBERS,
+    Workspace,
+    add_members,
+    multiply_members,
+    singular_direction,
+    solve_first,
+    solve_forward,
+    substitute_members,
+)
+from stiction.equilibrium.sample import Sample
 from stiction.jit import ZERO, jit
 
 SOLVED = 0
 STALLED = 1
 OVERFULL = 2
 
-PIVOT = 1e-13
-"""Share of the diagonal below which a pivot is round-off."""
 OVERSTRESS = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
 PASSES = 10_000
+
+
+class Solution(NamedTuple):
+    """Critical load (Pa), slip (m), K times it (Pa), and the multiplier, <p, y> = 1."""
+
+    load: float
+    slip: Array
+    stiff: Array
+    multiplier: Array
+    status: int = SOLVED
 
 
 @jit
@@ -43,42 +63,14 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 
 
 @jit
-def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
-    """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
-    right = workspace.vectors[0]
-    for t in range(size):
-        right[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
-    back_substitute(workspace.factor, size, right, solution)
-
-
-@jit
-def singular_direction(workspace: Workspace, size: int, direction: Array) -> None:
-    """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
-
-    It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
-    which slip runs away.
-    """
-    right = workspace.vectors[0]
-    solution = workspace.vectors[1]
-    start = row_start(size)
-    for t in range(size):
-        right[t] = -workspace.factor[start + t]
-    back_substitute(workspace.factor, size, right, solution)
-    direction[:] = 0.0
-    for t in range(size):
-        direction[workspace.members[t]] = max(solution[t], 0.0)
-    direction[workspace.members[size]] = 1.0
-
-
-@jit
 def overstressed(
-    load: float, excess: Array, profile: Array, stiff: Array, workspace: Workspace, tolerance: float
+    sample: Sample, load: float, stiff: Array, workspace: Workspace, tolerance: float
 ) -> int:
-    """Nodes at rest above their strength, most overstressed first; returns how many."""
+    """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
     keys = workspace.vectors[2]
-    for i in range(excess.shape[0]):
-        margin = excess[i] - load * profile[i] + stiff[i]
+    for i in range(stiff.shape[0]):
+        margin = sample.excess[i] - load * sample.profile[i] + stiff[i]
         if margin < -tolerance and not workspace.inside[i]:
             keys[count] = margin
             workspace.order[count] = i
@@ -88,53 +80,55 @@ def overstressed(
 
 
 @jit
-def stress_tolerance(excess: Array, profile: Array, load: float) -> float:
+def stress_tolerance(sample: Sample, load: float) -> float:
     """Overstress, Pa, that is round-off."""
     scale = 0.0
-    for i in range(excess.shape[0]):
-        scale += abs(excess[i]) + abs(load) * profile[i]
-    return OVERSTRESS * scale / excess.shape[0]
+    n = sample.excess.shape[0]
+    for i in range(n):
+        scale += abs(sample.excess[i]) + abs(load) * sample.profile[i]
+    return OVERSTRESS * scale / n
 
 
 @jit
-def back_off(
-    load: float,
-    excess: Array,
-    profile: Array,
-    grid: Grid,
-    workspace: Workspace,
-    size: int,
-    solution: Array,
-    stiff: Array,
-) -> None:
+def _back_off(sample: Sample, load: float, workspace: Workspace, size: int, stiff: Array) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
     a node overstressed. One step along the tangent d d/d load mends it.
     """
-    right = workspace.vectors[0]
+    solution = workspace.vectors[1]
     stiff_rate = workspace.vectors[2]
-    own = grid.column[0]
-    for t in range(size):
-        right[t] = workspace.forward[0, t]
-    back_substitute(workspace.factor, size, right, solution)
-    apply_stiffness(
-        grid.strip, own, workspace.members, size, solution, workspace.halves, stiff_rate
-    )
+    solve_first(workspace, size, solution)
+    multiply_members(workspace, size, solution, stiff_rate)
     step = 0.0
-    for i in range(excess.shape[0]):
-        margin = excess[i] - load * profile[i] + stiff[i]
+    for i in range(stiff.shape[0]):
+        margin = sample.excess[i] - load * sample.profile[i] + stiff[i]
         if margin < 0.0 and not workspace.inside[i]:
-            step = max(step, margin / (stiff_rate[i] - profile[i]))
+            step = max(step, margin / (stiff_rate[i] - sample.profile[i]))
     solve_forward(workspace, size, load - step, solution)
-    apply_stiffness(grid.strip, own, workspace.members, size, solution, workspace.halves, stiff)
+    multiply_members(workspace, size, solution, stiff)
+
+
+@jit
+def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
+    """Remove the members that would slip backwards at a load; returns how many stay."""
+    solution = workspace.vectors[1]
+    while size > 0:
+        kept = 0
+        while kept < size and solution[kept] >= 0.0:
+            kept += 1
+        if kept == size:
+            break
+        for t in range(kept, size):
+            workspace.inside[workspace.members[t]] = False
+        size = kept
+        solve_forward(workspace, size, load, solution)
+    return size
 
 
 @jit
 def solve_program(
-    excess: Array,
-    profile: Array,
-    grid: Grid,
+    sample: Sample,
     bound: float,
     cap: float,
     multiplier: Array,
@@ -146,9 +140,8 @@ def solve_program(
 
     Parameters
     ----------
-    excess, profile : (n,) arrays
-        s = tau_p - tau_i (Pa), load profile p.
-    grid : Grid
+    sample : Sample
+        Strength less initial stress s and load profile p count.
     bound : float
         An upper bound of the load that belongs to `multiplier`.
     cap : float
@@ -159,7 +152,7 @@ def solve_program(
     slip, stiff : (n,) arrays, output
         d and K d.
     workspace : Workspace
-        With workspace.diagonal set to the diagonal of A.
+        With the diagonal of A in it.
 
     Returns
     -------
@@ -167,17 +160,15 @@ def solve_program(
         SOLVED, STALLED after too many passes, or OVERFULL: more members than the workspace holds.
     """
     load = min(bound, cap)
-    tolerance = stress_tolerance(excess, profile, load)
-    members = workspace.members
-    inside = workspace.inside
+    tolerance = stress_tolerance(sample, load)
+    members, inside = workspace.members, workspace.inside
     solution = workspace.vectors[1]
-    own = grid.column[0]
     inside[:] = False
     stiff[:] = 0.0
     size = ZERO
     status = STALLED
     for _ in range(PASSES):
-        count = overstressed(load, excess, profile, stiff, workspace, tolerance)
+        count = overstressed(sample, load, stiff, workspace, tolerance)
         if count == 0:
             status = SOLVED
             break
@@ -185,18 +176,9 @@ def solve_program(
             status = OVERFULL
             break
         before = size
-        size = append(
-            workspace.factor,
-            size,
-            members,
-            workspace.order,
-            count,
-            grid.column,
-            workspace.diagonal,
-            PIVOT,
-        )
-        extend_forward(workspace.factor, before, size, members, profile, workspace.forward[0])
-        extend_forward(workspace.factor, before, size, members, excess, workspace.forward[1])
+        size = add_members(workspace, size, count)
+        substitute_members(workspace, before, size, sample.profile, 0)
+        substitute_members(workspace, before, size, sample.excess, 1)
         for t in range(before, size):
             inside[members[t]] = True
         failed = size < before + count
@@ -208,36 +190,55 @@ def solve_program(
             below = 0.0
             for t in range(size + 1):
                 node = members[t]
-                above += direction[node] * excess[node]
-                below += direction[node] * profile[node]
+                above += direction[node] * sample.excess[node]
+                below += direction[node] * sample.profile[node]
             settled = above / below >= load - tolerance
             if above / below < bound:
                 bound = above / below
-                for i in range(excess.shape[0]):
+                for i in range(multiplier.shape[0]):
                     multiplier[i] = direction[i] / below
             load = min(load, bound)
         solve_forward(workspace, size, load, solution)
-        if failed:
-            # Members that joined only because the load was too high would slip backwards now.
-            kept = 0
-            while kept < size:
-                kept = 0
-                while kept < size and solution[kept] >= 0.0:
-                    kept += 1
-                if kept < size:
-                    for t in range(kept, size):
-                        inside[members[t]] = False
-                    size = kept
-                    solve_forward(workspace, size, load, solution)
-                    kept = 0
-                    if size == 0:
-                        break
-        apply_stiffness(grid.strip, own, members, size, solution, workspace.halves, stiff)
+        if failed:  # members that joined only because the load was too high
+            size = _without_reversed(workspace, size, load)
+        multiply_members(workspace, size, solution, stiff)
         if settled:  # a cut that lowers the load by round-off only: this is the optimum
             status = SOLVED
-            back_off(load, excess, profile, grid, workspace, size, solution, stiff)
+            _back_off(sample, load, workspace, size, stiff)
             break
     slip[:] = 0.0
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
     return load, status
+
+
+@jit
+def certificate(
+    sample: Sample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
+) -> float:
+    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
+
+    K y is left in ``workspace.vectors[2]``.
+    """
+    n = slip.shape[0]
+    lower = np.inf
+    count = ZERO
+    values = workspace.vectors[1]
+    product = workspace.vectors[2]
+    for i in range(n):
+        balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
+        lower = min(lower, balance / sample.profile[i])
+        if multiplier[i] > 0.0:
+            workspace.members[count] = i
+            values[count] = multiplier[i]
+            count += 1
+    multiply_members(workspace, count, values, product)
+    above = 0.0
+    below = 0.0
+    excess = 0.0
+    for i in range(n):
+        above += multiplier[i] * sample.excess[i]
+        below += multiplier[i] * sample.profile[i]
+        # Round-off may leave A y slightly positive; what this can do to the bound is added to it.
+        excess += max(product[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
+    return max((above + excess) / below - lower, 0.0)

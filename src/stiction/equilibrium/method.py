@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
-from stiction.equilibrium.pieces import pieces_of, refused
-from stiction.equilibrium.plane_solver import PlaneSolver
-from stiction.equilibrium.solver import Solver
+from stiction.equilibrium.sample import pieces_of, refused
+from stiction.equilibrium.solver import Solver, event_variables
 from stiction.model import Real, _count, model
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -36,13 +36,6 @@ AREA = Variable("m2", "area of the patch that becomes unstable first")
 JUMPS = {
     "arrested_events": Variable("1", "number of instabilities that came to rest"),
     "residual_reached": Variable("1", "whether a node was at its residual strength before sliding"),
-}
-_OF_EVENT = ("sample", "event")
-EVENTS = {
-    "event_stress": Variable("Pa", "mean stress at each arrested event", _OF_EVENT),
-    "event_position": Variable("m", "centre of the slip added by the event", _OF_EVENT),
-    "event_length": Variable("m", "length of the patch that slipped", _OF_EVENT),
-    "event_moment": Variable("N", "shear modulus times slip added, per unit depth", _OF_EVENT),
 }
 SLIDING_POSITION = Variable("m", "position of the patch that runs along the whole interface")
 SLIP = Variable("m", "slip at the first instability")
@@ -83,15 +76,12 @@ class Equilibrium:
         rupture (Griffith). Takes 5 to 50 % longer; of 5,250 samples it changed none. On planes
         it is always done.
     events : int
-        Of lines: also return the first so many arrested events of each sample over 'event', nan
-        where there are fewer: a sequence, since stress and slip are carried on from one to the
-        next. `equilibrium_events` has all of them.
+        Also return the first so many arrested events of each sample over 'event', NaN where there
+        are fewer: a sequence, since stress and slip are carried on from one to the next. Their
+        variables are those of `equilibrium_path`.
     gap : float
         Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are always
         solved to round-off.
-    wavenumbers : {"spectral", "lattice"}
-        Of planes: those of the nodes, most accurate, or of a lattice, (2/h) sin(k h/2), whose
-        bounds always meet, at a larger error; see `docs/planes.md`.
 
     Notes
     -----
@@ -125,7 +115,6 @@ class Equilibrium:
     prove_sliding: bool = False
     events: Number = 0
     gap: Gap = 1e-6
-    wavenumbers: Literal["spectral", "lattice"] = "spectral"
     type: Literal["equilibrium"] = "equilibrium"
     first_stage: ClassVar[str] = "local_criterion"
 
@@ -152,19 +141,10 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
         reasons = refused(problem.friction)
-        if problem.interface.is_plane:
-            if not problem.friction.linear and not reasons:
-                reasons.append(
-                    "on a plane it takes strength that falls linearly with slip only; use"
-                    " st.LinearWeakening(...)"
-                )
-            if self.events:
-                reasons.append(
-                    "events are kept of lines only; use st.equilibrium_events(...) for planes"
-                )
-        elif self.wavenumbers != "spectral":
+        if problem.interface.is_plane and not problem.friction.linear and not reasons:
             reasons.append(
-                "wavenumbers is a choice for planes only; leave wavenumbers = 'spectral'"
+                "on a plane it takes strength that falls linearly with slip only; use"
+                " st.LinearWeakening(...)"
             )
         return reasons
 
@@ -182,7 +162,10 @@ class Equilibrium:
             variables |= PATCHES | LENGTH
         variables |= JUMPS | {"sliding_position": position(interface, SLIDING_POSITION)}
         if self.events:
-            variables |= EVENTS
+            variables |= {
+                name: replace(variable, dims=("sample", *variable.dims))
+                for name, variable in event_variables(interface).items()
+            }
         if self.slip:
             variables["slip"] = along(problem.interface, SLIP)
         if self.sensitivity:
@@ -201,12 +184,8 @@ class Equilibrium:
             of nodes is no multiple of four for `discretization_error`. From the solver: if the
             initial stress reaches the strength somewhere.
         """
-        if problem.interface.is_plane:
-            return PlaneSolver(
-                problem, self.sensitivity, self.slip, self.discretization_error, self.gap,
-                self.wavenumbers,
-            )  # fmt: skip
         return Solver(
-            problem, self.sensitivity, self.slip, self.discretization_error, self.prove_sliding,
-            events=self.events,
+            problem, sensitivity=self.sensitivity, slip=self.slip,
+            discretization_error=self.discretization_error, prove_sliding=self.prove_sliding,
+            events=self.events, gap=self.gap,
         )  # fmt: skip

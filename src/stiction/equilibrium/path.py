@@ -1,4 +1,4 @@
-"""The path itself: slip and stress at given loads, up to the onset of global sliding."""
+"""The path of one sample: slip and stress at given loads, and what came to rest on the way."""
 
 from __future__ import annotations
 
@@ -6,19 +6,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from stiction._checks import check_instance, check_memory
 from stiction.arrays import Array
-from stiction.equilibrium.continuation import State, at_rest, exceeds, follow
-from stiction.equilibrium.plane_path import plane_equilibria
-from stiction.equilibrium.prepared import Setting
-from stiction.equilibrium.solver import sample_of
-from stiction.equilibrium.workspace import Sample
-from stiction.errors import InputError
+from stiction.equilibrium.follow import follow
+from stiction.equilibrium.solver import event_table, event_variables, make_program
+from stiction.errors import InputError, warn_accuracy
 from stiction.model import real_array, to_plain
 from stiction.problem import Problem
-from stiction.problem import Sample as Samples
 from stiction.results import Variable, along, coordinate, to_dataset
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -29,33 +24,9 @@ VARIABLES = {
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
     "sliding": Variable("1", "whether the interface as a whole has let go", ("load",)),
 }
-
-
-class Path:
-    """Equilibria of one sample at rising loads.
-
-    Up to the first instability, and while no node is at its residual strength, each is the least
-    solution of one complementarity problem; beyond, the path is followed event by event.
-    """
-
-    def __init__(self, setting: Setting, sample: Sample) -> None:
-        self.setting, self.sample = setting, sample
-        self.state = at_rest(sample)
-        onset = setting.programme(sample.excess, sample.rate)
-        self.simple_to = -np.inf if onset is None else onset.load
-
-    def at(self, load: float) -> State:
-        """The state at a load not below the last one asked for."""
-        if load <= self.state.load:
-            return self.state
-        if load < self.simple_to:
-            found = self.setting.programme(self.sample.excess, self.sample.rate, load)
-            if found is not None and not exceeds(self.sample, found.slip):
-                self.state = State(load, found.slip, found.stiff, self.state.direction)
-                return self.state
-            self.simple_to = -np.inf
-        follow(self.setting, self.sample, self.state, load)
-        return self.state
+EVENT = Variable("1", "event number", ("event",))
+GAP = 1e-6
+"""Relative distance of the bounds of instabilities on planes."""
 
 
 def _check_loads(loads: Any) -> Array:
@@ -83,7 +54,9 @@ def equilibrium_path(
     profiles: Any,
     loads: Any,
 ) -> xr.Dataset:
-    """Slip and stress of one interface at rising loads: patches grow, merge and become unstable.
+    """Return slip and stress of one interface at rising loads, and its arrested events.
+
+    Patches grow, merge and become unstable; an instability that comes to rest is an event.
 
     Parameters
     ----------
@@ -100,10 +73,22 @@ def equilibrium_path(
         `arrested_events` so far, and `sliding`. From the onset of global sliding on slip and
         stress are NaN and `sliding` is true.
 
+        Over 'event', all arrested events up to global sliding, whatever the loads: `event_load`
+        (Pa, tau_0), `event_stress` (Pa, the mean on the interface), `event_position` (m),
+        `event_length` (m) of the patch that slipped, `event_mean_slip` (m, over that length) and
+        `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
+        On planes positions have two components, along 'direction', `event_extent` (m) and
+        `event_area` (m²) take the place of the length, and the moment is in N m.
+
     Raises
     ------
     InputError
         If there is more than one profile or the loads do not rise, and as `onset` does.
+
+    Notes
+    -----
+    A patch jumps to the least equilibrium at the same load: an overdamped interface would stop
+    there. Inertia may carry a rupture through; only `Rupture` decides that.
 
     Examples
     --------
@@ -121,39 +106,43 @@ def equilibrium_path(
         raise InputError(f"profiles: must be one sample, got {rows.samples}")
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
-    find = plane_equilibria if interface.is_plane else _line_equilibria
-    slip, stress, events, sliding = find(problem, rows, given)
+    program = make_program(problem, GAP)
+    sample = program.sample_of(rows, 0)
+    path = follow(program, sample)
+    slip, stress = np.full((2, given.size, interface.size), np.nan)
+    passed = np.array([event.before.load for event in path.events])
+    events = (passed[None, :] < given[:, None]).sum(axis=1)
+    sliding = given > path.last.load
+    state = program.at_rest(sample)
+    for i, load in enumerate(map(float, given[~sliding])):
+        if events[i]:
+            after = path.events[events[i] - 1].after
+            state = max(state, after, key=lambda one: one.load)
+        there = program.at(sample, state, load, fresh=not events[i])
+        if there is None:  # within the accuracy of the load of sliding
+            sliding[i:] = True
+            break
+        state = there
+        slip[i] = state.slip
+        released = program.stress_released(state)
+        stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
+    if not path.known and sliding.any():
+        warn_accuracy(
+            f"no equilibrium was found beyond {path.last.load:g} Pa, and none was ruled out; the"
+            " path ends there"
+        )
+    wide = (given.size, *interface.shape)
     values = {
-        "slip": slip,
-        "stress": stress,
-        "mean_stress": stress.mean(axis=tuple(range(1, stress.ndim))),
+        "slip": slip.reshape(wide),
+        "stress": stress.reshape(wide),
+        "mean_stress": stress.mean(axis=1),
         "arrested_events": events,
         "sliding": sliding,
-    }
-    coordinates = {"load": (given, LOAD)}
-    coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
-    wide = {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    } | event_table(problem, rows, 0, path.events)
+    variables = VARIABLES | event_variables(interface)
+    variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    coordinates = {"load": (given, LOAD), "event": (np.arange(len(path.events)), EVENT)}
+    dims = (*interface.dims, "direction") if interface.is_plane else interface.dims
+    coordinates |= {dim: coordinate(interface, dim) for dim in dims}
     attributes = {"study": {"problem": to_plain(problem)}}
-    return to_dataset(values, VARIABLES | wide, coordinates, attributes)
-
-
-def _line_equilibria(
-    problem: Problem, rows: Samples, loads: Array
-) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.bool_]]:
-    """Slip (m) and stress (Pa), (loads, nodes), arrested events, and whether it slides."""
-    setting = Setting(problem)
-    sample = sample_of(rows, 0, setting.pieces)
-    path = Path(setting, sample)
-    initial = rows.initial_stress[0]
-    slip = np.full((loads.size, problem.interface.size), np.nan)
-    stress = np.full((loads.size, problem.interface.size), np.nan)
-    events = np.zeros(loads.size, dtype=np.int64)
-    sliding = np.zeros(loads.size, dtype=np.bool_)
-    for i, load in enumerate(loads):
-        state = path.at(float(load))
-        events[i] = len(state.events)
-        sliding[i] = state.sliding
-        if not state.sliding:
-            slip[i] = state.slip
-            stress[i] = initial + load * setting.profile - state.stiff
-    return slip, stress, events, sliding
+    return to_dataset(values, variables, coordinates, attributes)

@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.line_stiffness import apply_stiffness
-from stiction.equilibrium.cholesky import append, back_substitute, extend_forward, raise_diagonal
-from stiction.equilibrium.linear_program import PIVOT, singular_direction, solve_forward
-from stiction.equilibrium.pieces import piece_at, start_of
-from stiction.equilibrium.workspace import MOST_MEMBERS, Grid, Sample, Workspace
+from stiction.equilibrium.cholesky import (
+    MOST_MEMBERS,
+    Workspace,
+    add_members,
+    multiply_members,
+    raise_diagonal,
+    singular_direction,
+    solve_first,
+    solve_forward,
+    substitute_members,
+)
+from stiction.equilibrium.sample import Sample, piece_at, start_of
 from stiction.jit import ZERO, jit
 
 REACHED = 0
@@ -29,22 +36,17 @@ REFRESH = 16
 
 
 @jit
-def build(
-    sample: Sample,
-    grid: Grid,
-    slip: Array,
-    piece: NDArray[np.int64],
-    strength: Array,
-    workspace: Workspace,
+def _begin(
+    sample: Sample, slip: Array, piece: NDArray[np.int64], strength: Array, workspace: Workspace
 ) -> int:
     """Strength and diagonal of A for the present pieces; returns how many nodes slip."""
     count = ZERO
-    pieces = sample.pieces
+    own = workspace.stiffness.column[0]
     for i in range(slip.shape[0]):
         workspace.inside[i] = slip[i] > 0.0
-        piece[i] = piece_at(pieces, sample.critical[i], slip[i])
-        strength[i] = start_of(pieces, sample.excess[i], sample.residual[i], piece[i])
-        workspace.diagonal[i] = grid.column[0] - pieces.slopes[piece[i]] * sample.rate[i]
+        piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
+        strength[i] = start_of(sample, i, piece[i])
+        workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
         if workspace.inside[i]:
             workspace.order[count] = i
             count += 1
@@ -52,9 +54,57 @@ def build(
 
 
 @jit
+def _next_event(
+    sample: Sample,
+    load: float,
+    target: float,
+    slip: Array,
+    stiff: Array,
+    piece: NDArray[np.int64],
+    workspace: Workspace,
+    size: int,
+) -> tuple[float, int, int]:
+    """Step of the load to the next event, the node that begins to slip and the member that reaches
+    a corner, -1 for none."""
+    rate, stiff_rate = workspace.vectors[3], workspace.vectors[2]
+    pieces = sample.pieces
+    step = target - load
+    starts = -1
+    ends = -1
+    for i in range(slip.shape[0]):
+        if not workspace.inside[i]:
+            margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
+            closing = sample.profile[i] - stiff_rate[i]
+            if closing > 0.0 and margin < step * closing:
+                step = margin / closing
+                starts = i
+    for t in range(size):
+        i = workspace.members[t]
+        if piece[i] < pieces.ends.shape[0] and rate[t] > 0.0:
+            left = max(pieces.ends[piece[i]] * sample.critical[i] - slip[i], 0.0)
+            if left < step * rate[t]:
+                step = left / rate[t]
+                starts = -1
+                ends = t
+    return step, starts, ends
+
+
+@jit
+def _change_slope(workspace: Workspace, size: int, member: int, before: float, after: float) -> int:
+    """Change the weakening rate of a member in the factor; returns the members still in it."""
+    node = workspace.members[member]
+    workspace.diagonal[node] = workspace.stiffness.column[0] - after
+    if after <= before:
+        raise_diagonal(workspace.factor, size, member, before - after, workspace.vectors)
+        return size
+    # It weakens more steeply: the factor is made anew from there on.
+    workspace.order[: size - member] = workspace.members[member:size]
+    return add_members(workspace, member, size - member)
+
+
+@jit
 def advance(
     sample: Sample,
-    grid: Grid,
     load: float,
     target: float,
     slip: Array,
@@ -66,7 +116,7 @@ def advance(
 
     Parameters
     ----------
-    sample, grid : Sample, Grid
+    sample : Sample
     load : float
         tau_0 (Pa) at which `slip` is a stable equilibrium.
     target : float
@@ -83,102 +133,61 @@ def advance(
         REACHED, UNSTABLE, or CROWDED: more members than the workspace holds.
     """
     n = slip.shape[0]
-    right = workspace.vectors[0]
-    solution = workspace.vectors[1]
-    stiff_rate = workspace.vectors[2]
-    rate = workspace.vectors[3]
+    solution, stiff_rate, rate = workspace.vectors[1], workspace.vectors[2], workspace.vectors[3]
     pieces = sample.pieces
-    last = pieces.ends.shape[0]
     piece = np.zeros(n, np.int64)
     strength = np.empty(n)
-    own = grid.column[0]
-    members, order, diagonal = workspace.members, workspace.order, workspace.diagonal
-    count = build(sample, grid, slip, piece, strength, workspace)
+    members, order = workspace.members, workspace.order
+    count = _begin(sample, slip, piece, strength, workspace)
     if count > MOST_MEMBERS:
         return load, CROWDED
-    size = append(workspace.factor, ZERO, members, order, count, grid.column, diagonal, PIVOT)
+    size = add_members(workspace, ZERO, count)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
         return load, UNSTABLE
-    extend_forward(workspace.factor, ZERO, size, members, sample.profile, workspace.forward[0])
-    extend_forward(workspace.factor, ZERO, size, members, strength, workspace.forward[1])
-    for event in range((1 + last) * n + 1):  # a node begins to slip, and passes each corner, once
-        for t in range(size):
-            right[t] = workspace.forward[0, t]
-        back_substitute(workspace.factor, size, right, rate)
-        apply_stiffness(grid.strip, own, members, size, rate, workspace.halves, stiff_rate)
+    substitute_members(workspace, ZERO, size, sample.profile, 0)
+    substitute_members(workspace, ZERO, size, strength, 1)
+    # A node begins to slip, and passes each corner, once.
+    for event in range((1 + pieces.ends.shape[0]) * n + 1):
+        solve_first(workspace, size, rate)
+        multiply_members(workspace, size, rate, stiff_rate)
         if event % REFRESH == 0:
             solve_forward(workspace, size, load, solution)
-            apply_stiffness(grid.strip, own, members, size, solution, workspace.halves, stiff)
+            multiply_members(workspace, size, solution, stiff)
             for t in range(size):
                 slip[members[t]] = max(solution[t], 0.0)
-        step = target - load
-        starts = -1
-        ends = -1
-        for i in range(n):
-            if not workspace.inside[i]:
-                margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
-                closing = sample.profile[i] - stiff_rate[i]
-                if closing > 0.0 and margin < step * closing:
-                    step = margin / closing
-                    starts = i
-        for t in range(size):
-            i = members[t]
-            if piece[i] < last and rate[t] > 0.0:
-                left = max(pieces.ends[piece[i]] * sample.critical[i] - slip[i], 0.0)
-                if left < step * rate[t]:
-                    step = left / rate[t]
-                    starts = -1
-                    ends = t
+        step, starts, ends = _next_event(sample, load, target, slip, stiff, piece, workspace, size)
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
             slip[members[t]] += step * rate[t]
         for i in range(n):
             stiff[i] += step * stiff_rate[i]
+        changed = size
         if ends >= 0:
             i = members[ends]
             slip[i] = pieces.ends[piece[i]] * sample.critical[i]
             before = pieces.slopes[piece[i]] * sample.rate[i]
             piece[i] += 1
-            strength[i] = start_of(pieces, sample.excess[i], sample.residual[i], piece[i])
+            strength[i] = start_of(sample, i, piece[i])
             after = pieces.slopes[piece[i]] * sample.rate[i]
-            diagonal[i] = own - after
-            if after <= before:
-                raise_diagonal(workspace.factor, size, ends, before - after, workspace.vectors)
-            else:  # it weakens more steeply: the factor is made anew from there on
-                order[: size - ends] = members[ends:size]
-                now = append(
-                    workspace.factor,
-                    ends,
-                    members,
-                    order,
-                    size - ends,
-                    grid.column,
-                    diagonal,
-                    PIVOT,
-                )
-                if now < size:
-                    singular_direction(workspace, now, direction)
-                    return load, UNSTABLE
-            extend_forward(
-                workspace.factor, ends, size, members, sample.profile, workspace.forward[0]
-            )
-            extend_forward(workspace.factor, ends, size, members, strength, workspace.forward[1])
+            now = _change_slope(workspace, size, ends, before, after)
+            if now < size:
+                singular_direction(workspace, now, direction)
+                return load, UNSTABLE
+            changed = ends
         elif starts >= 0:
             if size == MOST_MEMBERS:
                 return load, CROWDED
             order[0] = starts
-            now = append(workspace.factor, size, members, order, 1, grid.column, diagonal, PIVOT)
+            now = add_members(workspace, size, 1)
             if now == size:
                 singular_direction(workspace, size, direction)
                 return load, UNSTABLE
-            extend_forward(
-                workspace.factor, size, now, members, sample.profile, workspace.forward[0]
-            )
-            extend_forward(workspace.factor, size, now, members, strength, workspace.forward[1])
             workspace.inside[starts] = True
             size = now
         else:
             return load, REACHED
+        substitute_members(workspace, changed, size, sample.profile, 0)
+        substitute_members(workspace, changed, size, strength, 1)
     return load, CROWDED

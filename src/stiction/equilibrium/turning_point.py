@@ -1,6 +1,6 @@
 """The turning point of the load, where the stable and the unstable equilibria of a patch meet.
 
-With the patch held by a spring along phi (`controlled_equilibrium`), equilibria exist on both sides
+With the patch held by a spring along phi (`held_equilibrium`), equilibria exist on both sides
 of it. Let a = <phi, d> and mu the force of the spring. On the slipping nodes A d = tau_0 p - s +
 mu phi, and the slope d' = dd/da at fixed load satisfies A d' = mu' phi. At the turning point
 mu = mu' = 0: Newton's method in a (with the slope of mu' by secant) and tau_0.
@@ -17,10 +17,16 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.elasticity.conjugate_gradients import SOLVED, inner, residual_of, solve_inside
-from stiction.elasticity.lowest_eigenvector import lowest_eigenvector
-from stiction.equilibrium.controlled_equilibrium import equilibrate
-from stiction.equilibrium.onset_bracket import ITERATIONS, Bracket
+from stiction.elasticity.linear import (
+    SOLVED,
+    Spring,
+    inner,
+    lowest_eigenvector,
+    residual_of,
+    solve_inside,
+)
+from stiction.equilibrium.bracket import Bracket
+from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
 
 SWITCHES = 4
 """Patches to hold one after the other, at most."""
@@ -31,43 +37,46 @@ RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
 
 
-class State(NamedTuple):
+class Held(NamedTuple):
     """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, d, d' (<phi, d'> = 1)."""
 
     load: float
     amplitude: float
     force: float
-    stiffness: float
+    slope_of_force: float
     relief: float
     slip: Array
     slope: Array
 
 
-def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State | None:
+def _guess(load: float, amplitude: float, slip: Array, slope: Array) -> Held:
+    return Held(load, amplitude, 0.0, 0.0, 0.0, slip, slope)
+
+
+def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:
     """Equilibrium with a patch held; None if something else is unstable.
 
     Parameters
     ----------
     bracket : Bracket
-    held : (nx, ny) array
+    held : (nodes,) array
         phi, unit norm.
-    guess : State
+    guess : Held
         Load, amplitude at which the spring is without force, slip and slope to start from.
     accuracy : float
         Largest residual stress as a share of the mean strength.
     """
-    operator, excess, profile, workspace = (
-        bracket.operator, bracket.excess, bracket.profile, bracket.workspace,
-    )  # fmt: skip
-    load, amplitude = guess.load, guess.amplitude
-    spring = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
+    operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
+    workspace, load, amplitude = bracket.workspace, guess.load, guess.amplitude
+    stiffness = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
+    spring = Spring(stiffness, held)
     slip = guess.slip.copy()
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
-    right = load * profile - excess + (spring * amplitude) * held
+    right = load * profile - excess + (stiffness * amplitude) * held
     status, taken = equilibrate(
-        operator, right, spring, held, inside, slip, bracket.residual, workspace,
-        accuracy * bracket.scale, ITERATIONS,
+        operator, spring, right, inside, slip, bracket.residual, workspace,
+        accuracy * bracket.scale,
     )  # fmt: skip
     bracket.iterations += taken
     if status != SOLVED:
@@ -76,26 +85,26 @@ def hold(bracket: Bracket, held: Array, guess: State, accuracy: float) -> State 
     share = inner(held, slope)
     if not share > 0.0:  # none of the patch slips any more
         return None
-    slope *= 1.0 / (spring * share)
-    residual_of(operator, spring, held, held, slope, bracket.residual)
+    slope *= 1.0 / (stiffness * share)
+    residual_of(operator, spring, held, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
-    tolerance = accuracy * spring * bracket.scale * inner(profile, slope) / cost
+    tolerance = accuracy * stiffness * bracket.scale * inner(profile, slope) / cost
     status, taken = solve_inside(
-        operator, inside, spring, held, slope, bracket.residual, workspace, tolerance, ITERATIONS
+        operator, spring, inside, slope, bracket.residual, workspace, tolerance, ITERATIONS
     )
     bracket.iterations += taken
     if status != SOLVED:
         return None
     share = inner(held, slope)
     reached = inner(held, slip)
-    return State(
-        load, reached, spring * (amplitude - reached), 1.0 / share - spring,
+    return Held(
+        load, reached, stiffness * (amplitude - reached), 1.0 / share - stiffness,
         -inner(profile, slope) / share, slip, slope / share,
     )  # fmt: skip
 
 
-def other_patch(bracket: Bracket) -> Array | None:
+def _other_patch(bracket: Bracket) -> Array | None:
     """The patch that became unstable beside the one that was held, unit norm; None if none did."""
     vector = np.where(bracket.inside, np.abs(bracket.workspace[1]), 0.0)
     if not vector.any():
@@ -110,27 +119,27 @@ def other_patch(bracket: Bracket) -> Array | None:
     return held / np.sqrt(inner(held, held))
 
 
-def load_at(state: State, amplitude: float, curvature: float = 0.0) -> float:
+def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
     """Load without force of the spring at an amplitude, extrapolated from a state, Pa."""
     step = amplitude - state.amplitude
-    force = state.force + (state.stiffness + 0.5 * curvature * step) * step
+    force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.relief
 
 
-def amplitude_between(below: State, above: State, turn: int) -> float:
+def _amplitude_between(below: Held, above: Held, turn: int) -> float:
     """Guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
     if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
-        share = below.stiffness / (below.stiffness - above.stiffness)
-    else:  # mu' has one step, as where a single node joins: where the two `load_at` agree
-        here, there = load_at(below, below.amplitude), load_at(above, below.amplitude)
-        rise = below.stiffness / -below.relief
-        fall = above.stiffness / -above.relief
+        share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
+    else:  # mu' has one step, as where a single node joins: where the two `_load_at` agree
+        here, there = _load_at(below, below.amplitude), _load_at(above, below.amplitude)
+        rise = below.slope_of_force / -below.relief
+        fall = above.slope_of_force / -above.relief
         share = (there - here) / ((rise - fall) * (above.amplitude - below.amplitude))
         share = min(max(share, 0.0), 1.0)
     return below.amplitude + share * (above.amplitude - below.amplitude)
 
 
-def step_across(state: State, step: float, last: float, curvature: float, moved: bool) -> float:
+def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
     """Step of the amplitude that is likely to change the sign of mu'.
 
     `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
@@ -138,9 +147,9 @@ def step_across(state: State, step: float, last: float, curvature: float, moved:
     """
     longest = 0.3 * state.amplitude
     if curvature >= 0.0:
-        return float(np.copysign(longest / 3.0, state.stiffness))
-    newton = -1.2 * state.stiffness / curvature
-    stalled = moved and state.stiffness / last > 0.7
+        return float(np.copysign(longest / 3.0, state.slope_of_force))
+    newton = -1.2 * state.slope_of_force / curvature
+    stalled = moved and state.slope_of_force / last > 0.7
     step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
     return min(max(step, -longest), longest)
 
@@ -162,9 +171,9 @@ def close(
     ----------
     bracket : Bracket
         Changed.
-    held : (nx, ny) array
+    held : (nodes,) array
         phi >= 0, unit norm: the patch.
-    load, slip : float, (nx, ny) array
+    load, slip : float, (nodes,) array
         Guess.
     gap : float
         As a share of the load.
@@ -184,37 +193,38 @@ def close(
     if not slip.any() and not (bracket.excess < load * bracket.profile).any():  # nothing to hold
         load = 0.5 * (bracket.lower + bracket.upper)
     accuracy = 0.05 * gap
-    first: State | None = None
-    below: State | None = None  # mu' > 0, the one with the largest a
-    above: State | None = None
-    guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
+    first: Held | None = None
+    below: Held | None = None  # mu' > 0, the one with the largest a
+    above: Held | None = None
+    guess = _guess(load, inner(held, slip), slip, held)
     step = last = 0.0
     switches = idle = 0
     for turn in range(steps):
-        state = hold(bracket, held, guess, accuracy)
+        state = _hold(bracket, held, guess, accuracy)
         if state is None:
             switches += 1
-            other = other_patch(bracket)
+            other = _other_patch(bracket)
             if switches > SWITCHES or other is None:
                 break
             held = other
             load = min(guess.load, bracket.upper)
             load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
             slip = slip if first is None else first.slip
-            guess = State(load, inner(held, slip), 0.0, 0.0, 0.0, slip, held)
+            guess = _guess(load, inner(held, slip), slip, held)
             first = below = above = None
             step = bend = 0.0
             continue
         before = bracket.gap
         bracket.raise_slip(state.slip)
-        stable = state.stiffness > 0.0
+        stable = state.slope_of_force > 0.0
         if stable:
             below = state
         else:
             above = state
             bracket.raise_multiplier(state.slope)
         if below is not None and above is not None:
-            bracket.raise_multiplier(below.slope * -above.stiffness + above.slope * below.stiffness)
+            fall = -above.slope_of_force
+            bracket.raise_multiplier(below.slope * fall + above.slope * below.slope_of_force)
         if bracket.closed(gap):
             return True, bend
         idle = idle + 1 if bracket.gap > PROGRESS * before else 0
@@ -224,20 +234,18 @@ def close(
         moved = state.amplitude - first.amplitude
         curvature = bend / state.amplitude
         if moved:
-            curvature = (state.stiffness - first.stiffness) / moved
+            curvature = (state.slope_of_force - first.slope_of_force) / moved
         if curvature < 0.0:
             bend = curvature * state.amplitude
         if below is not None and above is not None and below.amplitude < above.amplitude:
-            amplitude = amplitude_between(below, above, turn)
+            amplitude = _amplitude_between(below, above, turn)
             step = amplitude - state.amplitude
-            load = min(load_at(below, amplitude), load_at(above, amplitude))
+            load = min(_load_at(below, amplitude), _load_at(above, amplitude))
         else:
-            step = step_across(state, step, last, curvature, bool(moved))
-            load = load_at(state, state.amplitude + step, min(curvature, 0.0))
-        last = state.stiffness
+            step = _step_across(state, step, last, curvature, bool(moved))
+            load = _load_at(state, state.amplitude + step, min(curvature, 0.0))
+        last = state.slope_of_force
         load = min(load, bracket.upper - 0.3 * gap * bracket.magnitude)
-        guess = State(
-            load, state.amplitude + step, 0.0, 0.0, 0.0,
-            np.maximum(state.slip + step * state.slope, 0.0), state.slope,
-        )  # fmt: skip
+        slip_there = np.maximum(state.slip + step * state.slope, 0.0)
+        guess = _guess(load, state.amplitude + step, slip_there, state.slope)
     return False, bend

@@ -15,7 +15,7 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from stiction.criterion.local import nucleation_stress
-from stiction.equilibrium.plane_patches import critical_patch
+from stiction.equilibrium.patches import critical_patch
 from stiction.errors import InputError
 from stiction.gaps import IN_GAP, listed
 from stiction.interface import Interface

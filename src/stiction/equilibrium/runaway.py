@@ -8,22 +8,27 @@ the runs of every sample.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.elasticity.line import griffith_length
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
-from stiction.equilibrium.instability_jump import (
-    SLIDING,
-    UNDECIDED,
+from stiction.equilibrium.patches import main_patch
+from stiction.equilibrium.sample import (
+    AT_CORNER,
+    Sample,
     step_to_corner,
     strength_at,
     unsupported,
 )
-from stiction.equilibrium.patches import main_patch
-from stiction.equilibrium.pieces import AT_CORNER
-from stiction.equilibrium.workspace import Sample
 from stiction.jit import jit
 from stiction.lanes import multiply_add
+
+SLIDING = 0
+ARRESTED = 1
+UNDECIDED = 2
 
 STEPS = 30
 """Elastic steps; most samples need five to eight."""
@@ -56,25 +61,61 @@ def block_factor(column: Array, width: int) -> Array:
     return factor
 
 
+class Runs(NamedTuple):
+    """What the test needs of a line.
+
+    Attributes
+    ----------
+    wide_column : (3 n,) array
+        First column of K, three times over, Pa/m.
+    factor, longest : array and int
+        From `block_factor`, for runs of so many nodes.
+    spacing, modulus : float
+        m and G* (Pa).
+    caution : float
+        Factor on Griffith's length; infinite where no length counts as unstoppable.
+    """
+
+    wide_column: Array
+    factor: Array
+    longest: int
+    spacing: float
+    modulus: float
+    caution: float
+
+
 @jit
-def _add_scaled(target: Array, source: Array, first: int, count: int, factor: float) -> None:
-    part = source[first : first + count]
-    for i in range(count):
+def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
+    """Nodes in a row at their residual strength that nothing on the interface stops.
+
+    Griffith's length with the least stress drop and the largest fracture energy, which is
+    (tau_p - tau_r) d_c times the area under the law.
+    """
+    drop = np.inf
+    energy = 0.0
+    for i in range(sample.excess.shape[0]):
+        drop = min(drop, load * sample.profile[i] - sample.residual[i])
+        fall = sample.excess[i] - sample.residual[i]
+        energy = max(energy, sample.pieces.area * fall * sample.critical[i])
+    return runs.caution * griffith_length(drop, energy, runs.modulus) / runs.spacing
+
+
+@jit
+def _add_scaled(target: Array, source: Array, first: int, factor: float) -> None:
+    part = source[first : first + target.shape[0]]
+    for i in range(target.shape[0]):
         target[i] = multiply_add(factor, part[i], target[i])
 
 
 @jit
 def runs_away(
     sample: Sample,
-    wide_column: Array,
+    runs: Runs,
     load: float,
     slip: Array,
     stiff: Array,
     direction: Array,
     stiff_direction: Array,
-    griffith: float,
-    factor: Array,
-    width: int,
     work: Array,
 ) -> int:
     """Whether the patch of an instability certainly becomes global sliding.
@@ -82,8 +123,7 @@ def runs_away(
     Parameters
     ----------
     sample : Sample
-    wide_column : (3 n,) array
-        First column of K, three times over.
+    runs : Runs
     load : float
         tau_0, Pa.
     slip : (n,) array, changed
@@ -92,10 +132,6 @@ def runs_away(
         K d of that state.
     direction, stiff_direction : (n,) arrays
         In which it is unstable, and K times it.
-    griffith : float
-        Griffith's critical crack length, in nodes: so many residual ones in a row nothing stops.
-    factor, width : array and int
-        From `block_factor`.
     work : (6, n) array
 
     Returns
@@ -104,20 +140,17 @@ def runs_away(
         SLIDING or UNDECIDED.
     """
     n = slip.shape[0]
+    griffith = unstoppable_length(sample, load, runs)
     step = step_to_corner(sample, slip, direction, np.inf)
     if not np.isfinite(step):
         return SLIDING
     first, length, _ = main_patch(direction)
-    if (np.isfinite(griffith) and griffith > width) or length > width:
+    if (np.isfinite(griffith) and griffith > runs.longest) or length > runs.longest:
         return UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     origin = (first - (n - length) // 2) % n
-    grown = work[0]
-    drive = work[1]
-    extra = work[2]
-    forward = work[3]
-    solution = work[4]
-    push = work[5]
+    grown, drive, extra = work[0], work[1], work[2]
+    forward, solution, push = work[3], work[4], work[5]
     grown[:] = 0.0
     extra[:] = 0.0
     for q in range(n):
@@ -140,14 +173,14 @@ def runs_away(
                 break
             end += 1
         length = end - begin
-        if length > width:
+        if length > runs.longest:
             return UNDECIDED
         for t in range(length):
             q = begin + t
             i = (origin + q) % n
             drive[t] = max(push[q] - extra[q] - strength_at(sample, slip, i), 0.0)
-        substitute(factor, length, drive, forward)
-        back_substitute(factor, length, forward, solution)
+        substitute(runs.factor, length, drive, forward)
+        back_substitute(runs.factor, length, forward, solution)
         run = 0
         longest = 0
         largest = 0.0
@@ -168,5 +201,5 @@ def runs_away(
         high = min(end + length // 2, n)
         extra[low:high] = 0.0
         for q in range(begin, end):
-            _add_scaled(extra[low:high], wide_column, n + low - q, high - low, grown[q])
+            _add_scaled(extra[low:high], runs.wide_column, n + low - q, grown[q])
     return UNDECIDED

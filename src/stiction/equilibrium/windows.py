@@ -16,8 +16,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.inner_product import dot
-from stiction.elasticity.line_stiffness import stiffness_column
+from stiction.elasticity.line import stiffness_column
+from stiction.elasticity.linear import dot
+from stiction.equilibrium.sample import Sample
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.jit import jit
 
@@ -171,10 +172,9 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
 
 
 @jit
-def _window_value(
-    excess: Array, profile: Array, mode: Array, width: int, start: int
-) -> tuple[float, float]:
+def _window_value(sample: Sample, mode: Array, width: int, start: int) -> tuple[float, float]:
     """Weighted sums of the strength and of the load profile over a window on the circle."""
+    excess, profile = sample.excess, sample.profile
     first = min(width, excess.shape[0] - start)
     rest = width - first
     above = dot(excess[start:], mode, first) + dot(excess, mode[first:], rest)
@@ -183,10 +183,34 @@ def _window_value(
 
 
 @jit
-def window_bound(
-    excess: Array, profile: Array, rate: Array, windows: Windows, work: Array
-) -> tuple[float, int, int]:
-    """Lowest bound over the windows and the uniform field.
+def _count_fast(rate: Array, threshold: float, length: Array) -> None:
+    """How many nodes in a row, from each on, weaken at least as fast as a threshold."""
+    n = rate.shape[0]
+    run = 0.0
+    for q in range(2 * n - 1, -1, -1):
+        i = q if q < n else q - n
+        run = run + 1.0 if rate[i] >= threshold else 0.0
+        length[i] = run
+
+
+@jit
+def _write_multiplier(sample: Sample, start: int, mode: Array, multiplier: Array) -> None:
+    """Write the multiplier of a window (without a mode: of the uniform field), <p, y> = 1."""
+    n = multiplier.shape[0]
+    width = mode.shape[0]
+    multiplier[:] = 1.0 if width == 0 else 0.0
+    for q in range(width):
+        multiplier[(start + q) % n] = mode[q]
+    weight = 0.0
+    for i in range(n):
+        weight += multiplier[i] * sample.profile[i]
+    for i in range(n):
+        multiplier[i] /= weight
+
+
+@jit
+def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: Array) -> float:
+    """Lowest bound over the windows and the uniform field, Pa, and its multiplier.
 
     A weighted mean over a window hardly changes as the window moves by a sixteenth of its width:
     only every such place is looked at, and then the nodes about the best one. Whichever window is
@@ -194,17 +218,13 @@ def window_bound(
 
     Parameters
     ----------
-    excess, profile, rate : (n,) arrays
-        tau_p - tau_i (Pa), load profile, weakening rate (Pa/m).
+    sample : Sample
     windows : Windows
-    work : (>= 1, n) array
-
-    Returns
-    -------
-    bound, start, choice : float, int, int
-        Load (Pa), first node of the window, and its number; -1 is the uniform field.
+    allowed : (n,) array, work space
+    multiplier : (n,) array, output
     """
-    n = excess.shape[0]
+    rate = sample.rate
+    n = rate.shape[0]
     start = 0
     choice = -1
     above = 0.0
@@ -212,12 +232,11 @@ def window_bound(
     lowest = rate[0]
     highest = rate[0]
     for i in range(n):
-        above += excess[i]
-        below += profile[i]
+        above += sample.excess[i]
+        below += sample.profile[i]
         lowest = min(lowest, rate[i])
         highest = max(highest, rate[i])
     best = above / below
-    allowed = work[0]
     for c in range(windows.thresholds.shape[0]):
         threshold = windows.thresholds[c]
         if threshold > highest:
@@ -226,12 +245,7 @@ def window_bound(
         mode = windows.modes[c]
         everywhere = threshold <= lowest
         if not everywhere:
-            # How many nodes in a row, from this one on, weaken fast enough.
-            length = 0.0
-            for q in range(2 * n - 1, -1, -1):
-                i = q if q < n else q - n
-                length = length + 1.0 if rate[i] >= threshold else 0.0
-                allowed[i] = length
+            _count_fast(rate, threshold, allowed)
         stride = max(1, width // STRIDES)
         low, high = 0, n
         while True:
@@ -239,7 +253,7 @@ def window_bound(
             for a in range(low, high, stride):
                 i = a % n
                 if everywhere or allowed[i] >= width:
-                    above, below = _window_value(excess, profile, mode, width, i)
+                    above, below = _window_value(sample, mode, width, i)
                     if above < best * below:
                         best = above / below
                         found = i
@@ -252,4 +266,6 @@ def window_bound(
             stride = 1
         if everywhere:
             break  # wider windows are unstable too, but bound less tightly
-    return best, start, choice
+    width = 0 if choice < 0 else windows.widths[choice]
+    _write_multiplier(sample, start, windows.modes[max(choice, 0)][:width], multiplier)
+    return best

@@ -1,4 +1,4 @@
-"""The static stiffness K on the grid: its first column in closed form, its product with a slip.
+"""The static stiffness K of a line on its nodes: the first column in closed form, its product.
 
 K is the circulant matrix of the symbol (G*/2)|k|. For an even number of nodes n its entries are
 
@@ -8,6 +8,8 @@ so that nodes of one parity act on those of the other only: half of each product
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,25 +38,26 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     return column
 
 
-def coupling_strip(column: Array) -> Array:
-    """Odd entries of K's first column, three times over, for products without index arithmetic."""
-    return np.ascontiguousarray(np.tile(column[1::2], 3))
+class Stiffness(NamedTuple):
+    """K of a line: its first column (n,), and the odd entries of it three times over, Pa/m."""
+
+    column: Array
+    strip: Array
+
+
+def make_stiffness(column: Array) -> Stiffness:
+    """Return the stiffness with a first column; the strip spares products index arithmetic."""
+    return Stiffness(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
 
 
 @jit
 def _add_four(
-    target: Array,
-    strip: Array,
-    half: int,
-    p0: int,
-    p1: int,
-    p2: int,
-    p3: int,
-    z0: float,
-    z1: float,
-    z2: float,
-    z3: float,
+    target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
+    """Add to one half of a product what four nodes contribute."""
+    half = target.shape[0]
+    p0, p1, p2, p3 = places
+    z0, z1, z2, z3 = values
     a = strip[p0 : p0 + half]
     b = strip[p1 : p1 + half]
     c = strip[p2 : p2 + half]
@@ -68,16 +71,13 @@ def _add_four(
 
 @jit
 def apply_stiffness(
-    strip: Array, own: float, members: Array, size: int, values: Array, halves: Array, result: Array
+    stiffness: Stiffness, members: Array, size: int, values: Array, halves: Array, result: Array
 ) -> None:
     """K times a field that vanishes off the members, at all nodes.
 
     Parameters
     ----------
-    strip : (3 n/2,) array
-        From `coupling_strip`.
-    own : float
-        K_0.
+    stiffness : Stiffness
     members, size : (n,) int array and int
         Where the field is not zero.
     values : (>= size,) array
@@ -85,6 +85,7 @@ def apply_stiffness(
     halves : (2, n/2) array, work space
     result : (n,) array, output
     """
+    strip = stiffness.strip
     half = halves.shape[1]
     halves[:] = 0.0
     for parity in range(2):
@@ -102,13 +103,30 @@ def apply_stiffness(
             z0, z1, z2, z3 = values[t], z0, z1, z2
             held += 1
             if held == 4:
-                _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3)
+                _add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
                 held = 0
                 z0 = z1 = z2 = z3 = 0.0
         if held > 0:
-            _add_four(target, strip, half, p0, p1, p2, p3, z0, z1, z2, z3)
+            _add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
     for q in range(half):
         result[2 * q] = halves[0, q]
         result[2 * q + 1] = halves[1, q]
     for t in range(size):
-        result[members[t]] += own * values[t]
+        result[members[t]] += stiffness.column[0] * values[t]
+
+
+@jit
+def griffith_length(drop: float, energy: float, modulus: float) -> float:
+    """Critical length of a crack (m), infinite without a stress drop.
+
+    A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith,
+    1921), and grows where that is more than the fracture energy.
+
+    Parameters
+    ----------
+    drop, energy, modulus : float
+        D (Pa), fracture energy (J/m²), G* (Pa).
+    """
+    if drop <= 0.0:
+        return np.inf
+    return 4.0 * modulus * energy / (np.pi * drop * drop)

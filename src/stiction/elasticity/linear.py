@@ -1,0 +1,251 @@
+"""Linear algebra with K - W cut to a set of nodes: conjugate gradients, the lowest eigenvector.
+
+The slip of given nodes solves A d = drive with A = K - W cut to them. A spring may hold a patch:
+A + spring phi phi^T is positive definite also where A has one direction phi of negative curvature,
+so that states on and beyond the turning point of the load can be solved for. The preconditioner is
+1/(K(k) + W/2), cut too.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.arrays import Array
+from stiction.elasticity.operator import Operator, filtered, product
+from stiction.jit import jit
+from stiction.lanes import LANES, add, load, multiply_add, total, zeros
+
+SOLVED = 0
+NEGATIVE = 1
+EXHAUSTED = 2
+
+Mask = NDArray[np.bool_]
+
+
+@jit
+def dot(first: Array, second: Array, count: int) -> float:
+    """Sum of products; numpy's own takes threads for long arrays, and then depends on how many."""
+    a = zeros()
+    b = zeros()
+    c = zeros()
+    d = zeros()
+    t = 0
+    while t + 4 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        c = multiply_add(load(first, t + 2 * LANES), load(second, t + 2 * LANES), c)
+        d = multiply_add(load(first, t + 3 * LANES), load(second, t + 3 * LANES), d)
+        t += 4 * LANES
+    if t + 2 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        t += 2 * LANES
+    if t + LANES <= count:
+        c = multiply_add(load(first, t), load(second, t), c)
+        t += LANES
+    rest = 0.0
+    while t < count:
+        rest = multiply_add(first[t], second[t], rest)
+        t += 1
+    return total(add(add(a, b), add(c, d))) + rest
+
+
+@jit
+def inner(a: Array, b: Array) -> float:
+    """Sum of products over all nodes of two fields."""
+    return dot(a, b, a.size)
+
+
+@jit
+def add_scaled(target: Array, factor: float, source: Array) -> None:
+    """`target` += factor * source."""
+    for i in range(target.size):
+        target[i] += factor * source[i]
+
+
+@jit
+def restrict(field: Array, inside: Mask) -> None:
+    """Set a field to zero outside a set of nodes."""
+    for i in range(field.size):
+        if not inside[i]:
+            field[i] = 0.0
+
+
+@jit
+def largest_inside(field: Array, inside: Mask) -> float:
+    """Largest absolute value of a field on a set of nodes."""
+    most = 0.0
+    for i in range(field.size):
+        if inside[i]:
+            most = max(most, abs(field[i]))
+    return most
+
+
+class Spring(NamedTuple):
+    """A spring that holds a patch: its stiffness (Pa/m; 0 for none) and phi, of unit norm."""
+
+    stiffness: float
+    shape: Array
+
+
+def no_spring(nodes: int) -> Spring:
+    """Return a spring that holds nothing."""
+    return Spring(0.0, np.zeros(nodes))
+
+
+@jit
+def residual_of(operator: Operator, spring: Spring, right: Array, x: Array, out: Array) -> None:
+    """`out` = right - (A + spring phi phi^T) x at every node."""
+    product(operator, x, out)
+    force = spring.stiffness * inner(spring.shape, x) if spring.stiffness > 0.0 else 0.0
+    for i in range(out.size):
+        out[i] = right[i] - out[i] - force * spring.shape[i]
+
+
+@jit
+def solve_inside(
+    operator: Operator,
+    spring: Spring,
+    inside: Mask,
+    x: Array,
+    residual: Array,
+    workspace: Array,
+    tolerance: float,
+    iterations: int,
+) -> tuple[int, int]:
+    """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
+
+    Parameters
+    ----------
+    operator, spring
+    inside : (nodes,) bool array
+    x : (nodes,) array, changed
+        Guess, then solution; zero outside.
+    residual : (nodes,) array, changed
+        Of the guess on entry, as from `residual_of`; afterwards that of the solution, zero outside.
+    workspace : (3, nodes) array
+        Overwritten; ``workspace[1]`` is the direction of negative curvature, if one is met.
+    tolerance : float
+        Largest residual allowed at a node, Pa.
+    iterations : int
+
+    Returns
+    -------
+    status, iterations : int
+        SOLVED, NEGATIVE (curvature) or EXHAUSTED; and how many iterations it took.
+    """
+    z, direction, image = workspace[0], workspace[1], workspace[2]
+    restrict(residual, inside)
+    previous = 0.0
+    for iteration in range(iterations):
+        if largest_inside(residual, inside) <= tolerance:
+            return SOLVED, iteration
+        filtered(operator, operator.inverse, residual, z)
+        restrict(z, inside)
+        now = inner(residual, z)
+        ratio = now / previous if previous > 0.0 else 0.0
+        previous = now
+        for i in range(direction.size):
+            direction[i] = z[i] + (ratio * direction[i] if ratio > 0.0 else 0.0)
+        product(operator, direction, image)
+        if spring.stiffness > 0.0:
+            add_scaled(image, spring.stiffness * inner(spring.shape, direction), spring.shape)
+        restrict(image, inside)
+        curvature = inner(direction, image)
+        if curvature <= 0.0:
+            return NEGATIVE, iteration + 1
+        step = now / curvature
+        add_scaled(x, step, direction)
+        add_scaled(residual, -step, image)
+    return EXHAUSTED, iterations
+
+
+@jit
+def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
+    """`out` = the second to last vectors of a basis with these weights; the first is scaled."""
+    out[:] = 0.0
+    for k in range(1, count):
+        add_scaled(out, weights[k], basis[k])
+    basis[2] = out
+    basis[0] *= weights[0]
+    basis[0] += out
+
+
+@jit
+def lowest_eigenvector(
+    operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
+) -> tuple[float, int]:
+    """Smallest eigenvalue of A on the nodes `inside`, by single-vector LOBPCG (Knyazev 2001).
+
+    Parameters
+    ----------
+    operator : Operator
+    inside : (nodes,) bool array
+    vector : (nodes,) array, changed
+        Guess, then the eigenvector: unit norm, positive sum, zero outside.
+    tolerance : float
+        Norm of A y - lambda y at which to stop, Pa/m.
+    iterations : int
+
+    Returns
+    -------
+    value : float
+        lambda, Pa/m.
+    iterations : int
+    """
+    nodes = vector.size
+    basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction
+    images = np.empty((3, nodes))
+    moved = np.empty(nodes)
+    basis[0] = vector
+    restrict(basis[0], inside)
+    basis[0] *= 1.0 / np.sqrt(inner(basis[0], basis[0]))
+    product(operator, basis[0], images[0])
+    restrict(images[0], inside)
+    value = inner(basis[0], images[0])
+    count = 2
+    taken = 0
+    while taken < iterations:
+        moved[:] = images[0]
+        add_scaled(moved, -value, basis[0])
+        if np.sqrt(inner(moved, moved)) <= tolerance:
+            break
+        taken += 1
+        filtered(operator, operator.inverse, moved, basis[1])
+        restrict(basis[1], inside)
+        product(operator, basis[1], images[1])
+        restrict(images[1], inside)
+        for k in range(1, count):  # orthonormal, so that the small problem is a plain one
+            for _ in range(2):
+                for m in range(k):
+                    overlap = inner(basis[k], basis[m])
+                    add_scaled(basis[k], -overlap, basis[m])
+                    add_scaled(images[k], -overlap, images[m])
+            norm = np.sqrt(inner(basis[k], basis[k]))
+            if norm < 1e-14:
+                count = k
+                break
+            basis[k] *= 1.0 / norm
+            images[k] *= 1.0 / norm
+        if count < 2:
+            break
+        small = np.empty((count, count))
+        for k in range(count):
+            for m in range(count):
+                small[k, m] = inner(basis[k], images[m])
+        values, vectors = np.linalg.eigh(0.5 * (small + small.T))
+        value = values[0]
+        weights = np.ascontiguousarray(vectors[:, 0])
+        _combine(basis, weights, count, moved)
+        _combine(images, weights, count, moved)
+        scale = 1.0 / np.sqrt(inner(basis[2], basis[2]))
+        basis[2] *= scale
+        images[2] *= scale
+        count = 3
+    vector[:] = basis[0]
+    if vector.sum() < 0.0:
+        vector *= -1.0
+    return value, taken

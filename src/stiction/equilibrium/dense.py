@@ -1,0 +1,466 @@
+"""The programme of lines: one dense factor, or conjugate gradients where the line is long."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.arrays import Array
+from stiction.elasticity.line import Stiffness, apply_stiffness, make_stiffness, stiffness_column
+from stiction.elasticity.linear import dot
+from stiction.equilibrium.cholesky import Workspace, make_workspace
+from stiction.equilibrium.follow import Jump, State
+from stiction.equilibrium.jump import jump
+from stiction.equilibrium.linear_program import (
+    OVERFULL,
+    SOLVED,
+    Solution,
+    certificate,
+    solve_program,
+)
+from stiction.equilibrium.long_line import LongLine, runs_away_alone
+from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.runaway import (
+    ARRESTED,
+    SLIDING,
+    UNDECIDED,
+    Runs,
+    block_factor,
+    runs_away,
+    unstoppable_length,
+)
+from stiction.equilibrium.sample import (
+    AT_CORNER,
+    Pieces,
+    Sample,
+    exceeds,
+    make_sample,
+    pieces_of,
+    present_pieces,
+    refused,
+    sample_of,
+)
+from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
+from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
+from stiction.errors import InputError
+from stiction.jit import jit
+from stiction.problem import Problem
+from stiction.problem import Sample as Samples
+
+LONGEST_RUN = 2048
+"""Nodes up to which the quick test for arrest follows a run."""
+LONG_LINE = 4096
+"""Nodes from which on conjugate gradients may be faster."""
+MANY_NODES = 600
+"""Nodes weaker than the upper bound of the load from which on they are."""
+WIDEST_PATCH = 256
+"""Nodes in the nucleation length beyond which a long line takes too long: the slipping nodes are
+too many for a dense factor, and a patch is as wide as a segment of the preconditioner."""
+PATIENCE = 1000
+"""Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
+MARGIN = 1.5
+"""Safety on the length at which a rupture counts as unstoppable."""
+
+LOAD, GAP, PATCHES, POSITION, LENGTH, OUTCOME = range(6)
+COLUMNS = 6
+CORNER_REACHED = 3
+"""Outcome of a sample in which a corner of the law is reached before the first instability."""
+
+
+class Line(NamedTuple):
+    """What is the same for all samples of a line.
+
+    `usual` is the window at the problem's uniform weakening rate, `usual_rate`, or NaN.
+    """
+
+    stiffness: Stiffness
+    pieces: Pieces
+    runs: Runs
+    usual_rate: float
+    usual: Windows
+
+
+class First(NamedTuple):
+    """First instabilities of many samples.
+
+    Attributes
+    ----------
+    table : (samples, COLUMNS) array
+    slip, multiplier : (samples, n) arrays
+        d (where the outcome is undecided, or all if asked for) and y.
+    stiff, ahead : (samples, n) arrays
+        Where the outcome is undecided: K d, and a lower bound of the slip after the jump.
+    """
+
+    table: Array
+    slip: Array
+    multiplier: Array
+    stiff: Array
+    ahead: Array
+
+
+@jit
+def judge(
+    sample: Sample,
+    line: Line,
+    first: First,
+    row: int,
+    slip: Array,
+    stiff: Array,
+    all_slips: bool,
+    workspace: Workspace,
+    work: Array,
+) -> None:
+    """Write what the programme of a sample says, and test quickly whether it runs away.
+
+    Its load and multiplier are in their places; `slip` is changed.
+    """
+    load = first.table[row, LOAD]
+    multiplier = first.multiplier[row]
+    gap = certificate(sample, slip, stiff, multiplier, workspace)
+    _, length, centre = main_patch(multiplier)
+    spacing = line.runs.spacing
+    outcome = UNDECIDED
+    for i in range(slip.shape[0]):
+        corner = line.pieces.ends[0] * sample.critical[i]
+        if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
+            outcome = CORNER_REACHED
+    if all_slips or outcome == UNDECIDED:
+        first.slip[row] = slip
+    first.table[row, PATCHES] = count_patches(slip)
+    if outcome == UNDECIDED:
+        outcome = runs_away(
+            sample, line.runs, load, slip, stiff, multiplier, workspace.vectors[2], work
+        )
+        if outcome == UNDECIDED:
+            first.stiff[row] = stiff
+            first.ahead[row] = slip
+    first.table[row, GAP] = gap
+    first.table[row, POSITION] = centre * spacing
+    first.table[row, LENGTH] = length * spacing
+    first.table[row, OUTCOME] = outcome
+
+
+@jit
+def solve_batch(
+    excess: Array,
+    residual: Array,
+    profile: Array,
+    rate: Array,
+    line: Line,
+    others: Windows,
+    all_slips: bool,
+    first: First,
+) -> None:
+    """Solve the programme for each row and test quickly whether its instability is arrested.
+
+    Parameters
+    ----------
+    excess, residual, rate : (samples, n) arrays
+        tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
+    profile : (n,) array
+    line : Line
+    others : Windows
+        For samples with another weakening rate than the usual one anywhere.
+    all_slips : bool
+    first : First, output
+    """
+    samples, n = excess.shape
+    workspace = make_workspace(line.stiffness)
+    slip = np.empty(n)
+    stiff = np.empty(n)
+    work = np.empty((6, n))
+    for row in range(samples):
+        sample = make_sample(excess[row], residual[row], profile, rate[row], line.pieces)
+        windows = line.usual
+        for i in range(n):
+            workspace.diagonal[i] = line.stiffness.column[0] - sample.rate[i]
+            if rate[row, i] != line.usual_rate:
+                windows = others
+        multiplier = first.multiplier[row]
+        bound = window_bound(sample, windows, work[0], multiplier)
+        # If it does not succeed, the certificate says so.
+        load, _ = solve_program(sample, bound, np.inf, multiplier, slip, stiff, workspace)
+        first.table[row, LOAD] = load
+        judge(sample, line, first, row, slip, stiff, all_slips, workspace, work)
+
+
+class LineProgram:
+    """Equilibria of a line; safe to use from several threads.
+
+    Parameters
+    ----------
+    problem : Problem
+    every : int
+        Which nodes of the problem are taken: all, or every second one.
+    prove_sliding : bool
+        Whether no length of a rupture counts as unstoppable.
+
+    Raises
+    ------
+    InputError
+        If the law has no straight pieces, or the grid is far too fine.
+    """
+
+    widest_gap = 1e-9
+    """Certificate gap, as a share of the load, from which on there is a warning."""
+    at_corner = AT_CORNER
+
+    def __init__(self, problem: Problem, every: int = 1, prove_sliding: bool = False) -> None:
+        if reasons := refused(problem.friction):
+            raise InputError(reasons)
+        self.problem = problem
+        self.pieces = pieces_of(problem.friction)
+        self.nodes = problem.interface.size // every
+        self.spacing = problem.interface.spacing * every
+        modulus = problem.effective_modulus
+        self.unit = np.pi * modulus / problem.interface.extent
+        rate = problem.friction.weakening_rate
+        if rate is not None:
+            self.refuse_too_fine(float(np.max(rate)))
+        uniform = rate is not None and np.ptp(rate) == 0.0
+        usual = float(np.max(rate)) if uniform else np.nan
+        column = stiffness_column(self.nodes, problem.interface.extent, modulus)
+        longest = min(LONGEST_RUN, self.nodes - 1)
+        self.line = Line(
+            make_stiffness(column),
+            self.pieces,
+            Runs(
+                np.tile(column, 3), block_factor(column, longest), longest, self.spacing, modulus,
+                np.inf if prove_sliding else 1.0,
+            ),
+            usual,
+            exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
+        )  # fmt: skip
+
+    def refuse_too_fine(self, steepest_rate: float) -> None:
+        """Raise `InputError` where a grid is so much too fine that it would take minutes."""
+        resolution = self.problem.nucleation_lengths(steepest_rate)[0] / self.spacing
+        if self.nodes < LONG_LINE or resolution <= WIDEST_PATCH:
+            return
+        share = int(np.ceil(resolution / WIDEST_PATCH))
+        raise InputError(
+            f"interface.nodes: the nucleation length spans {resolution:.4g} of {self.nodes} nodes;"
+            f" on grids of {LONG_LINE} nodes or more Equilibrium takes at most {WIDEST_PATCH} of"
+            " them (it would need minutes a sample, and 64 leave an error of 3e-5). Take"
+            f" every {share}th node or fewer, interface.nodes <= {self.nodes // (2 * share) * 2}"
+        )
+
+    def sample_of(self, rows: Samples, row: int) -> Sample:
+        """Return one row of a batch."""
+        return sample_of(rows, row, self.pieces)
+
+    def _windows(self, rates: Array) -> Windows:
+        """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""
+        moving = rates[rates > 0.0]
+        if moving.size == 0:
+            return _no_windows()
+        return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
+
+    def bound(self, sample: Sample) -> tuple[float, Array]:
+        """Return the discrete local bound of one sample (Pa), and its multiplier."""
+        usual = bool(np.all((sample.rate == self.line.usual_rate) | (sample.rate == 0.0)))
+        windows = self.line.usual if usual else self._windows(sample.rate)
+        multiplier = np.empty(self.nodes)
+        load = window_bound(sample, windows, np.empty(self.nodes), multiplier)
+        return load, multiplier
+
+    def programme(self, sample: Sample, cap: float = np.inf) -> Solution | None:
+        """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
+
+        Parameters
+        ----------
+        sample : Sample
+            Only the first piece of its law counts: `excess` and `rate`.
+        cap : float
+            Load (Pa) not to go beyond.
+        """
+        bound, multiplier = self.bound(sample)
+        long = self.nodes >= LONG_LINE
+        if long and np.count_nonzero(sample.excess < bound * sample.profile) > MANY_NODES:
+            found = LongLine(sample, self.line.stiffness, bound, multiplier, cap).run(PATIENCE)
+            if found.status == SOLVED:
+                return found
+        # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
+        workspace = self._workspace(sample)
+        slip, stiff = np.empty((2, self.nodes))
+        lowest = multiplier.copy()
+        load, status = solve_program(sample, bound, cap, lowest, slip, stiff, workspace)
+        if status == SOLVED:
+            return Solution(load, slip, stiff, lowest)
+        if status == OVERFULL:
+            found = LongLine(sample, self.line.stiffness, bound, multiplier, cap).run()
+            if found.status == SOLVED:
+                return found
+        return None
+
+    def _workspace(self, sample: Sample) -> Workspace:
+        workspace = make_workspace(self.line.stiffness)
+        workspace.diagonal[:] = self.line.stiffness.column[0] - sample.rate
+        return workspace
+
+    def first(self, rows: Samples, slips: bool) -> tuple[First, dict[int, State | None]]:
+        """Return the first instability of each row by the programme.
+
+        Also the rows to be followed from there, or, None, from the start, as a corner of the law
+        is reached before; all others run away.
+        """
+        self.refuse_too_fine(float(rows.weakening_rate.max()))
+        shape = rows.strength.shape
+        # What is never written takes no memory.
+        first = First(np.empty((shape[0], COLUMNS)), *np.empty((4, *shape)))
+        if self.nodes < LONG_LINE:
+            rate = np.ascontiguousarray(rows.weakening_rate)
+            unusual = rate[np.any(rate != self.line.usual_rate, axis=1)]
+            solve_batch(
+                np.ascontiguousarray(rows.strength - rows.initial_stress),
+                np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
+                np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
+            )  # fmt: skip
+        else:
+            for row in range(shape[0]):
+                self._solve_long(self.sample_of(rows, row), row, slips, first)
+        states: dict[int, State | None] = {}
+        for row in map(int, np.flatnonzero(first.table[:, OUTCOME] != SLIDING)):
+            states[row] = None
+            if first.table[row, OUTCOME] == UNDECIDED:
+                states[row] = State(
+                    float(first.table[row, LOAD]), first.slip[row].copy(), first.stiff[row],
+                    first.multiplier[row].copy(), ahead=first.ahead[row],
+                )  # fmt: skip
+        return first, states
+
+    def _solve_long(self, sample: Sample, row: int, slips: bool, first: First) -> None:
+        """Solve the programme of one row of a long line."""
+        found = self.programme(sample)
+        if found is None:  # followed event by event instead
+            first.table[row] = 0.0
+            first.table[row, GAP] = np.nan
+            first.multiplier[row] = 0.0
+            first.table[row, OUTCOME] = CORNER_REACHED
+            return
+        first.table[row, LOAD] = found.load
+        first.multiplier[row] = found.multiplier
+        judge(
+            sample, self.line, first, row, found.slip, found.stiff, slips, self._workspace(sample),
+            np.empty((6, self.nodes)),
+        )  # fmt: skip
+
+    def at_rest(self, sample: Sample) -> State:
+        """Return the state in which the first node is about to slip."""
+        load = float((sample.excess / sample.profile).min())
+        return State(load, *np.zeros((3, self.nodes)))
+
+    def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
+        """Return the next instability, or the state at a load before it.
+
+        It is the programme of the present pieces if no node reaches another corner before it; that
+        is not tried from rest, where it has been, nor after it once failed: most others would.
+        """
+        stuck = state.stuck
+        if target == np.inf and state.slip.any() and not stuck:
+            piece, strength, rate = present_pieces(sample, state.slip)
+            found = self.programme(sample._replace(excess=strength, rate=rate))
+            straight = found is not None and found.load >= state.load
+            if found is not None and straight and not exceeds(sample, found.slip, piece):
+                return State(found.load, found.slip, found.stiff, found.multiplier)
+            stuck = True
+        slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
+        workspace = make_workspace(self.line.stiffness)
+        load, status = advance(sample, state.load, target, slip, stiff, direction, workspace)
+        return State(
+            load, slip, stiff, direction,
+            unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), stuck=stuck,
+        )  # fmt: skip
+
+    def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
+        """Return the equilibrium at a load from a state below, None if it is not found."""
+        if load <= state.load:
+            return state
+        if fresh and not state.stuck:
+            found = self.programme(sample, load)
+            if found is not None and not exceeds(sample, found.slip):
+                return State(load, found.slip, found.stiff, state.direction, unstable=False)
+        there = self.next(sample, replace(state, stuck=True), load)
+        return None if there.unstable or not there.known else there
+
+    def jump(self, sample: Sample, found: State) -> Jump:
+        """Let an unstable state jump to another equilibrium, or to sliding."""
+        slip, stiff = found.slip.copy(), found.stiff.copy()
+        runs = self.line.runs
+        griffith = MARGIN * unstoppable_length(sample, found.load, runs)
+        outcome = UNDECIDED
+        if found.ahead is not None:
+            slip = found.ahead
+        else:
+            outcome = runs_away(
+                sample, runs, found.load, slip, stiff, found.direction,
+                self._stiffness_times(found.direction), np.empty((6, self.nodes)),
+            )  # fmt: skip
+        stiffness = self.line.stiffness
+        if outcome == UNDECIDED and runs_away_alone(
+            sample, stiffness, found.load, slip, found.direction, griffith
+        ):
+            outcome = SLIDING
+        if outcome == UNDECIDED:
+            outcome = jump(sample, found.load, slip, stiff, griffith, make_workspace(stiffness))
+        before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
+        if outcome == ARRESTED and not np.any(after > before):
+            outcome = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
+        state = State(found.load, slip, stiff, found.direction, stuck=found.stuck)
+        return Jump(outcome == ARRESTED, outcome != UNDECIDED, state)
+
+    def gap(self, sample: Sample, state: State, multiplier: Array) -> float:
+        """Return the distance of the bounds of an instability (Pa); NaN where a law steepens.
+
+        Then no multiplier bounds the load from above.
+        """
+        if self.pieces.steepens:
+            return np.nan
+        _, strength, rate = present_pieces(sample, state.slip)
+        present = sample._replace(excess=strength, rate=rate)
+        workspace = make_workspace(self.line.stiffness)
+        return float(certificate(present, state.slip, state.stiff, multiplier, workspace))
+
+    def corner_sensitivity(
+        self, sample: Sample, slip: Array, piece: NDArray[np.int64], corners: NDArray[np.int64]
+    ) -> Array:
+        """Return the derivative by the peak strengths of the load at which a node is at a corner.
+
+        Up to there A d = tau_0 p - q on the slipping nodes, with q the start of their pieces, and
+        the slip of node j is u_j (tau_p - tau_r)/W; with z = A^-1 e_j that is z (tau_0 p - q).
+        NaN where several nodes reach a corner at once: the derivatives of either side differ.
+        """
+        derivative = np.zeros(slip.size)
+        if corners.size > 1:
+            derivative[:] = np.nan
+            return derivative
+        pieces, node = sample.pieces, int(corners[0])
+        before = piece.copy()
+        before[node] -= 1
+        inside = np.flatnonzero(slip > 0.0)
+        matrix = self.line.stiffness.column[np.abs(inside[:, None] - inside)]
+        matrix[np.diag_indices(inside.size)] -= (pieces.slopes[before] * sample.rate)[inside]
+        z = np.linalg.solve(matrix, (inside == node).astype(np.float64))
+        share = np.where(sample.critical > 0.0, pieces.starts[before], 1.0)
+        derivative[inside] = z * share[inside]
+        derivative[node] += pieces.ends[before[node]] * pieces.first / sample.rate[node]
+        return derivative / dot(z, sample.profile[inside], inside.size)
+
+    def stress_released(self, state: State) -> Array:
+        """Return the stress that the slip takes off the interface, K d, Pa."""
+        return state.stiff
+
+    def _stiffness_times(self, field: Array) -> Array:
+        members = np.flatnonzero(field)
+        result = np.empty(self.nodes)
+        halves = np.empty((2, self.nodes // 2))
+        apply_stiffness(self.line.stiffness, members, members.size, field[members], halves, result)
+        return result
+
+
+def _no_windows() -> Windows:
+    return Windows(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((1, 1)))

@@ -1,0 +1,228 @@
+"""Beyond an instability: does the patch come to rest in another equilibrium at the same load?
+
+Slip beyond the instability can only grow, and strength only falls with slip. So every field from
+which all slipping nodes are still driven forward lies below the next equilibrium, and two kinds of
+step keep that property: with frozen strengths, solve the elastic problem (K on the slipping nodes);
+or move along a field z >= 0 with A z <= 0, or towards the solution of the linear problem of the
+present states, as far as the first node that reaches the next corner of its friction law.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.equilibrium.cholesky import (
+    MOST_MEMBERS,
+    Workspace,
+    add_members,
+    make_workspace,
+    multiply_members,
+    singular_direction,
+    solve_first,
+    substitute_members,
+)
+from stiction.equilibrium.linear_program import overstressed, stress_tolerance
+from stiction.equilibrium.runaway import ARRESTED, SLIDING, UNDECIDED
+from stiction.equilibrium.sample import (
+    AT_CORNER,
+    Sample,
+    piece_at,
+    step_to_corner,
+    strength_at,
+    unsupported,
+)
+from stiction.jit import ZERO, jit
+
+ALL = -1
+CROWDED = -2
+
+STEPS = 4000
+"""Elastic steps at most."""
+PATIENCE = 16
+"""Elastic steps after which the true states are tried even if more nodes keep joining."""
+
+
+@jit
+def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
+    """Longest run of residual nodes on the circle, and how many corners are passed in all."""
+    n = slip.shape[0]
+    longest = 0
+    run = 0
+    count = 0
+    for q in range(2 * n):
+        i = q if q < n else q - n
+        residual = slip[i] > 0.0 and slip[i] >= AT_CORNER * sample.critical[i]
+        run = run + 1 if residual else 0
+        if q < n and residual:
+            count += sample.pieces.ends.shape[0]
+        elif q < n and slip[i] > 0.0:
+            count += piece_at(sample.pieces, sample.critical[i], slip[i])
+        longest = max(longest, run)
+    return min(longest, n), count
+
+
+@jit
+def _join(
+    sample: Sample, load: float, stiff: Array, workspace: Workspace, size: int, tolerance: float
+) -> int:
+    """Append the overstressed nodes to the elastic factor.
+
+    Returns the members now, ALL if nothing remains at rest, CROWDED if there is no space for them.
+    """
+    count = overstressed(sample, load, stiff, workspace, tolerance)
+    if count == 0:
+        return size
+    if size + count > MOST_MEMBERS:
+        return CROWDED
+    now = add_members(workspace, size, count)
+    if now < size + count:
+        return ALL
+    for t in range(size, now):
+        workspace.inside[workspace.members[t]] = True
+    return now
+
+
+@jit
+def _relax(
+    sample: Sample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    workspace: Workspace,
+    size: int,
+    tolerance: float,
+) -> int:
+    """One elastic step with frozen strengths, then the nodes it overstresses join.
+
+    Returns as `_join` does.
+    """
+    solution = workspace.vectors[1]
+    drive = workspace.vectors[3]
+    for t in range(size):
+        i = workspace.members[t]
+        drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
+    substitute_members(workspace, ZERO, size, drive, 0)
+    solve_first(workspace, size, solution)
+    for t in range(size):
+        i = workspace.members[t]
+        slip[i] = max(slip[i], solution[t])
+        solution[t] = slip[i]
+    multiply_members(workspace, size, solution, stiff)
+    return _join(sample, load, stiff, workspace, size, tolerance)
+
+
+@jit
+def _settle(
+    sample: Sample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    workspace: Workspace,
+    other: Workspace,
+    size: int,
+) -> int:
+    """One step with the true states: along the unstable direction, or towards equilibrium.
+
+    Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
+    it, else UNDECIDED.
+    """
+    own = workspace.stiffness.column[0]
+    for t in range(size):
+        i = workspace.members[t]
+        other.order[t] = i
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
+    now = add_members(other, ZERO, size)
+    direction = other.vectors[3]
+    longest = 1.0
+    if now < size:
+        singular_direction(other, now, direction)
+        longest = np.inf
+    else:
+        drive = other.vectors[2]
+        for i in range(slip.shape[0]):
+            drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
+        substitute_members(other, ZERO, size, drive, 0)
+        solution = other.vectors[1]
+        solve_first(other, size, solution)
+        direction[:] = 0.0
+        for t in range(size):
+            direction[other.members[t]] = max(solution[t], 0.0)
+    step = step_to_corner(sample, slip, direction, longest)
+    if not np.isfinite(step):
+        return SLIDING
+    solution = workspace.vectors[1]
+    for t in range(size):
+        solution[t] = slip[workspace.members[t]]
+    multiply_members(workspace, size, solution, stiff)
+    return ARRESTED if step == 1.0 and longest == 1.0 else UNDECIDED
+
+
+@jit
+def jump(
+    sample: Sample, load: float, slip: Array, stiff: Array, griffith: float, workspace: Workspace
+) -> int:
+    """Follow an instability at a fixed load to the next least equilibrium, or to none.
+
+    Parameters
+    ----------
+    sample : Sample
+    load : float
+        tau_0, Pa.
+    slip, stiff : (n,) arrays, changed
+        d of the state that became unstable, moved along the unstable direction as far as
+        `step_to_corner` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
+    griffith : float
+        Griffith's critical crack length, in nodes: so many residual nodes in a row count as global
+        sliding.
+    workspace : Workspace
+
+    Returns
+    -------
+    int
+        SLIDING, ARRESTED or UNDECIDED.
+    """
+    tolerance = stress_tolerance(sample, load)
+    workspace.diagonal[:] = workspace.stiffness.column[0]
+    count = ZERO
+    for i in range(slip.shape[0]):
+        workspace.inside[i] = slip[i] > 0.0
+        if workspace.inside[i]:
+            workspace.order[count] = i
+            count += 1
+    if count > MOST_MEMBERS:
+        return UNDECIDED
+    size = add_members(workspace, ZERO, count)
+    if size < count:
+        return SLIDING
+    other = make_workspace(workspace.stiffness)
+    waited = 0
+    passed = 0
+    for _ in range(STEPS):
+        before = size
+        size = _relax(sample, load, slip, stiff, workspace, size, tolerance)
+        if size == CROWDED:
+            return UNDECIDED
+        if size == ALL or unsupported(sample, load, slip):
+            return SLIDING
+        run, corners = _residual_runs(sample, slip)
+        if run >= griffith:
+            return SLIDING
+        waited += 1
+        # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.
+        if waited < PATIENCE and (size > before or corners > passed):
+            passed = corners
+            continue
+        waited = 0
+        passed = corners
+        before = size
+        status = _settle(sample, load, slip, stiff, workspace, other, size)
+        if status == SLIDING:
+            return SLIDING
+        size = _join(sample, load, stiff, workspace, size, tolerance)
+        if size < 0:
+            return UNDECIDED if size == CROWDED else SLIDING
+        if status == ARRESTED and size == before:
+            return ARRESTED
+    return UNDECIDED

@@ -1,0 +1,185 @@
+"""Relaxation at a fixed load, by transforms: each node stuck or on a piece of its friction law.
+
+From a slip d whose nodes are all driven forward or balanced, an overdamped interface moves to the
+least equilibrium that is not below d, or there is none and it slides. Two kinds of step, neither
+of which passes that equilibrium (see `jump`, which does the same with dense factors): an elastic
+one, with the strength frozen at its present value; and one with the true states of the nodes, up
+to where the first node reaches the next corner: if none does, it is the equilibrium.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.elasticity.linear import (
+    EXHAUSTED,
+    NEGATIVE,
+    SOLVED,
+    lowest_eigenvector,
+    no_spring,
+    residual_of,
+    solve_inside,
+)
+from stiction.elasticity.operator import Operator
+from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
+from stiction.equilibrium.sample import Present, Sample, present_pieces, residual_nodes
+
+BALANCED = 0
+SLIDING = 1
+UNDECIDED = 2
+
+AT_RESIDUAL = 1.0 - 1e-9
+"""Share of the slip at a corner from which on a node counts as beyond it."""
+RELEVANT = 1e-5
+"""Share of the largest value below which a node is not part of an unstable direction."""
+STEPS = 2000
+SETTLED = 0.02
+"""Growth of slip in one elastic step, as a share of d_c, below which the true states are tried."""
+DRAG = 1e-3
+"""Stiffness added to elastic steps, as a share of the largest W."""
+ROUGH = 2e-3
+"""Largest residual stress as a share of the mean strength while slip grows faster than that."""
+
+
+def present(sample: Sample, slip: Array) -> Present:
+    """Return the pieces on which the nodes are after a slip."""
+    return present_pieces(sample, slip, AT_RESIDUAL)
+
+
+def step_to_corner(sample: Sample, now: Present, slip: Array, direction: Array) -> float:
+    """Return the length along a direction at which the first node reaches the next corner."""
+    ends = sample.pieces.ends
+    moving = (now.piece < ends.size) & (direction > 0.0)
+    if not moving.any():
+        return np.inf
+    corner = ends[now.piece[moving]] * sample.critical[moving]
+    return float(((corner - slip[moving]) / direction[moving]).min())
+
+
+def _solve(
+    operator: Operator, drive: Array, rate: Array, slip: Array, tolerance: float
+) -> tuple[int, Array, int]:
+    """Equilibrium for given strengths at zero slip and rates; status, slip, iterations."""
+    new = slip.copy()
+    inside = (slip > 0.0) | (drive > 0.0)
+    status, taken = equilibrate(
+        operator._replace(rate=rate), no_spring(slip.size), drive, inside, new,
+        np.empty_like(slip), np.empty((3, slip.size)), tolerance,
+    )  # fmt: skip
+    return status, new, taken
+
+
+def _weakening_step(
+    operator: Operator, sample: Sample, load: float, slip: Array, tolerance: float
+) -> tuple[Array, int]:
+    """Slip moved with the true states until the first node reaches a corner, and iterations.
+
+    Only the nodes that slip or are overloaded move; it goes towards their equilibrium, or, if they
+    have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
+    forward or balanced, so the next equilibrium is not passed.
+    """
+    now = present(sample, slip)
+    operator = operator._replace(rate=now.rate)
+    drive = load * sample.profile - now.strength
+    rest, new = np.empty_like(slip), slip.copy()
+    workspace = np.empty((3, slip.size))
+    free = no_spring(slip.size)
+    residual_of(operator, free, drive, slip, rest)
+    inside = (slip > 0.0) | (rest > 0.0)
+    status, used = solve_inside(operator, free, inside, new, rest, workspace, tolerance, ITERATIONS)
+    direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
+    longest = 1.0
+    if status == NEGATIVE:
+        direction = np.abs(workspace[1])
+        largest = float(sample.rate.max())
+        _, taken = lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
+        used += taken
+        direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
+        longest = np.inf
+    step = min(step_to_corner(sample, now, slip, direction), longest)
+    return (slip + step * direction if np.isfinite(step) else slip), used
+
+
+class Relaxed(NamedTuple):
+    """BALANCED, SLIDING or UNDECIDED; the slip; whether it was unstable on the way; iterations."""
+
+    status: int
+    slip: Array
+    jumped: bool
+    iterations: int
+
+
+def least_equilibrium(
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    accuracy: float = 1e-7,
+    only_stable: bool = False,
+) -> Relaxed:
+    """Return the least equilibrium at a load that is not below a given slip.
+
+    Parameters
+    ----------
+    operator : Operator
+        Its rate is not used.
+    sample : Sample
+    load : float
+        tau_0, Pa.
+    slip : (nodes,) array
+        Zero, or an equilibrium at a lower load, or beyond it along an unstable direction, m.
+    accuracy : float
+        Largest residual stress as a share of the mean strength.
+    only_stable : bool
+        Give up, as UNDECIDED, where the path to the equilibrium looks unstable.
+
+    Notes
+    -----
+    It slides as soon as the load exceeds the strength that is left on average: stiffness adds
+    nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
+    `accuracy`; that of planes has small ones.
+    """
+    tolerance = accuracy * float(np.abs(sample.excess).mean() + abs(load) * sample.profile.mean())
+    # K alone is singular where everything slips; a drag on the growth keeps it a lower bound.
+    drag = DRAG * float(sample.rate.max())
+    frozen = np.full_like(sample.rate, -drag)
+    slip = np.maximum(slip, 0.0)
+    jumped = False
+    used = 0
+    patient = False
+    for _ in range(STEPS):
+        now = present(sample, slip)
+        drive = load * sample.profile - now.strength
+        if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
+            return Relaxed(SLIDING, slip, True, used)
+        if not patient:
+            status, new, taken = _solve(operator, drive, now.rate, slip, tolerance)
+            used += taken
+            if status == EXHAUSTED:
+                return Relaxed(UNDECIDED, slip, jumped, used)
+            jumped = jumped or status == NEGATIVE
+            if jumped and only_stable:
+                return Relaxed(UNDECIDED, slip, jumped, used)
+            if status == SOLVED:
+                new = np.maximum(new, slip)
+                if step_to_corner(sample, now, slip, new - slip) >= 1.0:
+                    return Relaxed(BALANCED, new, jumped, used)
+            slip, taken = _weakening_step(operator, sample, load, slip, tolerance)
+            used += taken
+            now = present(sample, slip)
+        # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
+        rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
+        strength = now.strength - now.rate * slip
+        drive = load * sample.profile - (strength + rough - drag * slip)
+        status, new, taken = _solve(operator, drive, frozen, slip, rough)
+        used += taken
+        if status != SOLVED:
+            return Relaxed(UNDECIDED, slip, jumped, used)
+        new = np.maximum(new, slip)
+        weakening = ~residual_nodes(sample, new, AT_RESIDUAL) & (sample.critical > 0.0)
+        patient = bool((new - slip > SETTLED * sample.critical)[weakening].any())
+        slip = new
+    return Relaxed(UNDECIDED, slip, jumped, used)

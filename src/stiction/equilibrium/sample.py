@@ -1,0 +1,233 @@
+"""One sample as the solvers take it: strength excess, residual, and the pieces of its law.
+
+Strength falls with slip along straight pieces. A law of M pieces has M corners; piece M is the
+residual strength. Between corners everything is linear, and a corner is an event. The linear law
+has one piece: its start is tau_p, to the bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.arrays import Array
+from stiction.friction import FrictionLaw
+from stiction.friction.kernels import registered
+from stiction.friction.parameters import Linear, Polygon
+from stiction.jit import jit
+from stiction.problem import Sample as Samples
+
+AT_CORNER = 1.0 - 1e-12
+"""Share of the slip at a corner from which a node counts as beyond it."""
+TOGETHER = 1e-9
+"""Share of the slip at a corner within which nodes reach their corners at once."""
+FLAT = 1e-11
+"""Share of the mean strength by which it must fall to count as weakening. Less cannot be told from
+the round-off of K d; an instability of such nodes would be one of nothing, and never end."""
+
+
+class Pieces(NamedTuple):
+    """A falling polygon f of u = slip/d_c, in what does not depend on the node.
+
+    Attributes
+    ----------
+    ends : (M,) array
+        u at the end of each piece, the last 1.
+    starts : (M + 1,) array
+        f of each piece, and of the residual strength, continued back to zero slip: 1, ..., 0.
+    slopes : (M + 1,) array
+        How steep they are in units of the first: 1, ..., 0.
+    first : float
+        -f' of the first piece.
+    area : float
+        Integral of f.
+    """
+
+    ends: Array
+    starts: Array
+    slopes: Array
+    first: float
+    area: float
+
+    @property
+    def steepens(self) -> bool:
+        """Whether a piece falls more steeply than the one before it."""
+        return bool(np.any(np.diff(self.slopes) > 0.0))
+
+
+LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0, 0.5)
+
+
+def refused(law: FrictionLaw) -> list[str]:
+    """Return why a law cannot be followed piece by piece; nothing if it can."""
+    name = type(law).__name__
+    try:
+        parameters = law.parameters
+    except NotImplementedError:
+        return [f"friction: {name} does not say what its parameters are"]
+    if isinstance(parameters, Linear | Polygon):
+        return []
+    instead = "use st.Rupture(...)" if registered(parameters) else "use another law"
+    return [
+        f"friction: equilibria are followed along straight pieces, and {name} has none;"
+        f" use st.PiecewiseWeakening.from_law(friction, pieces=32), or {instead}"
+    ]
+
+
+def pieces_of(law: FrictionLaw) -> Pieces:
+    """Return the pieces of a law that `refused` has nothing against."""
+    parameters = law.parameters
+    if not isinstance(parameters, Polygon):
+        return LINEAR
+    u, f = parameters.slip, parameters.fraction
+    steep = np.append(-np.diff(f) / np.diff(u), 0.0)
+    starts = f + steep * u
+    return Pieces(u[1:].copy(), starts, steep / steep[0], float(steep[0]), law.integral)
+
+
+class Sample(NamedTuple):
+    """One strength profile; all arrays of shape (nodes,).
+
+    Stress is counted from the initial one: `excess` is the strength excess tau_p - tau_i and
+    `residual` is tau_r - tau_i (Pa). `profile` is the load profile, `rate` the weakening rate W at
+    zero slip (Pa/m), and `critical` the slip d_c (m) at which the strength is residual. Nodes of
+    constant strength have both 0. `pieces` are those of the friction law.
+    """
+
+    excess: Array
+    residual: Array
+    profile: Array
+    rate: Array
+    critical: Array
+    pieces: Pieces
+
+
+@jit
+def make_sample(
+    excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
+) -> Sample:
+    """A sample in which nodes whose strength is residual, but for round-off, do not weaken."""
+    n = excess.shape[0]
+    scale = 0.0
+    for i in range(n):
+        scale += max(abs(excess[i]), abs(residual[i]))
+    critical = np.empty(n)
+    moving = rate.copy()
+    residual = residual.copy()
+    for i in range(n):
+        if excess[i] - residual[i] <= FLAT * scale / n:
+            residual[i] = excess[i]
+            moving[i] = 0.0
+            critical[i] = 0.0
+        else:
+            critical[i] = pieces.first * (excess[i] - residual[i]) / rate[i]
+    return Sample(excess, residual, profile, moving, critical, pieces)
+
+
+def sample_of(rows: Samples, row: int, pieces: Pieces = LINEAR) -> Sample:
+    """Return one row of a batch as the kernels take it."""
+    initial = rows.initial_stress[row]
+    excess = (rows.strength[row] - initial).flatten()
+    residual = (rows.residual_strength[row] - initial).flatten()
+    rate = np.array(rows.weakening_rate[row]).flatten()
+    return make_sample(excess, residual, np.array(rows.load_profile).flatten(), rate, pieces)
+
+
+class Present(NamedTuple):
+    """The piece on which each node is, what it has at zero slip (Pa), and its slope (Pa/m)."""
+
+    piece: NDArray[np.int64]
+    strength: Array
+    rate: Array
+
+
+def present_pieces(sample: Sample, slip: Array, at_corner: float = AT_CORNER) -> Present:
+    """Return the pieces after a slip; from the share `at_corner` on a node is beyond a corner."""
+    pieces = sample.pieces
+    corners = at_corner * (pieces.ends * sample.critical[:, None])
+    piece = np.count_nonzero(slip[:, None] >= corners, axis=1)
+    share = pieces.starts[piece]
+    strength = share * sample.excess + (1.0 - share) * sample.residual
+    return Present(piece, strength, pieces.slopes[piece] * sample.rate)
+
+
+def residual_nodes(sample: Sample, slip: Array, at_corner: float = AT_CORNER) -> NDArray[np.bool_]:
+    """Return which weakening nodes have reached their residual strength."""
+    reached: NDArray[np.bool_] = (slip >= at_corner * sample.critical) & (sample.critical > 0.0)
+    return reached
+
+
+def exceeds(
+    sample: Sample,
+    slip: Array,
+    piece: NDArray[np.int64] | None = None,
+    at_corner: float = AT_CORNER,
+) -> bool:
+    """Whether a slip goes beyond the piece of each node (by default the first) that it rests on."""
+    ends = np.append(sample.pieces.ends, np.inf)
+    with np.errstate(invalid="ignore"):
+        end = ends[0 if piece is None else piece] * sample.critical
+    return bool(np.any((slip > (2.0 - at_corner) * end) & (sample.critical > 0.0)))
+
+
+def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
+    """Return the nodes that are at a corner beyond which they weaken more steeply."""
+    pieces = sample.pieces
+    corners = pieces.ends * sample.critical[:, None]
+    near = np.abs(slip[:, None] - corners) <= TOGETHER * corners
+    steeper = np.diff(pieces.slopes) > 0.0
+    found: NDArray[np.int64] = np.flatnonzero(
+        (near & steeper).any(axis=1) & (sample.critical > 0.0)
+    )
+    return found
+
+
+@jit
+def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
+    """The piece on which a node of this d_c is after a slip."""
+    piece = 0
+    while piece < pieces.ends.shape[0] and slip >= AT_CORNER * (pieces.ends[piece] * critical):
+        piece += 1
+    return piece
+
+
+@jit
+def start_of(sample: Sample, i: int, piece: int) -> float:
+    """What a piece of node i has at zero slip, Pa: tau_p on the first, tau_r on the last."""
+    share = sample.pieces.starts[piece]
+    return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
+
+
+@jit
+def strength_at(sample: Sample, slip: Array, i: int) -> float:
+    """Strength less initial stress of node i after some slip, Pa."""
+    piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+    return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
+
+
+@jit
+def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
+    """Move along a direction until the first node reaches a corner, at most `longest` of it."""
+    step = longest
+    ends = sample.pieces.ends
+    for i in range(slip.shape[0]):
+        if direction[i] > 0.0:
+            piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+            if piece < ends.shape[0]:
+                step = min(step, (ends[piece] * sample.critical[i] - slip[i]) / direction[i])
+    if not np.isfinite(step):
+        return step
+    for i in range(slip.shape[0]):
+        slip[i] += step * direction[i]
+    return step
+
+
+@jit
+def unsupported(sample: Sample, load: float, slip: Array) -> bool:
+    """Whether the whole interface, at its present strengths, cannot carry the load."""
+    balance = 0.0
+    for i in range(slip.shape[0]):
+        balance += load * sample.profile[i] - strength_at(sample, slip, i)
+    return balance > 0.0

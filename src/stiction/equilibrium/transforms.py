@@ -1,0 +1,321 @@
+"""The programme of planes, with transforms: a coarse grid first, then the turning point.
+
+Between jumps the next instability is a linear programme with the present pieces of the friction
+law, as long as no node reaches a corner before it. Where one does, the path is followed in steps of
+the load by relaxation at fixed load.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.elasticity.linear import inner, lowest_eigenvector
+from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
+from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
+from stiction.equilibrium.follow import Jump, State
+from stiction.equilibrium.relaxation import (
+    AT_RESIDUAL,
+    BALANCED,
+    UNDECIDED,
+    least_equilibrium,
+    present,
+)
+from stiction.equilibrium.sample import Sample, exceeds, pieces_of, residual_nodes, sample_of
+from stiction.equilibrium.turning_point import close
+from stiction.problem import Problem
+from stiction.problem import Sample as Samples
+
+COARSEST = 8.0
+"""Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
+FEWEST = 8
+"""Least nodes along x and y on a coarse grid."""
+ROUGH = 1e-4
+"""Relative gap on coarse grids."""
+FIRST_STEP = 0.01
+"""Step of the load where the path is followed in steps, as a share of the load."""
+MOVED = 0.02
+"""Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
+DIRECTION_ITERATIONS = 300
+ACCURACY = 1e-7
+"""Of the slip at a given load: largest residual stress as a share of the mean strength."""
+
+
+class Plane(NamedTuple):
+    """Periods (m), G (Pa) and nu of a plane between two half-spaces."""
+
+    lengths: tuple[float, float]
+    shear_modulus: float
+    poisson_ratio: float
+
+    def symbol(self, shape: tuple[int, int]) -> Array:
+        """Return K(k) on a grid; see `stiffness_symbol`."""
+        return _symbol(*self, shape)
+
+
+@functools.lru_cache(maxsize=16)
+def _symbol(
+    lengths: tuple[float, float], modulus: float, ratio: float, shape: tuple[int, int]
+) -> Array:
+    return stiffness_symbol(shape, lengths, modulus / (1.0 - ratio), modulus)
+
+
+def halved(fine: Array) -> Array:
+    """Return values on every other node, averaged with weights 1/4, 1/2, 1/4 along x and y."""
+    for axis in (0, 1):
+        even, odd = (
+            (slice(None),) * axis + (slice(0, None, 2),),
+            (slice(None),) * axis + (slice(1, None, 2),),
+        )
+        fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
+    return fine
+
+
+def doubled(coarse: Array) -> Array:
+    """Return values interpolated linearly to twice the nodes along x and y."""
+    for axis in (0, 1):
+        between = 0.5 * (coarse + np.roll(coarse, -1, axis))
+        both = np.stack((coarse, between), axis + 1)
+        coarse = both.reshape(tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape)))
+    return coarse
+
+
+@dataclass(frozen=True)
+class PlaneOnset:
+    """Onset of one sample on a plane.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Rigorous bounds of the onset load tau_0, Pa.
+    slip : (nx, ny) array
+        d at onset, m; proves the lower bound.
+    multiplier : (nx, ny) array
+        y, with <p, y> = 1: derivative of the load by the strength; proves the upper bound.
+    closed : bool
+        Whether they are as close as was asked for. On a grid too coarse for the critical patch
+        they may not be.
+    iterations : int
+        On the finest grid; each takes two pairs of transforms.
+    """
+
+    lower: float
+    upper: float
+    slip: Array
+    multiplier: Array
+    closed: bool
+    iterations: int
+
+
+def _narrow(bracket: Bracket, gap: float) -> float:
+    """Close a bracket from nothing: bisection until Newton's method succeeds.
+
+    Returns the curvature found. The bounds of a stiffness that is no Z-matrix may not meet.
+    """
+    share, finest = 5e-3, 0.1 * gap
+    bend = 0.0
+    while not bracket.closed(gap):
+        direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
+        _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
+        if share <= finest:
+            break
+        share = max(0.2 * share, finest)
+    return bend
+
+
+def plane_onset(
+    plane: Plane,
+    excess: Array,
+    profile: Array,
+    rate: Array,
+    gap: float = 1e-6,
+    slip: Array | None = None,
+) -> PlaneOnset:
+    """Return the largest load with an equilibrium while no node has reached a corner of its law.
+
+    Parameters
+    ----------
+    plane : Plane
+    excess : (nx, ny) array
+        Peak strength less initial stress, Pa.
+    profile : (nx, ny) array
+        Load profile p > 0.
+    rate : (nx, ny) array
+        W, Pa/m; zero at nodes that have reached their residual strength.
+    gap : float
+        Relative gap between the bounds at which to stop.
+    slip : (nx, ny) array, optional
+        Equilibrium at a lower load to start from, m, instead of coarse grids.
+    """
+    levels = [tuple(np.asarray(given, dtype=np.float64) for given in (excess, profile, rate))]
+    while slip is None:
+        shape = levels[-1][0].shape
+        largest = float(plane.symbol(shape).max())
+        odd = shape[0] % 2 or shape[1] % 2
+        if odd or min(shape) < 2 * FEWEST or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
+            break
+        levels.append(tuple(map(halved, levels[-1])))
+    coarse: Bracket | None = None
+    bend = 0.0
+    for number in range(len(levels) - 1, -1, -1):
+        goal = gap if number == 0 else max(ROUGH, gap)
+        strength, load_profile, weakening = levels[number]
+        bracket = make_bracket(plane.symbol(strength.shape), weakening, strength, load_profile)
+        if slip is not None:
+            bracket.raise_slip(slip.flatten())
+        closed = False
+        if coarse is not None:
+            below = levels[number + 1][0].shape
+            guess = doubled(coarse.slip.reshape(below)).flatten()
+            held = doubled(coarse.multiplier.reshape(below)).flatten()
+            held *= 1.0 / np.sqrt((held**2).sum())
+            closed, bend = close(bracket, held, coarse.lower, guess, goal, bend)
+        if not closed:
+            bend = _narrow(bracket, goal)
+        coarse = bracket
+    return PlaneOnset(
+        bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
+        bracket.multiplier.reshape(strength.shape), bracket.closed(gap), bracket.iterations,
+    )  # fmt: skip
+
+
+class PlaneProgram:
+    """Equilibria of a plane; safe to use from several threads.
+
+    Parameters
+    ----------
+    problem : Problem
+    gap : float
+        Relative distance of the bounds at which to stop.
+    every : int
+        Which nodes of the problem are taken along x and y: all, or every second one.
+    """
+
+    at_corner = AT_RESIDUAL
+
+    def __init__(self, problem: Problem, gap: float = 1e-6, every: int = 1) -> None:
+        x, y = problem.interface.lengths
+        solid = problem.solid
+        self.plane = Plane((x, y), solid.shear_modulus, solid.poisson_ratio)
+        nx, ny = problem.interface.shape
+        self.shape = (nx // every, ny // every)
+        self.pieces = pieces_of(problem.friction)
+        self.requested = gap
+        self.widest_gap = 1.01 * gap  # round-off
+
+    def sample_of(self, rows: Samples, row: int) -> Sample:
+        """Return one sample of a batch."""
+        return sample_of(rows, row, self.pieces)
+
+    def first(self, rows: Samples, slips: bool) -> tuple[None, dict[int, State | None]]:
+        """Return the rows that are to be followed from rest: all of them."""
+        return None, dict.fromkeys(range(rows.samples))
+
+    def at_rest(self, sample: Sample) -> State:
+        """Return the state in which the first node is about to slip."""
+        load = float((sample.excess / sample.profile).min())
+        return State(load, *np.zeros((3, sample.excess.size)))
+
+    def _operator(self, sample: Sample) -> Operator:
+        return make_operator(
+            self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
+        )
+
+    def programme(self, sample: Sample, slip: Array) -> PlaneOnset | None:
+        """Return the next instability if no further node reaches a corner before it."""
+        now = present(sample, slip)
+        found = plane_onset(
+            self.plane,
+            *(given.reshape(self.shape) for given in (now.strength, sample.profile, now.rate)),
+            self.requested,
+            slip.reshape(self.shape) if slip.any() else None,
+        )
+        if exceeds(sample, found.slip.reshape(-1), now.piece, AT_RESIDUAL):
+            return None
+        return found
+
+    def next(self, sample: Sample, state: State) -> State:
+        """Return the next instability on the path from a stable state."""
+        found = self.programme(sample, state.slip)
+        if found is None:
+            return self._step_on(sample, state)
+        slip = np.maximum(found.slip.reshape(-1), state.slip)
+        return State(
+            found.lower, slip, state.stiff, found.multiplier.reshape(-1), upper=found.upper,
+            certified=not residual_nodes(sample, state.slip, AT_RESIDUAL).any(),
+        )  # fmt: skip
+
+    def _step_on(self, sample: Sample, state: State) -> State:
+        """Follow the stable path in steps of the load.
+
+        A step is halved if it looks unstable, which a long one may do only because nodes reach a
+        corner in it.
+        """
+        load, slip, gap = state.load, state.slip, self.requested
+        operator = self._operator(sample)
+        step = FIRST_STEP * load
+        while True:
+            trial = least_equilibrium(operator, sample, load + step, slip, 0.1 * gap, True)
+            if trial.status == BALANCED:
+                load, slip, step = load + step, trial.slip, 1.5 * step
+            elif step > gap * load:
+                step = max(0.4 * step, 0.7 * gap * load)
+            else:
+                break
+        beyond = load + step
+        ahead = least_equilibrium(operator, sample, beyond, slip, 0.1 * gap)
+        direction = _direction(operator, sample, slip, ahead.slip)
+        return State(load, slip, state.stiff, direction, upper=beyond, certified=False, ahead=ahead)
+
+    def jump(self, sample: Sample, found: State) -> Jump:
+        """Let an unstable state jump to another equilibrium, or to sliding."""
+        beyond, ahead = found.upper, found.ahead
+        if ahead is None:
+            beyond += self.requested * abs(beyond)
+            ahead = least_equilibrium(
+                self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested
+            )
+        arrested = ahead.status == BALANCED
+        weakens = sample.critical > 0.0
+        moved = ahead.slip - found.slip > MOVED * sample.critical
+        after = State(beyond, ahead.slip, found.stiff, found.direction)
+        counts = not arrested or bool(moved[weakens].any())
+        return Jump(arrested, ahead.status != UNDECIDED, after, counts)
+
+    def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
+        """Return the equilibrium at a load from a state below, None if it is not found."""
+        if load <= state.load:
+            return state
+        found = least_equilibrium(self._operator(sample), sample, load, state.slip, ACCURACY)
+        if found.status != BALANCED:
+            return None
+        return State(load, found.slip, state.stiff, state.direction, unstable=False)
+
+    def gap(self, sample: Sample, state: State, multiplier: Array) -> float:
+        """Return the distance of the bounds of an instability, Pa."""
+        return state.upper - state.load
+
+    def stress_released(self, state: State) -> Array:
+        """Return the stress that the slip takes off the interface, K d, Pa."""
+        symbol = self.plane.symbol(self.shape)
+        slip = state.slip.reshape(self.shape)
+        released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
+        return released
+
+
+def _direction(operator: Operator, sample: Sample, slip: Array, after: Array) -> Array:
+    """How the patch at the end of a stable path gives way: the y of its nearly zero eigenvalue."""
+    growth = np.maximum(after - slip, 0.0)
+    inside = slip > 0.0
+    vector = np.where(inside, growth, 0.0)
+    if vector.any():
+        frozen = operator._replace(rate=present(sample, slip).rate)
+        tolerance = 1e-6 * float(sample.rate.max())
+        lowest_eigenvector(frozen, inside, vector, tolerance, DIRECTION_ITERATIONS)
+        growth = np.maximum(vector, 0.0)
+    y: Array = growth / inner(sample.profile, growth)
+    return y

@@ -1,0 +1,36 @@
+"""Planes on which every entry of K off its diagonal is negative, so that the theory is strict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiction.equilibrium.sample import LINEAR, make_sample
+from stiction.equilibrium.transforms import Plane
+
+
+class Lattice(Plane):
+    """A plane with the wavenumbers (2/h) sin(k h/2) of a lattice, up to nu = 0.45 a Z-matrix."""
+
+    def symbol(self, shape):
+        first, second = (
+            2.0 * n / length * np.sin(np.pi * mode / n)
+            for n, length, mode in zip(
+                shape,
+                self.lengths,
+                (np.arange(shape[0])[:, None], np.arange(shape[1] // 2 + 1)[None, :]),
+                strict=True,
+            )
+        )
+        k = np.hypot(first, second)
+        k[0, 0] = 1.0
+        return 0.5 * self.shear_modulus * (first**2 / (1.0 - self.poisson_ratio) + second**2) / k
+
+
+WAVENUMBERS = {"spectral": Plane, "lattice": Lattice}
+
+
+def plane_sample(strength, residual, rate):
+    """A sample on a plane under a uniform load, of (nx, ny) fields or numbers."""
+    shape = np.shape(strength)
+    whole = (np.broadcast_to(given, shape).flatten() for given in (strength, residual, 1.0, rate))
+    return make_sample(*whole, LINEAR)
