@@ -24,9 +24,6 @@ from stiction.errors import (
     RunError as RunError,
 )
 from stiction.errors import (
-    StoreError as StoreError,
-)
-from stiction.errors import (
     UnitWarning as UnitWarning,
 )
 from stiction.friction import ExponentialWeakening as ExponentialWeakening
@@ -70,13 +67,9 @@ from stiction.random.spectra import (
 )
 from stiction.reliability.curve import failure_curve as failure_curve
 from stiction.reliability.design import (
-    DesignStress as DesignStress,
-)
-from stiction.reliability.design import (
     design_stress as design_stress,
 )
 from stiction.reliability.estimate import failure_probability as failure_probability
-from stiction.reliability.result import FailureProbability as FailureProbability
 from stiction.solid import Solid as Solid
 from stiction.study.study import Ensemble as Ensemble
 from stiction.study.study import Study as Study

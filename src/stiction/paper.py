@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from stiction._checks import check_instance, is_finite
-from stiction.errors import InputError
 from stiction.friction import LinearWeakening
 from stiction.interface import Interface
-from stiction.model import describe
+from stiction.model import Positive, checked
 from stiction.problem import Problem
 from stiction.random.marginals import Beta
 from stiction.random.random_field import RandomField
@@ -46,7 +44,8 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
     )
 
 
-def strength(problem: Problem, correlation_ratio: float = 0.5) -> RandomField:
+@checked
+def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField:
     """The random strength of Albertini et al. (2020, Eqs. 2 to 7).
 
     Beta(1.5, 3) on [0.66, 1.66] MPa; power-law spectrum (k^2 + lambda^2)^-4, truncated at
@@ -68,10 +67,6 @@ def strength(problem: Problem, correlation_ratio: float = 0.5) -> RandomField:
     InputError
         If the ratio is not positive, or h_n is not defined because W varies.
     """
-    check_instance("problem", problem, Problem)
-    if not (is_finite(correlation_ratio) and correlation_ratio > 0.0):
-        given = describe(correlation_ratio)
-        raise InputError(f"correlation_ratio: must be a positive number, got {given}")
     return RandomField(
         marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         spectrum=PowerLawSpectrum(

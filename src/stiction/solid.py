@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from numbers import Real as Number
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
-from stiction._checks import check_choice, is_finite
 from stiction.errors import InputError, UnitWarning, warn_user
-from stiction.model import Mode, Positive, _number, describe, model
+from stiction.model import Mode, Positive, Real, model
 
 SLOWEST, FASTEST = 0.3, 2e4
 """m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
@@ -45,49 +45,44 @@ class Solid:
     """
 
     shear_modulus: Positive
-    poisson_ratio: Annotated[
-        float, BeforeValidator(_number), Field(gt=-1, lt=0.5, allow_inf_nan=False)
-    ]
+    poisson_ratio: Annotated[Real, Field(gt=-1, lt=0.5)]
     density: Positive
     plane: Literal["strain", "stress"] = "strain"
 
-    if TYPE_CHECKING:  # what the validator below makes of it
+    if TYPE_CHECKING:  # with what the validator below takes besides
 
-        @overload
         def __init__(
             self,
-            shear_modulus: float,
-            poisson_ratio: float,
-            density: float,
+            shear_modulus: float = ...,
+            poisson_ratio: float = ...,
+            density: float = ...,
             plane: Literal["strain", "stress"] = ...,
-        ) -> None: ...
-        @overload
-        def __init__(
-            self,
             *,
-            youngs_modulus: float,
-            poisson_ratio: float,
-            density: float,
-            plane: Literal["strain", "stress"] = ...,
+            youngs_modulus: float = ...,
         ) -> None: ...
-        def __init__(self, *args: Any, **kwargs: Any) -> None: ...
 
     @model_validator(mode="before")
     @classmethod
-    def _from_youngs_modulus(cls, given: Any) -> Any:
-        """G = E/(2 (1 + nu)); what is kept is G."""
-        named = given.kwargs if isinstance(given, ArgsKwargs) else given
-        if not isinstance(named, dict) or "youngs_modulus" not in named:
+    def _shear_modulus(cls, given: Any) -> Any:
+        """Replace `youngs_modulus` by G = E/(2 (1 + nu))."""
+        named = dict(given.kwargs or {}) if isinstance(given, ArgsKwargs) else given
+        if not isinstance(named, dict):
             return given
-        places = given.args if isinstance(given, ArgsKwargs) else ()
-        named = dict(named)
-        modulus, ratio = named.pop("youngs_modulus"), named.get("poisson_ratio", math.nan)
-        if places or "shear_modulus" in named:
+        if {"c_p", "c_s"} & named.keys():
+            raise InputError(
+                "wave speeds are not parameters; give shear_modulus = density c_s^2 and"
+                " poisson_ratio = (c_p^2 - 2 c_s^2)/(2 (c_p^2 - c_s^2))"
+            )
+        if "youngs_modulus" not in named:
+            return given
+        if "shear_modulus" in named or (isinstance(given, ArgsKwargs) and given.args):
             raise InputError("give shear_modulus or youngs_modulus, by name, and not both")
-        if not (is_finite(modulus) and modulus > 0.0):
-            raise InputError(f"youngs_modulus: must be a positive number, got {describe(modulus)}")
+        modulus, ratio = named["youngs_modulus"], named.get("poisson_ratio")
+        named = {name: value for name, value in named.items() if name != "youngs_modulus"}
+        if not (isinstance(modulus, Number) and modulus > 0.0):
+            raise InputError(f"youngs_modulus: must be a positive number, got {modulus!r}")
         # Without a usable ratio any modulus will do: the ratio is what is complained of.
-        usable = is_finite(ratio) and ratio > -1.0
+        usable = isinstance(ratio, Number) and ratio > -1.0
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
         return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
 
@@ -148,7 +143,8 @@ class Solid:
         Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress; mode III: G. In every case
         it is 2 G (1 - c_s^2/c_d^2) for mode II (Geubelle and Rice, 1995, static limit).
         """
-        check_choice("mode", mode, ("II", "III"))
+        if mode not in ("II", "III"):
+            raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")
         if mode == "III":
             return self.shear_modulus
         return 2.0 * self.shear_modulus * (1.0 - self.wave_speed_ratio**-2)

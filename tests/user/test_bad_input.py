@@ -367,3 +367,8 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.load.profile[0] = 2.0
     error = st.InputError(["a", "b"])
     assert pickle.loads(pickle.dumps(error)).problems == ("a", "b")
+
+
+def test_wave_speeds_are_no_moduli():
+    with pytest.raises(st.InputError, match=r"Solid: wave speeds are not param.*= density c_s\^2"):
+        st.Solid(c_p=6000.0, c_s=3464.0, density=2670.0)

@@ -7,6 +7,7 @@ import pytest
 import scipy.stats
 
 import stiction as st
+from stiction.errors import StoreError
 
 LENGTH, NODES = 0.1, 256
 
@@ -130,4 +131,4 @@ def test_representations_fit_on_a_screen(tmp_path):
     assert repr(st.open_run(tmp_path / "run")).endswith("run': 3 samples>")
     assert len(repr(st.open_run(tmp_path / "run").status())) < 200
     assert len(repr(st.statistics.density(np.random.default_rng(0).random(1000)))) < 300
-    assert issubclass(st.StoreError, st.RunError)
+    assert issubclass(StoreError, st.RunError)
