@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,16 +22,16 @@ GAPS = "gaps"
 def gather(
     problem: Any, given: Mapping[str, Any], gaps: Gaps
 ) -> tuple[dict[str, Any], Mask | None]:
-    """What a caller gave, at the nodes, and where all of it was measured.
+    """Put what a caller gave on the nodes, and find where all of it was measured.
 
     Returns
     -------
     values : dict
-    measured : (samples, nodes) or (1, nodes) array of bool, or None if nothing was filled in
+    measured : (samples, *shape) or (1, *shape) array of bool, or None if nothing is missing
     """
     problems: list[str] = []
     values: dict[str, Any] = {}
-    masks = []
+    measured: Any = True
     for name, value in given.items():
         values[name] = value
         if value is None:
@@ -43,29 +43,23 @@ def gather(
             continue
         values[name] = found.values
         if found.measured is not None:
-            masks.append(found.measured.reshape(-1, problem.interface.size))
+            measured = measured & found.measured.reshape(-1, *problem.interface.shape)
     if problems:
         raise InputError(problems)
-    if not masks:
-        return values, None
-    count = max(mask.shape[0] for mask in masks)
-    everywhere = np.ones((count, problem.interface.size), dtype=bool)
-    for mask in masks:
-        everywhere &= mask
-    return values, everywhere
+    return values, None if measured is True else measured
 
 
 def without_gaps(
     values: Mapping[str, Any], measured: Mask
 ) -> tuple[dict[str, Any], NDArray[np.int64]]:
-    """The samples that have no gap in any profile, and their numbers.
+    """Return the samples that have no gap in any profile, and their numbers.
 
     Raises
     ------
     InputError
         If every sample has one.
     """
-    whole = measured.all(axis=1)
+    whole = measured.reshape(len(measured), -1).all(axis=1)
     if not whole.any():
         raise InputError(
             f"gaps: all of {whole.size} samples have gaps, so none is left (gaps='skip');"
@@ -80,72 +74,47 @@ def without_gaps(
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Mask) -> xr.Dataset:
-    """A result that says where its profiles have gaps, and which onsets lie in one."""
+    """Return a result that says where its profiles have gaps, and which onsets lie in one."""
+    interface = problem.interface
     position = result["critical_position"]
-    inside = (_inside_plane if problem.interface.is_plane else _inside)(
-        problem, np.atleast_1d(position.values), measured
-    )
+    places = np.reshape(position.values, (-1, len(interface.shape)))
+    inside = _missing_near(interface, places, measured, interface.spacings)
+    rate = problem.uniform_rate
+    lengths = interface.spacings if rate is None else problem.nucleation_lengths(rate)
+    near = _missing_near(interface, places, measured, [0.5 * h for h in lengths]) & ~inside
+    said = {"the onset at {} lies in": inside, "the critical patch at {} reaches into": near}
+    for what, where in said.items():
+        if where.any():
+            first = places[int(np.argmax(where))]
+            at = ", ".join(f"{d} = {v:.6g} m" for d, v in zip(interface.dims, first, strict=True))
+            also = f" (and {int(where.sum()) - 1} more samples)" if where.sum() > 1 else ""
+            warn_accuracy(
+                f"{what.format(at)} a gap of the profile{also}: the strength there was filled in,"
+                " not measured"
+            )
     dims = tuple(dim for dim in position.dims if dim != "direction")
     attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
     result[IN_GAP] = (dims, inside.reshape([position.sizes[dim] for dim in dims]), attributes)
-    if not problem.interface.is_plane and np.all(measured == measured[:1]):
-        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], problem.interface))
+    if not interface.is_plane and np.all(measured == measured[:1]):
+        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], interface))
     return result
 
 
-def _inside_plane(problem: Any, position: NDArray[np.float64], measured: Mask) -> Mask:
-    """Which onsets (samples, 2) lie at a node that was not measured."""
-    interface = problem.interface
-    position = position.reshape(-1, 2)
-    nodes = [
-        np.round(np.nan_to_num(place) / spacing).astype(np.int64) % count
-        for place, spacing, count in zip(
-            position.T, interface.spacings, interface.shape, strict=True
-        )
-    ]
-    maps = np.broadcast_to(measured, (len(position), interface.size))
-    rows = np.arange(len(position))
-    known = np.isfinite(position).all(axis=1)
-    inside: Mask = known & ~maps.reshape(-1, *interface.shape)[rows, nodes[0], nodes[1]]
-    if inside.any():
-        x, y = position[int(np.argmax(inside))]
-        warn_accuracy(
-            f"the onset at x = {x:.6g} m, y = {y:.6g} m lies in a gap of the map: the strength"
-            " there was filled in, not measured"
-        )
-    return inside
-
-
-def _inside(problem: Any, position: NDArray[np.float64], measured: Mask) -> Mask:
-    """Which onsets lie in a gap; warns of them, and of critical patches that reach into one."""
-    nodes, spacing = problem.interface.size, problem.interface.spacing
-    measured = np.broadcast_to(measured, (position.size, nodes))
-    known = np.isfinite(position)
-    place = np.where(known, position, 0.0) / spacing
-    rows = np.arange(position.size)
-
-    def unknown(at: Any) -> Any:
-        return known & ~measured[rows, np.mod(at.astype(np.int64), nodes)]
-
-    inside: Mask = unknown(np.floor(place)) | unknown(np.ceil(place))
-    rate = problem.friction.weakening_rate
-    near = inside.copy()
-    if rate is not None and np.ptp(rate) == 0.0:
-        half = min(0.5 * problem.nucleation_length / spacing, 0.5 * nodes)
-        for step in np.arange(-np.floor(half), np.floor(half) + 1.0):
-            near |= unknown(np.round(place) + step)
-    for where, what in ((inside, "lies in a gap"), (near & ~inside, "reaches into a gap")):
-        if where.any():
-            first = int(np.argmax(where))
-            also = f" (and {int(where.sum()) - 1} more samples)" if where.sum() > 1 else ""
-            subject = "the onset" if what.startswith("lies") else "the critical patch"
-            warn_accuracy(
-                f"{subject} at x = {position[first]:.6g} m {what} of the profile{also}: the"
-                " strength there was filled in, not measured"
-            )
-    return inside
+def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[float]) -> Mask:
+    """Whether nodes nearer than `reach` (m, in each direction) to places (k, D) are missing."""
+    found = np.zeros(len(places), dtype=np.bool_)
+    maps = np.broadcast_to(measured, (len(places), *interface.shape))
+    for i in np.flatnonzero(np.isfinite(places).all(axis=1)):
+        missing = ~maps[i]
+        for axis, (dim, nodes) in enumerate(interface.coordinates.items()):
+            length = interface.lengths[axis]
+            apart = np.abs(np.mod(nodes - places[i, axis] + 0.5 * length, length) - 0.5 * length)
+            close = apart < (1.0 - 1e-9) * reach[axis]
+            missing = np.compress(close, missing, axis=interface.dims.index(dim))
+        found[i] = missing.any()
+    return found
 
 
 def listed(result: xr.Dataset) -> list[tuple[float, float]]:
-    """The gaps that all profiles of a result have: first and last node without a value, m."""
+    """Return the gaps that all profiles have: first and last node without a value, m."""
     return [(float(a), float(b)) for a, b in json.loads(result.attrs.get(GAPS, "[]"))]
