@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import math
 import numbers
 import os
 import types
@@ -75,6 +76,25 @@ def names_to_keep(value: Any) -> tuple[str, ...]:
     return names
 
 
+def is_whole(value: Any, least: int) -> bool:
+    """Whether a value is a whole number (1e4 too), and not less than `least`."""
+    number = whole(value)
+    return number is not None and number >= least
+
+
+def is_real(value: Any) -> bool:
+    """Whether a value is a number and neither text nor a truth value; NaN and infinity are."""
+    try:
+        return isinstance(_number(value), float)
+    except ValueError:
+        return False
+
+
+def is_finite(value: Any) -> bool:
+    """Whether a value is a finite number."""
+    return is_real(value) and math.isfinite(value)
+
+
 def real_array(value: Any) -> Array:
     """`value` as a float64 array, or a TypeError that says what it is instead."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -93,6 +113,18 @@ def is_unplaced(value: Any) -> bool:
     """Whether a profile has coordinates or units of its own, which its problem resolves."""
     own = ("dims", "to_xarray", "magnitude", "to_value")
     return isinstance(value, dict) or any(hasattr(value, name) for name in own)
+
+
+@functools.cache
+def at_least(least: int) -> Any:
+    """Return the annotation of a whole number not below `least`."""
+
+    def read(value: Any) -> int:
+        if not is_whole(value, least):
+            raise ValueError(f"must be a whole number >= {least}")
+        return int(value)
+
+    return Annotated[int, BeforeValidator(read)]
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
@@ -409,6 +441,36 @@ def checked(function: Function) -> Function:
             raise InputError(explain(error, function)) from None
 
     return typing.cast(Function, call)
+
+
+def check(name: str, value: Any, annotation: Any) -> Any:
+    """Return a value as an annotation has it, or raise an `InputError` that begins with `name`.
+
+    For what `checked` does not see, such as entries of a mapping or options of a command.
+    """
+    try:
+        return _adapter(annotation).validate_python(value)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(error, check, name)) from None
+
+
+@functools.lru_cache(maxsize=64)
+def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
+    of_class = isinstance(annotation, type)
+    return pydantic.TypeAdapter(InstanceOf[annotation] if of_class else _instances(annotation))
+
+
+def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:
+    """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
+    try:
+        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # systems that do not say
+        return
+    if needed > there:
+        raise InputError(
+            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
+            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
+        )
 
 
 def _without_return(function: Any) -> types.FunctionType:

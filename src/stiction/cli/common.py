@@ -63,9 +63,9 @@ def in_options(text: str, command: Callable[..., Any] | None) -> str:
 
 def writable(path: Path, what: str) -> Path:
     """Refuse an output file that cannot be written, before any work is done."""
-    from stiction._checks import as_path
+    from stiction.model import FilePath, check
 
-    as_path("--out", path)
+    check("--out", path, FilePath)
     folder = path.absolute().parent
     if path.is_dir():
         raise InputError(f"--out: {path} is a folder; give a file name for {what}")
@@ -78,9 +78,9 @@ def writable(path: Path, what: str) -> Path:
 
 def writable_folder(path: Path) -> Path:
     """Make a folder for several files, or refuse it before any work is done."""
-    from stiction._checks import as_path
+    from stiction.model import FilePath, check
 
-    as_path("--out", path)
+    check("--out", path, FilePath)
     if path.exists() and not path.is_dir():
         raise InputError(f"--out: {path} is a file; give the name of a folder")
     try:

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import check_instance, is_finite
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import describe, real_array
+from stiction.model import check, describe, is_finite, real_array
 from stiction.problem import Problem
 
 POINTS = 512
@@ -162,7 +161,7 @@ def _crossing(above: Array, arrest: bool) -> int:
 
 def _check(problem: Any, **numbers: Any) -> None:
     """Refuse what is no line, a residual strength that is not known, numbers not finite."""
-    check_instance("problem", problem, Problem)
+    check("problem", problem, Problem)
     problems = [
         f"{name}: must be a finite number, got {describe(value)}"
         for name, value in numbers.items()

@@ -9,12 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import check_choice, check_instance, is_real
 from stiction.arrays import Array
 from stiction.criterion.average import LocalOnset, local_onset, minimum_rows
 from stiction.criterion.windows import Weights, Window, windows_of
 from stiction.errors import InputError, warn_accuracy
-from stiction.model import describe, model
+from stiction.model import check, describe, is_real, model
 from stiction.problem import Problem, Sample
 from stiction.results import Variable, onset_variables, position
 
@@ -319,7 +318,7 @@ def nucleation_stress(
     >>> bool(tau_p.min() < tau_n.min() < tau_n.max() < tau_p.max())
     True
     """
-    check_instance("problem", problem, Problem)
+    check("problem", problem, Problem)
     check_window(problem, weights, aspect)
     check_law(problem)
     sample = problem.sample(tau_p)
@@ -345,7 +344,7 @@ def nucleation_stress(
 
 def check_window(problem: Problem, weights: Weights, aspect: Any) -> None:
     """Refuse the options of a plane on a line, and the other way round."""
-    check_choice("weights", weights, ("exact", "rounded"))
+    check("weights", weights, Literal["exact", "rounded"])
     plane = problem.interface.is_plane
     if aspect is not None and not (plane and is_real(aspect) and 0.0 < aspect < np.inf):
         valid = "a positive number" if plane else "left out on a line"

@@ -12,11 +12,10 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from stiction._checks import as_path
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.misfit import misfit, read_record
 from stiction.dynamics.simulate import simulate_rupture
-from stiction.model import Count, model
+from stiction.model import Count, FilePath, check, model
 from stiction.problem import Problem, Sample
 from stiction.results import Variable
 
@@ -29,7 +28,7 @@ _PROFILES = ("strength", "residual_strength", "weakening_rate", "initial_stress"
 
 def _record(value: Any, info: pydantic.ValidationInfo) -> Path:
     """The path of a record that can be read; in a study file relative to it."""
-    path = as_path("record", value)
+    path = check("record", value, FilePath)
     folder = (info.context or {}).get("folder")
     path = path if folder is None else Path(folder) / path
     read_record(path)

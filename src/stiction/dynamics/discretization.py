@@ -8,7 +8,6 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import check_memory
 from stiction.dynamics.arrays import Grid
 from stiction.dynamics.courant_limit import courant_limit, plane_limit
 from stiction.dynamics.memory_layout import places, step_table
@@ -18,6 +17,7 @@ from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError
 from stiction.friction.kernels import registered
 from stiction.interface import Interface
+from stiction.model import check_memory
 from stiction.problem import Problem
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import as_names
 from stiction.dynamics import monitor, stations
 from stiction.dynamics.energies import fracture_energy, strain_energy
 from stiction.dynamics.integrator import Run, State
@@ -16,6 +15,7 @@ from stiction.dynamics.stations import Stations
 from stiction.dynamics.summary import per_area
 from stiction.errors import InputError, unknown_name
 from stiction.interface import Interface
+from stiction.model import Names, check
 from stiction.results import Variable, along
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def frame_variables(interface: Interface) -> dict[str, Variable]:
 
 def check_variables(names: Sequence[str]) -> None:
     """Refuse unknown names of fields."""
-    known = as_names("variables", names)
+    known = check("variables", names, Names)
     problems = [unknown_name("variables", name, FIELDS) for name in known if name not in FIELDS]
     if problems:
         raise InputError(problems)

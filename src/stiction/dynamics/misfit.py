@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiction._checks import as_path, check_flag, check_instance
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import describe
+from stiction.model import FilePath, Flag, check, describe
 from stiction.profiles import read_table
 from stiction.units import factor_to
 
@@ -64,7 +63,7 @@ def read_record(path: str | Path) -> xr.DataArray:
     InputError
         If a unit or a place is missing, or quantities are mixed.
     """
-    path = as_path("path", path)
+    path = check("path", path, FilePath)
     table = read_table(path)
     if not table.names[0] or not table.names[0].lower().startswith(("time", "t")):
         raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
@@ -128,10 +127,10 @@ def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: bool 
     as it was. The search begins at every shift that puts the steepest moment of the record on a
     frame, which are dense where things happen, and closes in on the best three.
     """
-    check_flag("align", align)
-    check_instance("run", run, xr.Dataset)
+    check("align", align, Flag)
+    check("run", run, xr.Dataset)
     record = read_record(measured) if isinstance(measured, str | Path) else measured
-    check_instance("measured", record, xr.DataArray)
+    check("measured", record, xr.DataArray)
     kind = str(record.name)
     if kind not in UNITS:
         raise InputError(f"measured: must be named one of {', '.join(UNITS)}, got {kind!r}")

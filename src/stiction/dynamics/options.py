@@ -8,10 +8,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._checks import as_path, is_finite, is_whole
 from stiction.dynamics.method import Rupture
 from stiction.errors import InputError
-from stiction.model import describe
+from stiction.model import FilePath, check, describe, is_finite, is_whole
 from stiction.problem import Problem
 
 Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
@@ -54,7 +53,7 @@ def check_options(options: dict[str, Any]) -> None:
         if value is None:
             continue
         try:
-            as_path(name, value)
+            check(name, value, FilePath)
         except InputError as error:
             problems += error.problems
             continue

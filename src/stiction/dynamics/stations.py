@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import is_finite
 from stiction.dynamics import monitor
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.model import describe
+from stiction.model import describe, is_finite
 from stiction.results import Variable
 
 Floats = NDArray[np.float64]

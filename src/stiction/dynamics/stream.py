@@ -11,11 +11,11 @@ from typing import Any
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import as_names, as_path, check_flag
 from stiction.dynamics.frames import FIELDS, TIME, frame_variables
 from stiction.dynamics.stations import Stations
 from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.model import FilePath, Flag, Names, check
 from stiction.results import coordinate, to_dataset
 
 FORMAT = 2
@@ -59,7 +59,7 @@ class Stream:
     """
 
     def __init__(self, folder: str | Path, *, resume: bool = False) -> None:
-        self.folder = as_path("store", folder)
+        self.folder = check("store", folder, FilePath)
         self.chunks: dict[str, int] = {}  # and the last step each of them holds
         manifest = self.folder / _MANIFEST
         if manifest.exists() and resume:
@@ -143,10 +143,10 @@ def open_rupture(
     InputError
         If the folder is not such a store.
     """
-    root = as_path("store", folder)
+    root = check("store", folder, FilePath)
     if variables is not None:
-        variables = as_names("variables", variables)
-    check_flag("steps", steps)
+        variables = check("variables", variables, Names)
+    check("steps", steps, Flag)
     parts = []
     for name in _read_manifest(root)["chunks"]:
         with xr.open_dataset(root / name, engine="netcdf4") as data:

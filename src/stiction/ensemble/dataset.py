@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import check_memory
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.points import differing_in, variables_in
 from stiction.ensemble.table import Failure, Table
 from stiction.errors import warn_accuracy
+from stiction.model import check_memory
 from stiction.results import SAMPLE, Variable, coordinate, to_dataset
 
 FAILED = "failed_samples"

@@ -11,14 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import (
-    check_count,
-    check_flag,
-    check_progress,
-    is_real,
-    is_whole,
-    too_many_samples,
-)
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxis, warn_of_failures
 from stiction.ensemble.experiment import Experiment
@@ -27,11 +19,21 @@ from stiction.ensemble.points import differing_in
 from stiction.ensemble.table import Table
 from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import Method
-from stiction.model import describe, names_to_keep, to_plain
+from stiction.model import (
+    Flag,
+    Progress,
+    at_least,
+    check,
+    describe,
+    is_real,
+    is_whole,
+    names_to_keep,
+    to_plain,
+)
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, check_time_limit
 from stiction.random.checks import check_residual, warn_if_unresolved
-from stiction.random.random_field import RandomField
+from stiction.random.random_field import RandomField, too_many_samples
 from stiction.random.random_interface import RandomInterface
 
 KEEP_LIMIT = 2.0**30
@@ -172,10 +174,10 @@ def check_options(
     *, workers: Any, executor: Any, progress: Any, time_limit: Any, pilot: Any
 ) -> int | None:
     """Return the number of workers; refuse options of a run that make no sense."""
-    check_progress(progress)
-    check_flag("pilot", pilot)
+    check("progress", progress, Progress)
+    check("pilot", pilot, Flag)
     if workers is not None:
-        workers = check_count("workers", workers, 1)
+        workers = check("workers", workers, at_least(1))
     if executor is not None and not hasattr(executor, "submit"):
         raise InputError(
             f"executor: must be a concurrent.futures executor, got {describe(executor)}"
@@ -358,8 +360,8 @@ def monte_carlo(
     (('sample',), 'Pa')
     """
     names, chosen = _check_keep(keep, keep_samples, keep_limit)
-    samples, first = check_count("samples", samples, 1), check_count("first", first, 0)
-    seed = check_count("seed", seed, 0)
+    samples, first = check("samples", samples, at_least(1)), check("first", first, at_least(0))
+    seed = check("seed", seed, at_least(0))
     if problems := too_many_samples(samples, first):
         raise InputError(problems)
     workers = check_options(

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiction._checks import check_instance, check_memory
 from stiction.arrays import Array
 from stiction.equilibrium.follow import follow
 from stiction.equilibrium.solver import event_table, event_variables, make_program
 from stiction.errors import InputError, warn_accuracy
-from stiction.model import real_array, to_plain
+from stiction.model import check, check_memory, real_array, to_plain
 from stiction.problem import Problem
 from stiction.results import Variable, along, coordinate, to_dataset
 
@@ -100,7 +99,7 @@ def equilibrium_path(
     array([False,  True])
     """
     given = _check_loads(loads)
-    check_instance("problem", problem, Problem)
+    check("problem", problem, Problem)
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiction._checks import check_count, check_progress, is_finite, is_whole
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.grid import grid_of
@@ -17,7 +16,7 @@ from stiction.inference.likelihood import Likelihood, Model, make_model
 from stiction.inference.posterior import predicted
 from stiction.inference.prior import Prior, make_prior
 from stiction.methods import Method, check_method
-from stiction.model import describe
+from stiction.model import Progress, at_least, check, describe, is_finite, is_whole
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Show
 from stiction.random.random_field import RandomField
@@ -108,11 +107,11 @@ def design_of_tests(
     >>> bool(information.sel(design="many") > information.sel(design="few"))
     True
     """
-    check_progress(progress)
+    check("progress", progress, Progress)
     check_method(method)
     parameters = make_prior(problem, random, prior)
-    repetitions = check_count("repetitions", repetitions, 10)
-    seed = check_count("seed", seed, 0)
+    repetitions = check("repetitions", repetitions, at_least(10))
+    seed = check("seed", seed, at_least(0))
     found = _designs(designs, parameters, load_cell_error)
     lengths = list(dict.fromkeys(length for design in found.values() for length in design.tests))
     with Meter("design of tests", show=progress) as meter:

@@ -9,14 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from stiction._checks import (
-    check_choice,
-    check_instance,
-    check_progress,
-    is_finite,
-    is_real,
-    is_whole,
-)
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, warn_accuracy
@@ -36,7 +28,7 @@ from stiction.inference.records import Record, check_quantity, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.model import describe
+from stiction.model import Progress, check, describe, is_finite, is_real, is_whole
 from stiction.progress import Meter, Show, check_time_limit
 
 if TYPE_CHECKING:
@@ -220,18 +212,18 @@ def _checked(
     """The families to fit, or everything that is wrong with the arguments."""
     problems = check_time_limit(time_limit)
 
-    def collect(check: Any, *given: Any) -> Any:
+    def collect(function: Any, *given: Any) -> Any:
         try:
-            return check(*given)
+            return function(*given)
         except InputError as error:
             problems.extend(error.problems)
             return None
 
     if interface is not None:
-        collect(check_instance, "interface", interface, Interface)
-    collect(check_choice, "gaps", gaps, ("refuse", "skip"))
+        collect(check, "interface", interface, Interface)
+    collect(check, "gaps", gaps, Literal["refuse", "skip"])
     collect(check_quantity, quantity)
-    collect(check_progress, progress)
+    collect(check, "progress", progress, Progress)
     if not (is_whole(detrend, 0) and detrend <= HIGHEST_DEGREE):
         problems.append(f"detrend: must be a degree from 0 to 3, got {describe(detrend)}")
     if not (isinstance(noise, bool) or (is_finite(noise) and noise >= 0.0)):

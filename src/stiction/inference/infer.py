@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import check_count, check_progress, is_finite
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
 from stiction.errors import InputError, warn_accuracy
@@ -24,7 +23,7 @@ from stiction.inference.plausibility import (
 from stiction.inference.posterior import Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
 from stiction.methods import Method, check_method
-from stiction.model import describe
+from stiction.model import Progress, at_least, check, describe, is_finite
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 from stiction.random.random_field import RandomField
@@ -131,11 +130,11 @@ def infer(
     >>> 0.5e6 < low < high < 0.75e6
     True
     """
-    check_progress(progress)
+    check("progress", progress, Progress)
     check_method(method)
-    seed = check_count("seed", seed, 0)
+    seed = check("seed", seed, at_least(0))
     if samples is not None:
-        samples = check_count("samples", samples, 100)
+        samples = check("samples", samples, at_least(100))
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
     check_pressure(parameters, measured)

@@ -17,11 +17,10 @@ import scipy.stats
 from scipy.optimize import brentq, minimize
 from scipy.special import betaln, digamma, polygamma
 
-from stiction._checks import is_finite
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.noisy_marginal import without_noise
-from stiction.model import describe
+from stiction.model import describe, is_finite
 from stiction.random.marginals import (
     Beta,
     Gamma,

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import as_path, is_finite, numbers
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import describe
+from stiction.model import FilePath, Numbers, check, describe, is_finite
 from stiction.profiles import read_table
 from stiction.units import factor_to
 
@@ -113,7 +112,7 @@ def _unit(unit: Any) -> tuple[float, bool]:
 def _values(name: str, given: Any, unit: str) -> Array:
     """Peaks of one kind of specimen, in `unit`."""
     ragged = isinstance(given, list | tuple) and any(np.ndim(one) for one in given)
-    values = np.empty((0, 0)) if ragged else numbers(name, getattr(given, "values", given))
+    values = np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
     if values.ndim != 1:
         raise InputError(
             f"{name}: must be one list of numbers for one kind of specimen, got"
@@ -185,7 +184,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     >>> print(st.read_peaks(path))
     3 peaks
     """
-    path = as_path("path", path)
+    path = check("path", path, FilePath)
     try:
         return _from_table(read_table(path), unit)
     except InputError as error:

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import is_finite, numbers
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.onset_table import corners
 from stiction.inference.peaks import Peaks
-from stiction.model import describe
+from stiction.model import Numbers, check, describe, is_finite
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
@@ -108,7 +107,7 @@ class Posterior:
         ----------
         u : (parameters,) or (points, parameters) array
         """
-        given = numbers("u", u)
+        given = check("u", u, Numbers)
         found: Array = self._prior.theta(np.atleast_2d(given)).reshape(given.shape)
         return found
 
@@ -125,7 +124,7 @@ class Posterior:
         float or (points,) array
             -inf outside the prior.
         """
-        given = numbers("theta", theta)
+        given = check("theta", theta, Numbers)
         wanted = len(self.names)
         if given.ndim not in (1, 2) or given.shape[-1] != wanted:
             raise InputError(

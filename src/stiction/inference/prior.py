@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
-from stiction._checks import is_finite
 from stiction.arrays import Array
 from stiction.ensemble.dotted_keys import with_values
 from stiction.errors import InputError
-from stiction.model import describe
+from stiction.model import describe, is_finite
 from stiction.problem import Problem
 from stiction.random.marginals import marginal_of
 from stiction.random.random_field import RandomField

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import as_names, check_count, check_instance, is_finite, numbers
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import full_key, with_parameters
 from stiction.methods import Method, check_method
-from stiction.model import describe
+from stiction.model import Names, Numbers, at_least, check, describe, is_finite
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
@@ -72,10 +71,10 @@ def simulator(
     >>> simulate([2e-3, 0.66e6]).shape
     (25,)
     """
-    check_instance("problem", problem, Problem)
+    check("problem", problem, Problem)
     check_method(method)
-    names = as_names("parameters", parameters)
-    samples, seed = check_count("samples", samples, 1), check_count("seed", seed, 0)
+    names = check("parameters", parameters, Names)
+    samples, seed = check("samples", samples, at_least(1)), check("seed", seed, at_least(0))
     if not (is_finite(load_cell_error) and load_cell_error >= 0.0):
         raise InputError(
             f"load_cell_error: must be a number >= 0 in Pa, got {describe(load_cell_error)}"
@@ -86,7 +85,7 @@ def simulator(
 
     def simulate(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
-        first = check_count("first", first, 0)
+        first = check("first", first, at_least(0))
         changed = with_parameters(problem, interface, names, _values(theta, names))
         experiment = Experiment(*changed, method)
         peaks: Array = np.concatenate(
@@ -108,7 +107,7 @@ def _values(theta: Any, names: tuple[str, ...]) -> Array:
             given = describe(list(theta))
             raise InputError(f"theta: must have the keys {', '.join(names)}, got {given}")
         theta = [theta[name] for name in names]
-    values = numbers("theta", theta)
+    values = check("theta", theta, Numbers)
     if values.shape != (len(names),) or not np.isfinite(values).all():
         raise InputError(
             f"theta: must be {len(names)} finite numbers, {', '.join(names)}, got {describe(theta)}"

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import is_finite
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.whittle import Model, Observed, loss
-from stiction.model import describe
+from stiction.model import describe, is_finite
 from stiction.random.spectra import (
     ExponentialSpectrum,
     PowerLawSpectrum,

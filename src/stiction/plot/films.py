@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from stiction._checks import as_path, check_count
 from stiction.errors import InputError
+from stiction.model import FilePath, at_least, check
 from stiction.plot import maps
 from stiction.plot.axes import need, problem_of, unit_for
 from stiction.plot.ruptures import COLORS, DECADES, KEEP, finite_strength, rate_scale, since_onset
@@ -49,9 +49,9 @@ def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20)
         If a variable was not kept, or the file type is unknown.
     """
     need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
-    check_count("frames", frames, 1)
-    check_count("fps", fps, 1)
-    target = as_path("path", path)
+    check("frames", frames, at_least(1))
+    check("fps", fps, at_least(1))
+    target = check("path", path, FilePath)
     if target.suffix not in WRITERS:
         raise InputError(f"path: must end in .gif or .mp4, got {target.name!r}")
     if target.suffix == ".mp4" and not FFMpegWriter.isAvailable():

@@ -10,11 +10,10 @@ from typing import Any, Literal
 import numpy as np
 import pydantic
 
-from stiction._checks import check_choice, check_memory, too_many_samples
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import Flag, Positive, describe, model, real_array, whole
+from stiction.model import Flag, Positive, check, check_memory, describe, model, real_array, whole
 from stiction.random.mapping import (
     correlation_of_mapped,
     from_normal,
@@ -31,6 +30,10 @@ FEWEST_LENGTHS = 8.0 * math.pi
 """e-folding lengths in an interface below which a missing mean mode may be felt."""
 LOST, FALLEN, MISSED = 1e-4, 0.02, 0.1
 """What is worth a warning: shares of the variance and the power, and of a correlation."""
+
+
+MOST_SAMPLES = 10**10
+LAST_SAMPLE = 2**62
 
 
 @model
@@ -311,7 +314,7 @@ class RandomField:
 
 
 def _which(of: str) -> str:
-    check_choice("of", of, ("strength", "z"))
+    check("of", of, Literal["strength", "z"])
     return of
 
 
@@ -374,3 +377,16 @@ def _warn_of_lines(
             " power of the spectrum: it has lines or steps narrower than that, which a longer"
             " interface would resolve"
         )
+
+
+def too_many_samples(samples: int, first: int, points: int = 1) -> list[str]:
+    """Return what is wrong with numbers of samples that nobody has."""
+    problems = []
+    if samples * points > MOST_SAMPLES:
+        at = f" at each of {points} points" if points > 1 else ""
+        problems.append(
+            f"samples: must be at most {MOST_SAMPLES:.0e} in all, got {describe(samples)}{at}"
+        )
+    if first > LAST_SAMPLE:
+        problems.append(f"first: must be at most 2**62, got {describe(first)}")
+    return problems

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, model_validator
 
-from stiction._checks import check_memory
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
-from stiction.model import describe, model
+from stiction.model import check_memory, describe, model
 from stiction.problem import PROFILES
 from stiction.random.modes import Modes
 from stiction.random.random_field import RandomField, check_counts

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiction._checks import is_whole
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.methods import Method
-from stiction.model import describe, to_plain
+from stiction.model import describe, is_whole, to_plain
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField

@@ -9,9 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stiction._checks import is_real
 from stiction.methods import Method
-from stiction.model import describe
+from stiction.model import describe, is_real
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField

@@ -7,11 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stiction._checks import is_finite, is_real, is_whole
 from stiction.arrays import Array
 from stiction.errors import unknown_name
 from stiction.methods import Method
-from stiction.model import describe
+from stiction.model import describe, is_finite, is_real, is_whole
 from stiction.problem import Problem
 from stiction.progress import Meter, Show, TimeUp, check_time_limit
 from stiction.random.random_field import RandomField

@@ -12,14 +12,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from stiction._checks import is_whole, numbers
 from stiction.arrays import Array
 from stiction.criterion.windows import windows_of
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.friction import SCALES
-from stiction.model import describe
+from stiction.model import Numbers, check, describe, is_whole
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions, TimeUp
 from stiction.random.checks import check_residual, warn_if_unresolved
@@ -151,7 +150,7 @@ class LimitState:
         return found
 
     def _checked(self, draws: Any) -> Array:
-        given = numbers("draws", draws)
+        given = check("draws", draws, Numbers)
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {self.dimension}), got {given.shape}"

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from stiction._checks import numbers
 from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.model import Numbers, check
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
     InputError
         If there are fewer than `fewest`, or one is not finite.
     """
-    array = numbers("values", values).ravel()
+    array = check("values", values, Numbers).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
     if not np.all(np.isfinite(array)):

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction._checks import check_instance
 from stiction.arrays import Array
 from stiction.criterion.local import check_law, check_window
 from stiction.criterion.windows import Weights, middle_aspect, windows_of
 from stiction.errors import InputError
+from stiction.model import check
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 
@@ -132,8 +132,8 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     InputError
         If the nucleation stress is not stationary.
     """
-    check_instance("problem", problem, Problem)
-    check_instance("strength", strength, RandomField)
+    check("problem", problem, Problem)
+    check("strength", strength, RandomField)
     check_law(problem)
     sampled = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
     problems = [

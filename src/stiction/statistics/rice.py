@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction._checks import too_many_samples
 from stiction.arrays import Array
 from stiction.criterion.local import nucleation_stress
 from stiction.errors import InputError
 from stiction.jit import jit
 from stiction.model import Count, Numbers, brief, checked
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
+from stiction.random.random_field import RandomField, too_many_samples
 from stiction.statistics.moments import stationary
 
 LEVELS = 1024

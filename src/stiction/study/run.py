@@ -14,14 +14,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction._checks import as_path, is_whole
 from stiction.ensemble.dataset import Gathered, warn_of_failures
 from stiction.ensemble.monte_carlo import compute
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import SAVE_SECONDS, Store
 from stiction.ensemble.table import Failure
 from stiction.errors import InputError, StoreError, warn_user
-from stiction.model import brief, describe
+from stiction.model import FilePath, brief, check, describe, is_whole
 from stiction.progress import Show
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import check_suffix, export
@@ -205,7 +204,7 @@ class StoredRun:
         StoreError
             If it cannot be written.
         """
-        target = as_path("path", path)
+        target = check("path", path, FilePath)
         check_suffix(target)
         export(self.dataset(), target)
 
@@ -226,7 +225,7 @@ def run_into(
     mine = None if part is None else as_part(part)
     ensemble, points = study.ensemble, study.experiments
     size = len(points), ensemble.samples
-    store = Store.open(as_path("out", out), study.to_dict())
+    store = Store.open(check("out", out, FilePath), study.to_dict())
     done = store.done(*size, ensemble.first, retry=retry, whole=mine is None)
     if mine is not None:
         done |= ~mine.mask(*size)

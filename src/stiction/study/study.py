@@ -16,12 +16,6 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
-from stiction._checks import (
-    as_path,
-    check_flag,
-    check_instance,
-    too_many_samples,
-)
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import part_with_values
 from stiction.ensemble.experiment import Experiment
@@ -38,8 +32,11 @@ from stiction.errors import InputError, StoreError, unknown_name
 from stiction.methods import methods
 from stiction.model import (
     Count,
+    FilePath,
+    Flag,
     Positive,
     _count,
+    check,
     describe,
     explain,
     model,
@@ -49,7 +46,7 @@ from stiction.model import (
 )
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
-from stiction.random.random_field import RandomField
+from stiction.random.random_field import RandomField, too_many_samples
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import StoredRun, result_of, run_into
 from stiction.study.study_file import completed, read_sweep, read_toml, reading
@@ -308,7 +305,7 @@ class Study:
         WorkerError
             If a worker is lost.
         """
-        check_flag("retry", retry)
+        check("retry", retry, Flag)
         options: dict[str, Any] = {
             "workers": check_options(
                 workers=workers,
@@ -361,7 +358,7 @@ class Study:
         """
         text = tomli_w.dumps(self.to_dict())
         try:
-            as_path("path", path).write_text(text, encoding="utf-8")
+            check("path", path, FilePath).write_text(text, encoding="utf-8")
         except OSError as error:
             raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
@@ -374,8 +371,8 @@ class Study:
         A key that is swept need not have a value of its own. The points of a `trusted` study, one
         that was valid when it was stored, are not looked at one by one.
         """
-        check_instance("study", given, dict)
-        folder = None if folder is None else as_path("folder", folder)
+        check("study", given, dict)
+        folder = None if folder is None else check("folder", folder, FilePath)
         sweep, mistakes = read_sweep(given, folder, cls)
         if sweep:
             given = completed(given, sweep)
@@ -392,13 +389,13 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        path = as_path("path", path)
+        path = check("path", path, FilePath)
         return cls.from_dict(read_toml(path), folder=path.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """The study that made a result."""
-        check_instance("result", result, xr.Dataset)
+        check("result", result, xr.Dataset)
         if "study" not in result.attrs:
             raise InputError("result: has no attribute 'study'; it is not the result of a study")
         try:
@@ -494,7 +491,7 @@ def open_run(path: Any) -> StoredRun:
     StoreError
         If there is no run, or it cannot be read.
     """
-    place = as_path("path", path)
+    place = check("path", path, FilePath)
     if not place.is_dir():
         raise StoreError(f"{place}: there is no run here; a run is a folder")
     store = Store(place)

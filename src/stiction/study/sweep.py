@@ -16,11 +16,10 @@ import numpy as np
 import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from stiction._checks import is_whole
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import CORRELATION
 from stiction.errors import InputError, unknown_name
-from stiction.model import _models_in, describe, to_plain
+from stiction.model import _models_in, describe, is_whole, to_plain
 from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
 
