@@ -11,7 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.errors import InputError, warn_accuracy
-from stiction.profiles import Gaps, at_nodes, gaps_of
+from stiction.placing import Gaps, gaps_of
+from stiction.profiles import at_nodes
 
 Mask = NDArray[np.bool_]
 

@@ -16,8 +16,8 @@ from pydantic import WrapValidator
 from stiction.errors import InputError
 from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.model import Progress, checked, describe, to_plain
+from stiction.placing import Gaps
 from stiction.problem import Problem, Sample, named_profiles, refusals
-from stiction.profiles import Gaps
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
     DIRECTION,

@@ -7,29 +7,23 @@ until somebody asks for them to be filled. All of it is the same on a line and o
 
 from __future__ import annotations
 
-import csv
-import io
-import os
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import spsolve
 
 from stiction.arrays import Array
-from stiction.errors import InputError, UnitWarning, unknown_name, warn_accuracy, warn_user
-from stiction.interface import Interface
-from stiction.model import describe, real_array
+from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
+from stiction.interface import FEWEST, Interface
+from stiction.model import Flag, checked, describe, real_array
+from stiction.placing import AtNodes, Gaps, Points, close_gaps, place
+from stiction.tables import OF_A_PLANE, load, read_npy
 from stiction.units import factor_to, is_in, parse
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Gaps = Literal["refuse", "fill", "skip"]
 Map = Callable[[Array], Array]
 """From a measured quantity in SI units, such as heights, to what is wanted of it."""
 
@@ -66,53 +60,9 @@ PLACES = ("x", "position", "pos", "distance", "coordinate")
 SAMPLES = ("sample", "samples", "kept_sample")
 MEASURED = "measured"
 """Coordinate of a profile with gaps: False where there was no value."""
-OF_A_PLANE = (
-    "; a map over x and y is read with the plane it belongs to,"
-    " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
-)
-
-TEXT, NETCDF = (".csv", ".txt", ".dat", ".tsv"), (".nc", ".nc4")
-LARGEST = 2**30
-"""Bytes; a profile is one line of numbers, and what is larger than this is something else."""
-TOLERANCE = 0.02
-"""Of the spacing of nodes: what rounding in a file may move a point."""
-WIDE = 4.0
-"""Times the median distance of points: what is wider is no interval but a gap."""
-SHOWN = 3
 
 
-class Points(NamedTuple):
-    """Values of one quantity in SI, and where they belong.
-
-    Attributes
-    ----------
-    values : (..., points) array
-        Or (..., *shape) in the order of the nodes.
-    places : dict of (points,) arrays
-        m, along each direction; empty if the values come in the order of the nodes.
-    measured : array of bool or None
-        Of the shape of `values`; False where a gap was filled earlier.
-    """
-
-    values: Array
-    places: dict[str, Array]
-    measured: NDArray[np.bool_] | None = None
-
-
-class AtNodes(NamedTuple):
-    """Values at the nodes.
-
-    Attributes
-    ----------
-    values : (..., *shape) array
-    measured : (..., *shape) array of bool or None
-        False where there was no value, be it filled in or left out; None if nothing is missing.
-    """
-
-    values: Array
-    measured: NDArray[np.bool_] | None
-
-
+@checked
 def read_profile(
     source: Any,
     *,
@@ -123,7 +73,7 @@ def read_profile(
     quantity: str = "strength",
     strength: Map | None = None,
     interface: Interface | None = None,
-    interpolate: bool = False,
+    interpolate: Flag = False,
     gaps: Gaps = "refuse",
 ) -> xr.DataArray:
     """Read a profile along the interface from a file or a labelled array, in SI units.
@@ -197,7 +147,18 @@ def read_profile(
     """
     import xarray as xr
 
-    _check_options(quantity, unit, x_unit, strength, interface, interpolate, gaps, x)
+    if quantity not in UNITS:
+        raise InputError(unknown_name("quantity", quantity, UNITS))
+    if interface is None and (interpolate or gaps == "fill"):
+        raise InputError("interface: needed to interpolate, or to fill gaps")
+    if interface is not None and interface.is_plane:
+        if interpolate:
+            raise InputError(
+                "interpolate: is an option of profiles of a line; on a plane values are taken at"
+                " the nodes"
+            )
+        if x is not None or x_unit is not None:
+            raise InputError("x and x_unit: are options of profiles of a line")
     name = str(source) if isinstance(source, str | Path) else "source"
     try:
         dims = ("x",) if interface is None else interface.dims
@@ -224,39 +185,6 @@ def read_profile(
     return xr.DataArray(found.values, coords, dims, name=quantity, attrs=attributes)
 
 
-def _check_options(
-    quantity: Any, unit: Any, x_unit: Any, strength: Any, interface: Any, interpolate: Any,
-    gaps: Any, x: Any,
-) -> None:  # fmt: skip
-    problems = []
-    if quantity not in UNITS:
-        problems.append(unknown_name("quantity", str(quantity), UNITS))
-    if interface is not None and not isinstance(interface, Interface):
-        problems.append(f"interface: must be an Interface, got {describe(interface)}")
-    for what, text in {"unit": unit, "x_unit": x_unit}.items():
-        if text is not None and not isinstance(text, str):
-            problems.append(f"{what}: must be a text such as 'um', got {describe(text)}")
-    if strength is not None and not callable(strength):
-        problems.append(
-            "strength: must be a function that makes strength (Pa) of an array of heights (m), such"
-            f" as lambda h: 1e12 * h; got {describe(strength)}"
-        )
-    if gaps not in get_args(Gaps):
-        problems.append(f"gaps: must be 'refuse', 'fill' or 'skip', got {gaps!r}")
-    if interface is None and (interpolate or gaps == "fill"):
-        problems.append("interface: needed to interpolate, or to fill gaps")
-    if isinstance(interface, Interface) and interface.is_plane:
-        if interpolate:
-            problems.append(
-                "interpolate: is an option of profiles of a line; on a plane values are taken at"
-                " the nodes"
-            )
-        if x is not None or x_unit is not None:
-            problems.append("x and x_unit: are options of profiles of a line")
-    if problems:
-        raise InputError(problems)
-
-
 def _sorted(points: Points) -> tuple[AtNodes, dict[str, Array]]:
     """Points of a line in the order of x, which need not be that of any nodes."""
     if not points.places:
@@ -268,9 +196,6 @@ def _sorted(points: Points) -> tuple[AtNodes, dict[str, Array]]:
         raise InputError(f"x repeats: {x[again[0]]:.9g} m stands beside two values{OF_A_PLANE}")
     measured = None if points.measured is None else points.measured[order]
     return AtNodes(points.values[order], measured), {"x": x}
-
-
-# ---- what a source holds ------------------------------------------------------------------------
 
 
 def is_labelled(value: Any) -> bool:
@@ -329,7 +254,7 @@ def points_of(
     import xarray as xr
 
     if isinstance(source, str | Path):
-        data = _load(Path(source), x, value, dims)
+        data = load(Path(source), value, dims)
     elif is_labelled(source):
         data = source
     elif callable(getattr(source, "heights", None)) and hasattr(source, "physical_sizes"):
@@ -574,9 +499,6 @@ def _along(array: Any, dims: tuple[str, ...], x: Any) -> Any:
     return array.assign_coords(x=("x", place.data, place.attrs))
 
 
-# ---- units and maps -----------------------------------------------------------------------------
-
-
 def _factor(given: str | None, array: Any, what: str, si: str | None = None) -> float:
     """To SI, from what the caller says and what the source states."""
     stated, si = _unit_of(array), si or UNITS[what]
@@ -658,95 +580,6 @@ def _mapped(strength: Map, values: Array, quantity: str) -> Array:
     return found
 
 
-# ---- files --------------------------------------------------------------------------------------
-
-
-def _load(path: Path, x: Any, value: Any, dims: tuple[str, ...]) -> xr.Dataset:
-    """The variables of a file; those of a table are along 'row'."""
-    import xarray as xr
-
-    ending = path.suffix.lower()
-    if ending in TEXT:
-        return _dataset(read_table(path))
-    if ending in NETCDF:
-        _content(path, read=False)
-        try:
-            # Times are not decoded: a variable in seconds is refused by its unit, like any other.
-            with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
-                kept = [
-                    name for name, one in opened.data_vars.items()
-                    if one.dtype.kind in "fiu" and one.nbytes <= LARGEST
-                    and sum(size != 1 for size in one.shape) == len(dims)
-                ]  # fmt: skip
-                return opened[kept].squeeze(drop=True).load()
-        except (OSError, ValueError, RuntimeError, KeyError, AttributeError, TypeError) as error:
-            raise InputError(f"is no NetCDF file of numbers: {error}") from None
-    if ending != ".npy":
-        raise InputError(
-            f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r}; files"
-            " of instruments: give what SurfaceTopography.read_topography(path) returns"
-        )
-    array = _npy(path)
-    if len(dims) == 2:
-        if value is not None:
-            raise InputError(
-                "value: a .npy file of a plane holds one array, without names; got"
-                f" {describe(value)}"
-            )
-        if array.ndim != 2:
-            raise InputError(f"must have shape (nx, ny), got shape {array.shape}")
-        return xr.Dataset({"0": (dims, array, {"unnamed": True})})
-    if array.ndim == 1 and array.size:
-        return _dataset(Table([None], [None], [None], array[np.newaxis]))
-    if array.ndim == 2 and array.size and value is not None:
-        blank: list[None] = [None] * array.shape[1]
-        return _dataset(Table(blank, blank, blank, array.T))
-    hint = f"; of an array of columns say which: x=0, value=1{OF_A_PLANE}" * (array.ndim == 2)
-    raise InputError(f"must hold one profile, shape (nodes,), got shape {array.shape}{hint}")
-
-
-def _dataset(table: Table) -> xr.Dataset:
-    """The columns as variables along 'row'."""
-    import xarray as xr
-
-    variables: dict[str, Any] = {}
-    for number, (name, unit, heading, column) in enumerate(zip(*table, strict=True)):
-        attributes: dict[str, Any] = {"units": unit} if unit else {}
-        attributes["number"] = number
-        attributes |= {"unnamed": True} if name is None else {"heading": heading}
-        key = str(number) if name is None else name
-        if key in variables:
-            key = str(heading) if heading not in variables else f"{key} {number}"
-        variables[key] = ("row", column, attributes)
-    return xr.Dataset(variables)
-
-
-def _content(path: Path, *, read: bool = True) -> bytes:
-    """All of a regular file of reasonable size."""
-    try:
-        size = os.stat(path).st_size
-        if not path.is_file():
-            raise InputError("is not a regular file")
-        if size > LARGEST:
-            raise InputError(f"has {size} bytes, more than the {LARGEST} of a profile")
-        return path.read_bytes() if read else b""
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}") from None
-
-
-def _npy(path: Path) -> Array:
-    try:
-        array = np.load(io.BytesIO(_content(path)), allow_pickle=False)
-    except InputError:
-        raise
-    except Exception as error:  # numpy lets through whatever Python's own parser raises
-        text = str(error).splitlines()[0] if str(error) else "its header cannot be read"
-        raise InputError(f"is not a .npy file of numbers: {text}") from None
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        raise InputError(f"must hold numbers, got {getattr(array, 'dtype', 'an archive')}")
-    return np.squeeze(array.astype(np.float64))
-
-
 def _topography(source: Any, quantity: str, strength: Map | None) -> xr.DataArray:
     """Heights (m) of a line scan or map of the SurfaceTopography library; NaN where undefined."""
     import xarray as xr
@@ -767,472 +600,6 @@ def _topography(source: Any, quantity: str, strength: Map | None) -> xr.DataArra
         for dim, size, n in zip(dims, source.physical_sizes, heights.shape, strict=True)
     }
     return xr.DataArray(heights, coords, dims, name="height", attrs={"units": str(unit)})
-
-
-_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
-_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
-_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*$")
-
-
-class Table(NamedTuple):
-    """Columns of numbers.
-
-    Attributes
-    ----------
-    names, units, headings : sequences of str or None
-        One entry for each column; None where the file says nothing.
-    columns : (columns, lines) array
-        NaN where a cell is empty.
-    """
-
-    names: Sequence[str | None]
-    units: Sequence[str | None]
-    headings: Sequence[str | None]
-    columns: Array
-
-
-def read_table(path: Path) -> Table:
-    """Read a table of numbers from a text file.
-
-    Columns are separated by semicolons, tabs, commas or blanks, in this order of preference; the
-    decimal sign may be a comma unless commas separate. Lines that begin with ``#`` are comments;
-    the last one before the numbers names the columns if no other line does. Names may have a line
-    of units below them, and lines of another number of cells above them.
-
-    Raises
-    ------
-    InputError
-        Naming the line that does not fit.
-    """
-    lines, comment = [], ""
-    for number, line in enumerate(_decoded(path).splitlines(), 1):
-        if line.lstrip().startswith("#"):
-            comment = comment if lines else line.strip().lstrip("#").strip()
-        elif line.strip():
-            lines.append((number, line))
-    separator = _separator([line for _, line in lines])
-    rows = [(number, _split(line, separator)) for number, line in lines]
-    header = []
-    while rows and not any(_number(cell, separator) is not None for cell in rows[0][1]):
-        header.append(rows.pop(0))
-    if not rows:
-        raise InputError("holds no numbers")
-    if len(rows) == 1 and len(rows[0][1]) > 3:  # one line of values
-        rows = [(rows[0][0], [cell]) for cell in rows[0][1]]
-    width = len(rows[0][1])
-    whole = re.compile(r"[+-]?\d+$")
-    if separator == "," and not header and width == 2 and all(
-        whole.match(cell) for _, cells in rows for cell in cells
-    ):  # fmt: skip
-        raise InputError(
-            f"line {rows[0][0]}: {','.join(rows[0][1])!r} may be one number or two; separate"
-            " columns with ';', or write decimal points"
-        )
-    columns = np.full((width, len(rows)), np.nan)
-    for place, (number, cells) in enumerate(rows):
-        if len(cells) != width:
-            raise InputError(
-                f"line {number} has {len(cells)} columns, line {rows[0][0]} has {width}"
-            )
-        for column, cell in enumerate(cells):
-            value = _number(cell, separator)
-            if value is None and cell.lower() not in _EMPTY:
-                raise InputError(f"line {number}: {describe(cell)} is no number")
-            columns[column, place] = np.nan if value is None else value
-    if not header and comment:
-        cells = _split(comment, separator)
-        header = [(0, cells)] if len(cells) == width else [(0, [comment])] if width == 1 else []
-    return Table(*_headings(header, width), columns)
-
-
-def _decoded(path: Path) -> str:
-    """The text of a file: UTF-8 or UTF-16 with a mark, or else Windows' western code page."""
-    data = _content(path)
-    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
-        try:
-            text = data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        if "\0" not in text:
-            return text
-    raise InputError("is not a text file")
-
-
-def _separator(lines: list[str]) -> str:
-    for mark in (";", "\t"):
-        if any(mark in line for line in lines):
-            return mark
-    if not any("," in line for line in lines):
-        return " "
-    # Blanks separate numbers with decimal commas: '0,1 1000,5'; but '0.1, 1000.5' has commas.
-    last = lines[-1]
-    return " " if re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last) else ","
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if separator != " ":
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
-    cells = line.split()
-    if all(_number(cell, " ") is not None or cell.lower() in _EMPTY for cell in cells):
-        return cells
-    return [cell.strip() for cell in _WORDS.findall(line)]
-
-
-def _number(cell: str, separator: str) -> float | None:
-    if separator != "," and cell.count(",") == 1 and "." not in cell:
-        cell = cell.replace(",", ".")
-    try:
-        return None if "_" in cell else float(cell)  # Python reads 1_000, people do not
-    except ValueError:
-        return None
-
-
-def _headings(
-    header: list[tuple[int, list[str]]], width: int
-) -> tuple[list[str | None], list[str | None], list[str | None]]:
-    rows = [(number, cells) for number, cells in header if len(cells) == width]
-    if header and not rows:
-        number, cells = header[-1]
-        raise InputError(
-            f"line {number} names {len(cells)} columns, the numbers below it have {width}; begin"
-            " lines that are no names with '#'"
-        )
-    if not rows:
-        return [None] * width, [None] * width, [None] * width
-    pairs = [name_and_unit(cell) for cell in rows[0][1]]
-    names: list[str | None] = [name for name, _ in pairs]
-    units = [unit for _, unit in pairs]
-    for number, cells in rows[1:]:
-        for column, cell in enumerate(cells):
-            inner = _BRACKETS.match(cell)
-            stated = inner["unit"] if inner and not inner["name"] else cell
-            if not stated:
-                continue
-            if units[column] is not None or number != rows[1][0]:
-                raise InputError(f"line {number}: {describe(cell)} is neither a number nor a unit")
-            units[column] = stated
-    return names, units, list(rows[0][1])
-
-
-def name_and_unit(text: str) -> tuple[str, str | None]:
-    """Take a heading apart: 'strength (MPa)', 'tau / MPa', 'x_mm', 'x in mm', 'tau MPa'."""
-    match = _BRACKETS.match(text)
-    if match:
-        return match["name"].strip(), match["unit"] or None
-    if " / " in text:
-        name, unit = text.split(" / ", 1)
-        return name.strip(), unit.strip()
-    parts = re.split(r"[\s,_:]+(?:in\s+)?", text.strip())
-    if len(parts) > 1 and len(parts[-1]) > 1 and parse(parts[-1]) is not None:
-        return text[: text.rindex(parts[-1])].rstrip(" ,_:").removesuffix(" in"), parts[-1]
-    if parse(text) is not None and len(text) > 1:
-        return "", text
-    return text.strip(), None
-
-
-# ---- on the nodes -------------------------------------------------------------------------------
-
-
-def place(
-    points: Points, interface: Interface, *, interpolate: bool = False, gaps: Gaps = "refuse"
-) -> AtNodes:
-    """Put values on the nodes of an interface.
-
-    Parameters
-    ----------
-    points : Points
-        NaN where there is no value.
-    interface : Interface
-    interpolate : bool
-        Whether points of a line may lie elsewhere than the nodes; then linearly and periodically.
-    gaps : {"refuse", "fill", "skip"}
-
-    Raises
-    ------
-    InputError
-        If points repeat, reach beyond a period or lie elsewhere than the nodes, or values are
-        missing and may not be filled in.
-    """
-    values, measured = points.values, points.measured
-    if not points.places:
-        shape = values.shape[-len(interface.shape) :]
-        if shape != interface.shape:
-            raise InputError(_other_shape(shape, interface))
-        return _close(values, measured, interface, gaps)
-    if values.size == 0:
-        raise InputError("has no values")
-    problems: list[str] = []
-    put = _put(points.places, values, interface, interpolate, problems)
-    if problems and np.isnan(values).any() and gaps == "refuse":
-        problems.append(
-            f"{int(np.isnan(values).sum())} of {values.size} points have no value (NaN); fill such"
-            " gaps with gaps='fill'"
-        )
-    if problems:
-        raise InputError(problems)
-    if measured is not None:
-        measured = put(measured * 1.0) > 0.999
-    return _close(put(values), measured, interface, gaps)
-
-
-def _other_shape(shape: tuple[int, ...], interface: Interface) -> str:
-    if interface.is_plane:
-        turned = shape == interface.shape[::-1] != interface.shape
-        hint = "; x and y have changed places: the first axis of a profile is x" * turned
-        return f"must have shape {interface.shape}, got shape {shape}{hint}"
-    return (
-        f"has {shape[-1] if shape else 1} values, the interface has {interface.size} nodes"
-        " (interface.size); give a value for each node, or x beside the values (x=... names its"
-        " column), with interpolate=True where points lie elsewhere than the nodes"
-    )
-
-
-def _put(
-    places: dict[str, Array], values: Array, interface: Interface, interpolate: bool,
-    problems: list[str],
-) -> Callable[[Array], Array]:  # fmt: skip
-    """A function that puts values (..., points) on the nodes, NaN where there are none."""
-    kept: Any = slice(None)
-    at = []
-    for axis, dim in enumerate(interface.dims):
-        n, spacing, length = (
-            interface.shape[axis],
-            interface.spacings[axis],
-            interface.lengths[axis],
-        )
-        x, which = np.unique(places[dim], return_inverse=True)
-        if not np.all(np.isfinite(x)):
-            entry = int(np.argmin(np.isfinite(places[dim])))
-            raise InputError(f"{dim} must be finite; entry {entry} is not")
-        if x[-1] - x[0] > length + TOLERANCE * spacing:
-            raise InputError(_too_long(dim, x, length))
-        if abs(x[-1] - x[0] - length) <= TOLERANCE * spacing:
-            kept = _without_closing_points(dim, which, x, values, interface)
-        again = np.flatnonzero(np.diff(x) <= 1e-6 * spacing)
-        if again.size or (len(places) == 1 and x.size < which.size):
-            first = int(again[0]) if again.size else int(np.argmax(np.bincount(which) > 1))
-            last = min(first + 1, x.size - 1) if again.size else first
-            raise InputError(f"{dim} repeats: {x[first]:.9g} and {x[last]:.9g} m are one place")
-        offset = _offset(x, n, spacing, length, coarse=interface.is_plane)
-        if offset is None and not interpolate:
-            problems.append(_elsewhere(dim, x, n, spacing))
-            continue
-        if offset is None:
-            return lambda rows: _interpolated(places[dim][kept], rows[..., kept], interface)
-        if abs(offset) > TOLERANCE:
-            warn_accuracy(
-                f"{dim} lies {offset:.2g} of a spacing beside the nodes {dim}_i = i L/n, as at the"
-                f" centres of cells: node i stands for {dim}_i {offset * spacing:+.4g} m, to be"
-                " added to positions in the result"
-            )
-        at.append(np.round(x / spacing - offset).astype(np.int64)[which] % n)
-    if problems:
-        return lambda rows: rows
-    flat = np.ravel_multi_index([index[kept] for index in at], interface.shape)
-    if np.unique(flat).size < flat.size:
-        raise InputError(f"{' and '.join(interface.dims)} repeat: two points lie at one node")
-
-    def put(rows: Array) -> Array:
-        full = np.full((*rows.shape[:-1], interface.size), np.nan)
-        full[..., flat] = rows[..., kept]
-        return full.reshape(*rows.shape[:-1], *interface.shape)
-
-    return put
-
-
-def _too_long(dim: str, x: Array, length: float) -> str:
-    hint = (
-        f"crop the record, as profile.sel({dim}=slice(0, ...)) does, or make interface.length"
-        f" {float(x[-1] - x[0]):.6g} m"
-    )
-    for unit, factor in (("mm", 1e-3), ("um", 1e-6)):
-        if 0.3 * length < factor * (x[-1] - x[0]) <= 1.001 * length:
-            hint = f"if x is in {unit}, say so: units of x in the file, or x_unit={unit!r}"
-    return (
-        f"{dim} reaches from {x[0]:g} to {x[-1]:g} m, the interface is {length:g} m long"
-        f" (interface.extent); {hint}"
-    )
-
-
-def _without_closing_points(
-    dim: str, which: NDArray[np.int64], x: Array, values: Array, interface: Interface
-) -> NDArray[np.bool_]:
-    """All points but the last, which are the first ones again, a period later."""
-    first, last = which == 0, which == x.size - 1
-    if not np.array_equal(values[..., first], values[..., last], equal_nan=True):
-        raise InputError(
-            f"{dim} = {x[0]:g} and {x[-1]:g} m are one place of an interface with the period"
-            f" {interface.length} m (interface.extent), with two values; leave out one end, as"
-            " np.linspace(0, L, n, endpoint=False) does"
-        )
-    return ~last
-
-
-def _offset(x: Array, n: int, spacing: float, length: float, *, coarse: bool) -> float | None:
-    """By how many spacings, in (-0.5, 0.5], all points lie beside nodes; None if by no one number.
-
-    On a line, a grid that is coarser than the nodes does not count, even if its points are nodes.
-    """
-    if abs(x[-1] - x[0] - length) <= TOLERANCE * spacing:
-        x = x[:-1]
-    at = x / spacing
-    if at.size < 2 or (not coarse and np.median(np.diff(at)) > 1.5):
-        return 0.0 if coarse and abs(at[0] - round(at[0])) <= TOLERANCE else None
-    first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
-    deviation = at - first - np.round(at - first)
-    return float(first + deviation.mean()) if np.abs(deviation).max() <= TOLERANCE else None
-
-
-def _elsewhere(dim: str, x: Array, n: int, spacing: float) -> str:
-    step = float(np.median(np.diff(x))) if x.size > 1 else 0.0
-    fit = f", or interface.length = {x.size * step:.6g}" if x.size == n else ""
-    hint = ""
-    for unit, factor in (("mm", 1e-3), ("um", 1e-6), ("km", 1e3)):
-        if abs(factor * step / spacing - 1.0) < 1e-3:
-            hint = f"; if x is in {unit}, say so: units of x in the file, or x_unit={unit!r}"
-    return (
-        f"{dim} lies elsewhere than the {n} nodes {dim}_i = i L/n: {x.size} points from"
-        f" {x[0]:.6g} to {x[-1]:.6g} m, {step:.6g} m apart, the nodes {spacing:.6g} m"
-        f" (interface.extent / interface.size); give values at the nodes{fit}, or ask for linear"
-        f" interpolation with interpolate=True{hint}"
-    )
-
-
-def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Linear between points, and NaN in intervals that are gaps."""
-    length, nodes = interface.extent, interface.x
-    order = np.argsort(x, kind="stable")
-    x, rows = x[order], values.reshape(-1, x.size)[:, order]
-    found = np.empty((rows.shape[0], nodes.size))
-    typical = float(np.median(np.diff(x))) if x.size > 1 else length
-    widest = 0.0
-    for row, target in zip(rows, found, strict=True):
-        known = np.flatnonzero(~np.isnan(row))
-        if known.size == 0:
-            raise InputError("has no value at all")
-        begin = x[known]
-        target[:] = np.interp(nodes, begin, row[known], period=length)
-        end = np.append(begin[1:], begin[0] + length)
-        left_out = np.append(np.diff(known) > 1, known[-1] - known[0] < x.size - 1)
-        wide = (end - begin > WIDE * max(typical, interface.spacing)) | left_out
-        widest = max(widest, float(np.max((end - begin)[~wide], initial=0.0)))
-        margin = TOLERANCE * interface.spacing
-        for a, b in zip(begin[wide], end[wide], strict=True):
-            into = np.mod(nodes - a, length)
-            target[(into > margin) & (into < b - a - margin)] = np.nan
-    warn_accuracy(
-        f"{x.size} points are interpolated linearly to {nodes.size} nodes; the widest distance"
-        f" between them is {widest:.3g} m, {widest / interface.spacing:.3g} times the spacing of"
-        " nodes"
-    )
-    return found.reshape(*values.shape[:-1], nodes.size)
-
-
-# ---- gaps ---------------------------------------------------------------------------------------
-
-
-def _close(
-    values: Array, measured: NDArray[np.bool_] | None, interface: Interface, gaps: Gaps
-) -> AtNodes:
-    """Values (..., *shape) with NaN where nothing was measured, refused, left or filled."""
-    missing = np.isnan(values)
-    if not missing.any():
-        return AtNodes(values, measured)
-    text = describe_gaps(missing, interface)
-    how = "smoothly from around them" if interface.is_plane else "with straight lines"
-    if gaps == "refuse":
-        raise InputError(
-            f"must be finite: there {text}; give what was measured, or fill gaps {how}, which the"
-            f" result then remembers: gaps='fill'{_much_missing(missing, interface)}"
-        )
-    whole = ~missing if measured is None else ~missing & measured
-    if gaps == "skip":
-        return AtNodes(values, whole)
-    filled = values.reshape(-1, *interface.shape).copy()
-    for one, hole in zip(filled, missing.reshape(filled.shape), strict=True):
-        if hole.all():
-            raise InputError("has no value at all")
-        if hole.any():
-            _fill(one, hole, interface.spacings)
-    warn_accuracy(f"there {text}; filled {how}")
-    return AtNodes(filled.reshape(values.shape), whole)
-
-
-def _much_missing(missing: NDArray[np.bool_], interface: Interface) -> str:
-    """What to do where a record is much shorter than the interface."""
-    if interface.is_plane or missing.ndim > 1:
-        return ""
-    gap = max((b - a) % interface.extent for a, b in gaps_of(missing, interface))
-    if gap < 0.25 * interface.extent:
-        return ""
-    length = interface.extent - gap - interface.spacing
-    return (
-        f". The record covers {length:.4g} m of the interface; if it holds no more, make"
-        f" interface.length {length:.6g}"
-    )
-
-
-def _fill(values: Array, hole: NDArray[np.bool_], spacings: tuple[float, ...]) -> None:
-    """Solve Laplace's equation of the nodes in the hole, periodically.
-
-    The measured nodes around it are its rim: on a line that is the straight line between the ends,
-    and nothing in it is higher or lower than its rim.
-    """
-    number = np.full(hole.shape, -1)
-    number[hole] = np.arange(hole.sum())
-    places = np.nonzero(hole)
-    own = number[places]
-    rows, columns, entries = [own], [own], [np.zeros(own.size)]
-    right = np.zeros(own.size)
-    for axis, spacing in enumerate(spacings):
-        weight = (min(spacings) / spacing) ** 2
-        for step in (-1, 1):
-            beside = list(places)
-            beside[axis] = (places[axis] + step) % hole.shape[axis]
-            there = number[tuple(beside)]
-            known = there < 0
-            entries[0] += weight
-            right[known] += weight * values[tuple(beside)][known]
-            rows.append(own[~known])
-            columns.append(there[~known])
-            entries.append(np.full(int((~known).sum()), -weight))
-    index = (np.concatenate(rows), np.concatenate(columns))
-    matrix = csr_array((np.concatenate(entries), index), shape=(own.size, own.size))
-    values[hole] = spsolve(matrix.tocsc(), right)
-
-
-def gaps_of(missing: NDArray[np.bool_], interface: Interface) -> list[tuple[float, float]]:
-    """Return where nodes of a line lack a value: first and last, m; first > last across x = 0."""
-    if missing.all():
-        return [(0.0, float(interface.x[-1]))]
-    starts = np.flatnonzero(missing & ~np.roll(missing, 1))
-    ends = np.flatnonzero(missing & ~np.roll(missing, -1))
-    if ends.size and ends[0] < starts[0]:  # one begins before x = 0 and ends behind it
-        ends = np.roll(ends, -1)
-    x = interface.x
-    return [(float(x[a]), float(x[b])) for a, b in zip(starts, ends, strict=True)]
-
-
-def describe_gaps(missing: NDArray[np.bool_], interface: Interface) -> str:
-    """Say 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
-    maps = missing.reshape(-1, *interface.shape)
-    with_gaps = maps.reshape(len(maps), -1).any(axis=1)
-    row = int(np.argmax(with_gaps))
-    count = f"{int(maps[row].sum())} of {interface.size} nodes"
-    which = f" in sample {row}" if len(maps) > 1 else ""
-    others = int(with_gaps.sum()) - 1
-    which += f", and in {others} more samples" if others else ""
-    if interface.is_plane:
-        first = interface.describe_node(int(np.argmax(maps[row])))
-        return f"are no values (NaN) at {count}, the first at {first}{which}"
-    spans = gaps_of(maps[row], interface)
-    at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in spans[:SHOWN])
-    more = f" and {len(spans) - SHOWN} more gaps" if len(spans) > SHOWN else ""
-    return f"are no values (NaN) at x = {at}{more} ({count}{which})"
-
-
-# ---- profiles of samples and of problems --------------------------------------------------------
 
 
 def at_nodes(
@@ -1257,7 +624,7 @@ def at_nodes(
         if gaps != "refuse":
             array = real_array(value)
             if array.shape[-len(shape) :] == shape:
-                return _close(array, None, interface, gaps)
+                return close_gaps(array, None, interface, gaps)
     except TypeError:
         pass  # no numbers: refused with everything else that is wrong
     except InputError as error:
@@ -1318,8 +685,8 @@ def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
     path = Path(folder) / table["file"]
     try:
         if path.suffix.lower() == ".npy" and len(table) == 1:
-            array = _npy(path)
-            if array.ndim == 2 and min(array.shape) >= 8:  # a plane, and no columns
+            array = read_npy(path)
+            if array.ndim == 2 and min(array.shape) >= FEWEST:  # a plane, and no columns
                 return array
         columns = {name: table[name] for name in read if name in table}
         points = points_of(path, quantity_of(field), **columns)

@@ -12,7 +12,7 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import FilePath, Flag, check, describe
-from stiction.profiles import read_table
+from stiction.tables import read_table
 from stiction.units import factor_to
 
 UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa", "strain": "1"}

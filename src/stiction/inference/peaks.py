@@ -12,7 +12,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import FilePath, Numbers, check, describe, is_finite
-from stiction.profiles import read_table
+from stiction.tables import read_table
 from stiction.units import factor_to
 
 FEWEST = 3
