@@ -46,7 +46,7 @@ _HOMES = {
     "read_peaks": "inference.peaks",
     "infer": "inference.infer",
     "design_of_tests": "inference.design",
-    "Ensemble": "study.study",
+    "Ensemble": "ensemble.experiment",
     "Study": "study.study",
     "open_run": "study.study",
     "RunError": "errors",

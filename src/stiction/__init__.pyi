@@ -11,6 +11,7 @@ from stiction.dynamics.compared import RuptureMisfit as RuptureMisfit
 from stiction.dynamics.method import Rupture as Rupture
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.dynamics.stream import open_rupture as open_rupture
+from stiction.ensemble.experiment import Ensemble as Ensemble
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
 from stiction.equilibrium.method import Equilibrium as Equilibrium
 from stiction.equilibrium.path import equilibrium_path as equilibrium_path
@@ -71,7 +72,6 @@ from stiction.reliability.design import (
 )
 from stiction.reliability.estimate import failure_probability as failure_probability
 from stiction.solid import Solid as Solid
-from stiction.study.study import Ensemble as Ensemble
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run
 

@@ -67,15 +67,6 @@ def _count(value: Any) -> Any:
     return count
 
 
-def names_to_keep(value: Any) -> tuple[str, ...]:
-    """One name or several, as a tuple."""
-    several = isinstance(value, list | tuple | set | frozenset)
-    names = tuple(value) if several else (value,)
-    if not all(isinstance(name, str) for name in names):
-        raise InputError(f"keep: must be a name or a list of names, got {describe(value)}")
-    return names
-
-
 def is_whole(value: Any, least: int) -> bool:
     """Whether a value is a whole number (1e4 too), and not less than `least`."""
     number = whole(value)
@@ -170,6 +161,8 @@ def _plain(value: Any) -> Any:
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
 Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
+Number: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=0)]
+"""A whole number that is not negative."""
 PROFILE_SCHEMA = [
     {"type": "number"},
     {"type": "array", "items": {"type": "number"}},

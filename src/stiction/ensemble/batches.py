@@ -11,10 +11,11 @@ from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numba
 import numpy as np
+from pydantic import BeforeValidator
 from threadpoolctl import threadpool_limits
 
 from stiction import __version__
@@ -32,6 +33,16 @@ TICK = 1.0
 """Seconds after which an iteration goes on although nothing is done."""
 ASK = 2.0
 """Seconds after which a scheduler is asked again how many workers it has."""
+
+
+def _executor(value: Any) -> Any:
+    if not hasattr(value, "submit"):
+        raise ValueError("must be a concurrent.futures executor")
+    return value
+
+
+AnyExecutor: TypeAlias = Annotated[Any, BeforeValidator(_executor)]
+"""Anything that has `submit`: processes, a Dask client's executor, ..."""
 
 
 class Span(NamedTuple):

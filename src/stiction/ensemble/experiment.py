@@ -6,15 +6,16 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.methods import Values, accepted, check_method, prepared, variables_of
-from stiction.model import describe
+from stiction.methods import Solver, Values, accepted, check_method, prepared, variables_of
+from stiction.model import Count, Names, Number, Positive, describe, model, whole
 from stiction.problem import PROFILES, Problem, Sample, refusals
 from stiction.random.checks import check_residual, warn_if_unresolved
 from stiction.random.pressure import (
@@ -27,6 +28,16 @@ from stiction.random.random_interface import as_random_interface
 from stiction.random.synthesis import block_of
 from stiction.results import Variable, along
 
+if TYPE_CHECKING:
+    from stiction.random.random_field import RandomField
+    from stiction.random.random_interface import RandomInterface
+
+    AnyRandom: TypeAlias = RandomInterface | RandomField
+else:
+    AnyRandom = Any  # an `Experiment` checks it
+
+MOST_KEPT = 10**6
+"""Samples whose profiles may be kept."""
 SLOW = 32
 """Methods that solve fewer samples at once take so long that drawing does not matter."""
 MOST_NODES = 1 << 20
@@ -208,7 +219,11 @@ class Experiment:
         InputError
             If a sample does not fit the method.
         """
-        return _solver(self.problem, self.method)(self.sample(profiles))
+        return self.prepare()(self.sample(profiles))
+
+    def prepare(self) -> Solver:
+        """Return the prepared solver of the method, which is kept for the next call."""
+        return _solver(self.problem, self.method)
 
     def results(self, seed: int, first: int, count: int) -> Values:
         """Return all `variables` of samples first .. first + count - 1, solved at once.
@@ -253,7 +268,7 @@ class Experiment:
 
 
 @lru_cache(maxsize=8)
-def _solver(problem: Problem, method: Any) -> Any:
+def _solver(problem: Problem, method: Any) -> Solver:
     return prepared(problem, method)
 
 
@@ -284,3 +299,62 @@ def _keeping(
             names = {n for n in switches | set(method.variables(problem)) if wide(n)}
             problems.append(unknown_name("keep", name, sorted(random | names)))
     return method, problems
+
+
+def _chosen(value: Any) -> Any:
+    """A number of samples stands for the first ones."""
+    count = whole(value)
+    if count is not None and count > MOST_KEPT:
+        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
+    if count is not None and count > 0:
+        return tuple(range(count))
+    if not isinstance(value, list | tuple):
+        raise InputError(
+            "must be a list of sample numbers, or how many of the first samples to keep;"
+            f" got {describe(value)}"
+        )
+    return tuple(value)
+
+
+Chosen: TypeAlias = Annotated[tuple[Number, ...], BeforeValidator(_chosen)]
+"""Numbers of samples."""
+
+
+@model(kw_only=True)
+class Ensemble:
+    """How many samples, and which.
+
+    Parameters
+    ----------
+    samples : int
+        Number of samples.
+    seed : int
+        Not negative.
+    first : int
+        Number of the first sample.
+    keep : str or tuple of str
+        What is kept along the interface: random fields, such as ``"strength"``, and what the
+        method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
+    keep_samples : tuple of int or int, optional
+        Numbers of the samples for which it is kept, or how many of the first; all if left out.
+    keep_limit : float, optional
+        Bytes that this may take in all; 1 GiB if left out.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Ensemble(samples=1e4, seed=1).samples
+    10000
+    """
+
+    samples: Count
+    seed: Number = 0
+    first: Number = 0
+    keep: Names = ()
+    keep_samples: Chosen | None = None
+    keep_limit: Positive | None = None
+    keep_limit: Positive | None = None
+
+    def of(self, problem: Problem, random: Any, method: Any) -> Experiment:
+        """Return the experiment whose samples these are."""
+        return Experiment(problem, random, method, self.keep, self.keep_samples, self.seed)

@@ -5,36 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
+from stiction.ensemble.batches import AnyExecutor, missing_spans, solve_spans, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxis, warn_of_failures
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import AnyRandom, Chosen, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.points import differing_in
 from stiction.ensemble.table import Table
 from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
-from stiction.methods import Method
+from stiction.methods import MethodObject
 from stiction.model import (
+    Count,
     Flag,
+    Names,
+    Number,
+    Positive,
     Progress,
-    at_least,
-    check,
-    describe,
-    is_real,
-    is_whole,
-    names_to_keep,
+    Seconds,
+    checked,
     to_plain,
 )
 from stiction.problem import Problem
-from stiction.progress import Meter, Show, check_time_limit
-from stiction.random.checks import check_residual, warn_if_unresolved
-from stiction.random.random_field import RandomField, too_many_samples
-from stiction.random.random_interface import RandomInterface
+from stiction.progress import Meter, Show
+from stiction.random.random_field import too_many_samples
 
 KEEP_LIMIT = 2.0**30
 FEW = 4
@@ -88,6 +87,8 @@ def compute(
     spans = missing_spans(done, first)
     if spans:
         check_fields(points)
+        if len(points) == 1:
+            points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
     solved = done.any(axis=1)
     lost = np.zeros(len(points), dtype=np.int64)
     enough = np.minimum(HOPELESS, (~done).sum(axis=1))
@@ -126,23 +127,10 @@ def _method_name(points: Sequence[Experiment]) -> str:
 
 def check_fields(points: Sequence[Experiment]) -> None:
     """Warn of fields that do not suit the grid, the interface or their units, once each."""
-    pairs = list(
-        dict.fromkeys(
-            (field, point.problem.interface)
-            for point in differing_in(points, "random", "problem.interface")
-            for field in point.random.properties.values()
-        )
-    )
     some = differing_in(points, "random", "problem")
-    meter = Meter("checking the fields", len(pairs) + len(some), unit="fields")
-    with collect_warnings() as caught, meter:
-        for field, interface in pairs:
-            field.warn_if_inaccurate(interface)
-            meter.advance()
+    with collect_warnings() as caught, Meter("checking the fields", len(some)) as meter:
         for point in some:
-            point.problem.warn_of_units(point.mean("strength"))
-            check_residual(point.problem, point.random.properties)
-            warn_if_unresolved(point.problem, point.random)
+            point.check_fields()
             meter.advance()
     found = list(dict.fromkeys(caught))
     for text, category in found[:FEW]:
@@ -160,8 +148,9 @@ def wide_bytes(experiment: Experiment, samples: int, first: int = 0) -> float:
     return 8.0 * experiment.problem.interface.size * len(experiment.wide) * kept
 
 
-def check_size(needed: float, limit: float) -> None:
-    """Refuse to keep more than the stated size."""
+def check_size(needed: float, limit: float | None) -> None:
+    """Refuse to keep more than the stated size, 1 GiB if it is None."""
+    limit = KEEP_LIMIT if limit is None else limit
     if needed > limit:
         raise InputError(
             f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
@@ -170,67 +159,23 @@ def check_size(needed: float, limit: float) -> None:
         )
 
 
-def check_options(
-    *, workers: Any, executor: Any, progress: Any, time_limit: Any, pilot: Any
-) -> int | None:
-    """Return the number of workers; refuse options of a run that make no sense."""
-    check("progress", progress, Progress)
-    check("pilot", pilot, Flag)
-    if workers is not None:
-        workers = check("workers", workers, at_least(1))
-    if executor is not None and not hasattr(executor, "submit"):
-        raise InputError(
-            f"executor: must be a concurrent.futures executor, got {describe(executor)}"
-        )
-    problems = check_time_limit(time_limit)
-    if problems:
-        raise InputError(problems)
-    return workers
-
-
-def _check_keep(
-    keep: Any, keep_samples: Any, keep_limit: Any
-) -> tuple[tuple[str, ...], tuple[int, ...] | None]:
-    """What is to be kept, and of which samples, or what is wrong with it."""
-    problems: list[str] = []
-    names: tuple[str, ...] = ()
-    try:
-        names = names_to_keep(keep)
-    except InputError as error:
-        problems += error.problems
-    known = keep_samples is None or (
-        isinstance(keep_samples, list | tuple | range | np.ndarray)
-        and getattr(keep_samples, "ndim", 1) == 1
-        and all(is_whole(sample, 0) for sample in keep_samples)
-    )
-    if not known:
-        given = describe(keep_samples)
-        problems.append(f"keep_samples: must be a list of sample numbers, got {given}")
-    if not (is_real(keep_limit) and keep_limit > 0.0):
-        problems.append(f"keep_limit: must be a positive number, got {describe(keep_limit)}")
-    if problems:
-        raise InputError(problems)
-    return names, None if keep_samples is None else tuple(int(sample) for sample in keep_samples)
-
-
 def gather(
     points: Sequence[Experiment],
-    samples: int,
-    *,
-    first: int = 0,
-    axes: Sequence[GridAxis] = (),
+    ensemble: Ensemble,
     attributes: Mapping[str, Any],
+    axes: Sequence[GridAxis] = (),
+    *,
     pilot: bool = True,
-    time_limit: float | None = None,
     **options: Any,
 ) -> xr.Dataset:
-    """Compute samples first .. first + samples - 1 of every point in memory; see `monte_carlo`."""
+    """Compute an ensemble at every point in memory; `options` are those of `compute`."""
+    samples, first = ensemble.samples, ensemble.first
     rows = Gathered(points, samples, first)
-    compute(points, rows.done.copy(), rows, first=first, time_limit=time_limit, **options)
+    compute(points, rows.done.copy(), rows, first=first, **options)
     if pilot:
         attributes = {**attributes, **pilot_attributes(points, samples, first)}
     result = rows.dataset(attributes, axes)
-    warn_of_failures(rows.failed, len(points) * samples)
+    warn_of_failures(rows.failed, rows.done.size)
     for failure in rows.failed:
         rows.done[failure.point, failure.sample - first] = True
     return result if rows.done.all() else _cut_short(result, rows.done)
@@ -253,40 +198,34 @@ def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
     return result.assign_attrs(cut_short=text)
 
 
-def study_attributes(experiment: Experiment, samples: int, first: int = 0) -> dict[str, Any]:
-    """Return all it takes to run an experiment again, as a study in plain form."""
-    ensemble: dict[str, Any] = {"samples": samples, "seed": experiment.seed, "first": first}
-    ensemble["keep"] = list(experiment.keep)
-    if experiment.keep_samples is not None:
-        ensemble["keep_samples"] = list(experiment.keep_samples)
+def _attributes(experiment: Experiment, ensemble: Ensemble) -> dict[str, Any]:
+    """All it takes to run an ensemble again, as a study in plain form."""
+    parts = {name: getattr(experiment, name) for name in ("problem", "random", "method")}
+    parts["ensemble"] = replace(ensemble, keep_limit=None)
     try:
-        study: dict[str, Any] = {
-            "problem": to_plain(experiment.problem),
-            "random": to_plain(experiment.random),
-            "method": to_plain(experiment.method),
-            "ensemble": ensemble,
-        }
+        study = {name: to_plain(part) for name, part in parts.items()}
     except InputError as error:  # a function of the user's: the result says so and is still one
-        return {"study_incomplete": str(error), "seed": experiment.seed}
-    return {"study": study, "seed": experiment.seed}
+        return {"study_incomplete": str(error), "seed": ensemble.seed}
+    return {"study": study, "seed": ensemble.seed}
 
 
+@checked
 def monte_carlo(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     *,
-    method: Method,
-    samples: int,
-    seed: int = 0,
-    first: int = 0,
-    keep: str | Sequence[str] = (),
-    keep_samples: Sequence[int] | None = None,
-    keep_limit: float = KEEP_LIMIT,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    progress: Show = True,
-    time_limit: float | None = None,
-    pilot: bool = True,
+    method: MethodObject,
+    samples: Count,
+    seed: Number = 0,
+    first: Number = 0,
+    keep: Names = (),
+    keep_samples: Chosen | None = None,
+    keep_limit: Positive | None = None,
+    workers: Count | None = None,
+    executor: AnyExecutor | None = None,
+    progress: Progress = True,
+    time_limit: Seconds | None = None,
+    pilot: Flag = True,
 ) -> xr.Dataset:
     """Onset of many random interfaces.
 
@@ -307,10 +246,10 @@ def monte_carlo(
     keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"sensitivity"``.
-    keep_samples : sequence of int, optional
-        Numbers of the samples for which it is kept; all if left out.
-    keep_limit : float
-        Bytes that this may take.
+    keep_samples : sequence of int or int, optional
+        Numbers of the samples for which it is kept, or how many of the first; all if left out.
+    keep_limit : float, optional
+        Bytes that this may take; 1 GiB if left out.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -359,21 +298,22 @@ def monte_carlo(
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
     """
-    names, chosen = _check_keep(keep, keep_samples, keep_limit)
-    samples, first = check("samples", samples, at_least(1)), check("first", first, at_least(0))
-    seed = check("seed", seed, at_least(0))
     if problems := too_many_samples(samples, first):
         raise InputError(problems)
-    workers = check_options(
-        workers=workers, executor=executor, progress=progress, time_limit=time_limit, pilot=pilot
+    ensemble = Ensemble(
+        samples=samples,
+        seed=seed,
+        first=first,
+        keep=keep,
+        keep_samples=keep_samples,
+        keep_limit=keep_limit,
     )
-    experiment = Experiment(problem, random, method, names, chosen, seed)
-    check_size(wide_bytes(experiment, samples, first), keep_limit)
+    experiment = ensemble.of(problem, random, method)
+    check_size(wide_bytes(experiment, samples, first), ensemble.keep_limit)
     return gather(
         [experiment],
-        samples,
-        first=first,
-        attributes=study_attributes(experiment, samples, first),
+        ensemble,
+        _attributes(experiment, ensemble),
         workers=workers,
         executor=executor,
         progress=progress,

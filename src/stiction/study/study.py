@@ -6,7 +6,6 @@ import functools
 import json
 import operator
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -16,16 +15,14 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction._checks import (
+    too_many_samples,
+)
+from stiction.ensemble.batches import AnyExecutor
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import part_with_values
-from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.monte_carlo import (
-    KEEP_LIMIT,
-    check_options,
-    check_size,
-    gather,
-    wide_bytes,
-)
+from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.monte_carlo import check_size, gather, wide_bytes
 from stiction.ensemble.points import Points, differing_in, variables_in
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, StoreError, unknown_name
@@ -34,78 +31,21 @@ from stiction.model import (
     Count,
     FilePath,
     Flag,
-    Positive,
-    _count,
+    Progress,
+    Seconds,
     check,
-    describe,
+    checked,
     explain,
     model,
-    names_to_keep,
     to_plain,
-    whole,
 )
 from stiction.problem import Problem
-from stiction.progress import Meter, Show
+from stiction.progress import Meter
 from stiction.random.random_field import RandomField, too_many_samples
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import StoredRun, result_of, run_into
 from stiction.study.study_file import completed, read_sweep, read_toml, reading
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
-
-Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
-
-MOST_KEPT = 10**6
-
-
-def _chosen(value: Any) -> Any:
-    """A number of samples stands for the first ones."""
-    count = whole(value)
-    if count is not None and count > MOST_KEPT:
-        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
-    if count is not None and count > 0:
-        return tuple(range(count))
-    if not isinstance(value, list | tuple):
-        raise InputError(
-            "must be a list of sample numbers, or how many of the first samples to keep;"
-            f" got {describe(value)}"
-        )
-    return tuple(value)
-
-
-@model(kw_only=True)
-class Ensemble:
-    """How many samples, and which.
-
-    Parameters
-    ----------
-    samples : int
-        Number of samples.
-    seed : int
-        Not negative.
-    first : int
-        Number of the first sample.
-    keep : str or tuple of str
-        What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
-    keep_samples : tuple of int or int, optional
-        Numbers of the samples for which it is kept, or how many of the first; all if left out.
-    keep_limit : float, optional
-        Bytes that this may take in all; 1 GiB if left out.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> st.Ensemble(samples=1e4, seed=1).samples
-    10000
-    """
-
-    samples: Count
-    seed: Number = 0
-    first: Number = 0
-    keep: Annotated[tuple[str, ...], BeforeValidator(names_to_keep)] = ()
-    keep_samples: Annotated[tuple[Number, ...], BeforeValidator(_chosen)] | None = None
-    keep_limit: Positive | None = None
-
 
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
@@ -200,7 +140,7 @@ class Study:
             )
         size = sum(wide_bytes(point, ensemble.samples, ensemble.first) for point in some)
         try:
-            check_size(size * len(self.experiments) / len(some), ensemble.keep_limit or KEEP_LIMIT)
+            check_size(size * len(self.experiments) / len(some), ensemble.keep_limit)
         except InputError as error:
             raise InputError(f"ensemble.{error}") from None
 
@@ -263,17 +203,18 @@ class Study:
         result: dict[str, Any] = {"study": plain, "seed": self.ensemble.seed}
         return result | ({"title": self.title} if self.title else {})
 
+    @checked
     def run(
         self,
         *,
-        out: str | Path | None = None,
-        workers: int | None = None,
-        executor: Executor | None = None,
-        progress: Show = True,
-        time_limit: float | None = None,
-        retry: bool = False,
-        part: tuple[int, int] | str | None = None,
-        pilot: bool = True,
+        out: FilePath | None = None,
+        workers: Count | None = None,
+        executor: AnyExecutor | None = None,
+        progress: Progress = True,
+        time_limit: Seconds | None = None,
+        retry: Flag = False,
+        part: Any = None,
+        pilot: Flag = True,
     ) -> xr.Dataset:
         """Run it, or what is missing of it.
 
@@ -305,15 +246,8 @@ class Study:
         WorkerError
             If a worker is lost.
         """
-        check("retry", retry, Flag)
         options: dict[str, Any] = {
-            "workers": check_options(
-                workers=workers,
-                executor=executor,
-                progress=progress,
-                time_limit=time_limit,
-                pilot=pilot,
-            ),
+            "workers": workers,
             "executor": executor,
             "progress": progress,
             "time_limit": time_limit,
@@ -324,15 +258,7 @@ class Study:
             return result_of(stored, partial=time_limit is not None or part is not None)
         if part is not None:
             raise InputError("part: a part is stored; say where with out=")
-        ensemble = self.ensemble
-        return gather(
-            self.experiments,
-            ensemble.samples,
-            first=ensemble.first,
-            axes=self.axes,
-            attributes=self.attributes,
-            **options,
-        )
+        return gather(self.experiments, self.ensemble, self.attributes, self.axes, **options)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, as in TOML.
@@ -419,15 +345,8 @@ _PARTS = tuple(_Parts.__dataclass_fields__)
 
 
 def _experiment(parts: Mapping[str, Any]) -> Experiment:
-    given = parts["ensemble"]
-    return Experiment(
-        parts["problem"],
-        parts["random"],
-        parts["method"],
-        keep=given.keep,
-        keep_samples=given.keep_samples,
-        seed=given.seed,
-    )
+    ensemble: Ensemble = parts["ensemble"]
+    return ensemble.of(parts["problem"], parts["random"], parts["method"])
 
 
 def _at_points(text: str, points: list[Point]) -> str:
