@@ -15,9 +15,6 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
-from stiction._checks import (
-    too_many_samples,
-)
 from stiction.ensemble.batches import AnyExecutor
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import part_with_values
