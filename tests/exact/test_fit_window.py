@@ -64,6 +64,17 @@ def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
     assert cut.min() < 0.1 * cut.max()
 
 
+@pytest.mark.parametrize("name", ["exponential", "power_law"])
+def test_a_spectrum_whose_end_is_not_given_is_whole(name):
+    """What its usual truncation leaves out, 1 % of a rough one, would be taken for noise."""
+    family = spectrum_family({"type": name}, 1.0, 0.0, (1e-4, 1.0))
+    model = family.model(np.log([1.0, 1e-3, 0.5])[: len(family.free)], np.array([0.0, 1.0]))
+    grid = Grid((512,), (SPACING,))
+    rho = grid.correlation(model.power(grid))[1:64]
+    exact = model.spectrum.untruncated_correlation(SPACING * np.arange(1, 64))
+    np.testing.assert_allclose(rho, exact, atol=5e-4)
+
+
 def test_power_above_the_sampling_wavenumber_is_folded_back():
     """A third of this spectrum's power lies above what its points resolve."""
     rough = st.ExponentialSpectrum(5e-4, power_kept=0.99)

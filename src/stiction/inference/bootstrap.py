@@ -28,33 +28,24 @@ SAME = 1e-3
 
 def parameters_of(found: Estimate, setting: Setting) -> dict[str, float]:
     """Everything that was estimated, and what follows from it, by name."""
-    marginal, spectrum, model = found.marginal, found.model.spectrum, found.model
+    marginal, spectrum = found.marginal, found.model.spectrum
+    lags = spectrum.correlation_length * LAGS
+    correlation = spectrum.untruncated_correlation(lags)
     values = {
-        f"marginal.{name}": value for name, value in setting.marginal.parameters(marginal).items()
-    }
-    values |= {
+        "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
         "mean": float(marginal.distribution.mean()),
         "standard_deviation": float(marginal.distribution.std()),
     }
+    own = setting.marginal.parameters(marginal)
+    values |= {f"marginal.{name}": value for name, value in own.items()}
+    estimated = {
+        "correlation_length": ("spectrum.correlation_length", spectrum.correlation_length),
+        "exponent": ("spectrum.exponent", getattr(spectrum, "exponent", 0.0)),
+        "anisotropy": ("anisotropy", found.model.anisotropy),
+        "noise_share": ("noise", found.model.noise),
+    }
     free = setting.spectrum.free
-    if "correlation_length" in free:
-        values["spectrum.correlation_length"] = spectrum.correlation_length
-    if "exponent" in free:
-        values["spectrum.exponent"] = spectrum.exponent
-    values["efolding_length"] = efolding_length(found, setting)
-    if "anisotropy" in free:
-        values["anisotropy"] = model.anisotropy
-    if "noise_share" in free:
-        values["noise"] = model.noise
-    return values
-
-
-def efolding_length(found: Estimate, setting: Setting) -> float:
-    """Where the correlation of z falls to 1/e, m: of the curve that was fitted, interpolated."""
-    spectrum = found.model.spectrum
-    lags = spectrum.correlation_length * LAGS
-    rho = spectrum.untruncated_correlation(lags)
-    return float(np.interp(-math.exp(-1.0), -rho, lags))
+    return values | dict(pair for name, pair in estimated.items() if name in free)
 
 
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
@@ -81,29 +72,26 @@ class Repetitions:
 
     Attributes
     ----------
-    world : Estimate
+    truth : Estimate
     fits : list of Repetition
     """
 
-    world: Estimate
+    truth: Estimate
     fits: list[Repetition]
 
 
 def repeat(
     found: Estimate, setting: Setting, count: int, seed: int, workers: int, meter: Meter
 ) -> Repetitions:
-    """Fits to records simulated from a field; fewer than asked for if the time is over.
+    """Fits to records simulated from a field, as many as the family can be fitted to.
 
     Repetition b depends on (seed, b) only.
     """
-    start = setting.spectrum.vector(found.model)
 
     def one(number: int) -> Repetition | None:
-        if meter.over:
-            return None
         rng = np.random.default_rng([seed, number])
         try:
-            again = estimate(simulate(found, setting, rng), setting, start)
+            again = estimate(simulate(found, setting, rng), setting, found)
             result = Repetition(again, parameters_of(again, setting))
         except InputError:  # no member of the family fits: counted by its absence
             return None
@@ -126,7 +114,7 @@ def at_ends(
     name, family = "correlation_length", setting.spectrum
     if name not in family.free:
         return None
-    found = around.world
+    found = around.truth
     estimated = parameters_of(found, setting)
     full = f"spectrum.{name}"
     errors = _errors(full, around, setting)
@@ -174,7 +162,7 @@ def intervals(
     values : (points,)
         What was fitted, of all records.
     """
-    found = around.world
+    found = around.truth
     estimated = parameters_of(found, setting)
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
@@ -238,7 +226,7 @@ def _cut(
 
 def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
     """Of a parameter on its own scale, in units of their widths."""
-    truth = _scaled(name, parameters_of(repeated.world, setting))
+    truth = _scaled(name, parameters_of(repeated.truth, setting))
     return [
         (_scaled(name, one.parameters) - truth) / _width(name, one.parameters)
         for one in repeated.fits
@@ -247,7 +235,7 @@ def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
 
 def _noise_errors(repeated: Repetitions) -> list[float]:
     """Errors of the variance of the noise in units of their standard errors."""
-    truth = repeated.world.model.noise**2
+    truth = repeated.truth.model.noise**2
     return [(at - truth) / error for at, error in (one.estimate.noise for one in repeated.fits)]
 
 

@@ -60,7 +60,7 @@ def make_windows(records: Sequence[Record], degree: int) -> tuple[Window, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What one fit finds.
+    """The result of one fit.
 
     Attributes
     ----------
@@ -82,12 +82,12 @@ class Estimate:
     roughness: float
     noise: tuple[float, float] = (0.0, 0.0)
 
-    @property
-    def field(self) -> RandomField:
+    def field(self, quantity: str) -> RandomField:
         """To simulate with."""
         anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
+        of: Any = quantity if quantity == "friction_coefficient" else None
         return RandomField(
-            self.marginal, self.model.spectrum, mean_mode=True, anisotropy=anisotropy
+            self.marginal, self.model.spectrum, mean_mode=True, anisotropy=anisotropy, of=of
         )
 
 
@@ -110,21 +110,24 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
     return found
 
 
-def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None) -> Estimate:
+def estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None = None) -> Estimate:
     """Fit measured values (points,) of each record; from a start if there is one.
 
     The marginal of noisy values is too wide. So the noise is found first, with the marginal of the
     values as they are; then both are fitted again, the marginal to values less that noise.
     """
-    family, degree = setting.spectrum, setting.degree
-    rows = [detrended(r, w, degree) for r, w in zip(rows, setting.windows, strict=True)]
+    family = setting.spectrum
+    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
     values = np.concatenate(rows)
     observed = observe(rows, setting.windows)
-    vector = start
-    noise = 0.0 if start is None else family.model(start, np.ones(2)).noise
+    vector = None if start is None else family.vector(start.model)
+    marginal = None if start is None else start.marginal
+    noise = 0.0 if start is None else start.model.noise
+    if start is None and family.noise is not None:
+        noise = family.noise
     signed = (0.0, 0.0)
-    for turn in range(2):
-        marginal = setting.marginal.fit(values, noise)
+    for _ in range(2):
+        marginal = setting.marginal.fit(values, noise, marginal)
         shares = hermite_shares(marginal)
         if vector is None:
             vector = coarse(family, shares, observed)
@@ -133,9 +136,9 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Array | None = None
         if family.noise is None:
             signed = noise_variance(family, vector, shares, observed)
         if model.noise_share < 0.0:  # the best there can be is none
-            quiet = replace(family, noise=0.0)
-            model = quiet.model(fit_spectrum(quiet, shares, observed, vector[:-1]), shares)
-        if turn == 0 and abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
+            without = replace(family, noise=0.0)
+            model = without.model(fit_spectrum(without, shares, observed, vector[:-1]), shares)
+        if abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
             break
         noise = model.noise
     return Estimate(

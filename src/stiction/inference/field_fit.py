@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from stiction.arrays import Array
 from stiction.inference.bootstrap import RANGES
@@ -16,8 +16,39 @@ from stiction.inference.whittle import Observed
 from stiction.profiles import UNITS
 from stiction.random.random_field import RandomField
 
-if TYPE_CHECKING:
-    pass
+DOUBTS = {
+    "lengths_held": "the records hold {value:.2g} correlation lengths, too few for intervals to be"
+    " trusted: at least {limit:g} are needed; measure a longer piece, or several",
+    "noise": "the noise ({value:.3g}) hides the cut-off of the spectrum, where the field has"
+    " {limit:.3g} left at wavenumbers at which its density has fallen to a quarter: the"
+    " correlation length rests on the family of the spectrum, not on the data",
+    "correlation_length": "the correlation length {value:.3g} m lies at the end of the range that"
+    " is searched, {limit:.3g} m: the data do not determine it; give it with spectrum={{...}}",
+    "exponent": "the exponent {value:.3g} lies at the end of the range that is searched,"
+    " {limit:.3g}: the data do not determine it; give it with spectrum={{...}}, or another"
+    " spectrum",
+    "anisotropy": "the anisotropy {value:.3g} lies at the end of the range that is searched,"
+    " {limit:.3g}: the data do not determine it; give it",
+    "marginal": "the p-value of the marginal is {value:.2g}, below {limit:g}: the values are far"
+    " from its family; compare families (marginal=['beta', 'lognormal', ...]) or look at"
+    " st.plot.fit",
+    "spectrum": "the p-value of the spectrum is {value:.2g}, below {limit:g}: the periodogram is"
+    " far from its family; take another spectrum or a higher detrend, or look at st.plot.fit",
+    "repetitions": "intervals are from {value:g} of {limit:g} repetitions: the family could not be"
+    " fitted to the others",
+}
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What stands in the way of trusting a fit: a quantity beyond its limit."""
+
+    name: str
+    value: float
+    limit: float
+
+    def __str__(self) -> str:
+        return DOUBTS[self.name].format(value=self.value, limit=self.limit)
 
 
 @dataclass(frozen=True)
@@ -49,10 +80,10 @@ class FieldFit:
     field : RandomField
         To simulate with, without the measurement noise; it has the mean mode.
     parameters : dict of str to float
-        What was estimated, in SI: ``marginal.*`` and ``spectrum.*`` by the names that study files
-        use, ``mean`` and ``standard_deviation`` of the field, ``efolding_length`` (m) at which the
-        correlation of z falls to 1/e, ``anisotropy``, and ``noise``, the standard deviation of the
-        measurement noise.
+        What was estimated, in SI: ``efolding_length`` (m), at which the correlation of z falls to
+        1/e; ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
+        the names that study files use; ``anisotropy``; and ``noise``, the standard deviation of
+        the measurement noise.
     interval : dict of str to (float, float)
         Of each of them, from the bootstrap; within what is searched, and of bounds of the marginal
         outside the values.
@@ -62,16 +93,15 @@ class FieldFit:
         The fits to records simulated from `field`: what another measurement might have given.
     families : dict of str to Goodness
         Of every family of marginals that was asked for.
-    misfit : dict of str to float
+    p_values : dict of str to float
         Shares of the repetitions that are as far from their own marginal, and spectrum, as the
-        data are from the fitted ones; small where a family does not suit. A share below 1 % takes
-        at least 99 repetitions to tell.
+        data are from the fitted ones (Barnard's test); small where a family does not suit.
     lengths_held : float
         Correlation lengths (on a plane, areas) that the records hold together.
-    warnings : tuple of str
+    missing : (int, int)
+        Points without a value, which are left out, and all points.
+    doubts : tuple of Doubt
         What stands in the way of trusting it; empty if nothing does.
-    cut_short : bool
-        Whether `time_limit` ended the repetitions early.
     """
 
     field: RandomField
@@ -80,35 +110,38 @@ class FieldFit:
     confidence: float
     repetitions: tuple[RandomField, ...] = dataclasses.field(repr=False)
     families: Mapping[str, Goodness] = dataclasses.field(repr=False)
-    misfit: Mapping[str, float] = dataclasses.field(repr=False)
+    p_values: Mapping[str, float] = dataclasses.field(repr=False)
     lengths_held: float = dataclasses.field(repr=False)
+    missing: tuple[int, int] = dataclasses.field(repr=False)
     quantity: str = dataclasses.field(repr=False)
     _details: Details = dataclasses.field(repr=False)
-    warnings: tuple[str, ...] = ()
-    cut_short: bool = False
+    doubts: tuple[Doubt, ...] = ()
 
     def __str__(self) -> str:
-        unit = UNITS[self.quantity]
-        width = max(len(name) for name in self.parameters)
+        width = max(map(len, self.parameters))
+        marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
+        spectrum = self.field.spectrum.type.replace("_", " ")
         lines = [
-            f"{_title(self.field)} from {self.lengths_held:.3g} correlation lengths,"
-            f" {100 * self.confidence:g} % intervals"
+            f"{marginal} marginal, {spectrum} spectrum from {self.lengths_held:.3g} correlation"
+            f" lengths, {100 * self.confidence:g} % intervals"
         ]
+        if self.missing[0]:
+            lines.append("  {} of {} points are missing and left out".format(*self.missing))
         for name, value in self.parameters.items():
+            if name == "mean" and "marginal.mean" in self.parameters:
+                continue  # the same number
             low, high = self.interval[name]
-            suffix = unit_of(name, unit)
+            suffix = unit_of(name, UNITS[self.quantity])
             least, most = RANGES.get(name, (-math.inf, math.inf))
             if low <= least or high >= most:
                 suffix += f" (searched from {least:g} to {most:g})"
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
             lines.append(f"{line} {suffix.strip()}".rstrip())
-        marginal, spectrum = (100.0 * self.misfit[name] for name in ("marginal", "spectrum"))
         lines.append(
-            f"  as far from its marginal as {marginal:.3g} % of {len(self.repetitions)} simulated"
-            f" records, from its spectrum as {spectrum:.3g} %"
+            f"  p-values: marginal {self.p_values['marginal']:.3g}, spectrum"
+            f" {self.p_values['spectrum']:.3g} ({len(self.repetitions)} repetitions)"
         )
-        lines += [f"  ! {text}" for text in self.warnings]
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
 
     def __repr__(self) -> str:
         return str(self)
@@ -124,11 +157,6 @@ class Details:
     setting: Setting
     observed: tuple[Observed, ...]
     repeated: tuple[Estimate, ...]
-
-
-def _title(found: RandomField) -> str:
-    marginal = getattr(found.marginal, "type", "marginal").replace("_", " ")
-    return f"{marginal} marginal, {found.spectrum.type.replace('_', ' ')} spectrum"
 
 
 def unit_of(name: str, unit: str) -> str:

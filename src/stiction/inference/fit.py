@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.inference.bootstrap import Repetitions, at_ends, intervals, parameters_of, repeat
 from stiction.inference.estimate import (
     Estimate,
@@ -21,48 +22,45 @@ from stiction.inference.estimate import (
     make_windows,
     observe,
 )
-from stiction.inference.field_fit import Details, FieldFit, Goodness
-from stiction.inference.marginal_fit import Family, family_of
-from stiction.inference.noisy_marginal import mean_log_likelihood
-from stiction.inference.records import Record, check_quantity, records_of
-from stiction.inference.spectrum_fit import SpectrumFamily, spectrum_family
+from stiction.inference.field_fit import Details, Doubt, FieldFit, Goodness
+from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
+from stiction.inference.records import Record, records_of
+from stiction.inference.spectrum_fit import SpectrumFamily, back, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.model import Progress, check, describe, is_finite, is_real, is_whole
-from stiction.progress import Meter, Show, check_time_limit
-
-if TYPE_CHECKING:
-    pass
+from stiction.model import Progress, Real, at_least, checked
+from stiction.profiles import UNITS
+from stiction.progress import Meter
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record says little of any parameter."""
 FAR = 0.01
-"""Share of simulated records that are as far from their model as the data are from theirs, below
-which a family does not suit."""
+"""p-value below which a family does not suit."""
 AT_LIMIT = 1e-3
 FEWEST = 20
-"""Repetitions that tell a tail of errors."""
-HIGHEST_DEGREE = 3
+"""Repetitions that determine a tail of errors."""
+NotNegative = Annotated[Real, Field(ge=0.0)]
+Positive = Annotated[Real, Field(gt=0.0)]
+Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
+@checked
 def fit_field(
     profiles: Any,
     interface: Interface | None = None,
     *,
-    marginal: str | Mapping[str, Any] | Sequence[str] = MARGINALS,
-    spectrum: str | Mapping[str, Any] = "power_law",
-    detrend: int = 0,
-    noise: bool | float = True,
-    anisotropy: bool | float = False,
-    gaps: Literal["refuse", "skip"] = "refuse",
+    marginal: Any = MARGINALS,
+    spectrum: Any = "power_law",
+    detrend: Literal[0, 1, 2, 3] = 0,
+    noise: bool | NotNegative = True,
+    anisotropy: bool | Positive = False,
     quantity: str = "strength",
-    bootstrap: int = 200,
-    confidence: float = 0.9,
-    seed: int = 0,
-    workers: int | None = None,
-    time_limit: float | None = None,
-    progress: Show = True,
+    bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
+    confidence: Share = 0.9,
+    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    workers: at_least(1) | None = None,  # type: ignore[valid-type]
+    progress: Progress = True,
 ) -> FieldFit:
     """Fit a random field to measured profiles, with an interval of every parameter.
 
@@ -71,6 +69,7 @@ def fit_field(
     profiles : DataArray, array, or list of them
         Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile` returns; units
         that are stated are converted, points may come in any order, and must be equally spaced.
+        Missing values (NaN, missing points, values that were filled in) are left out.
         Plain arrays, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx,
         ny), in SI, have a value at each node of `interface`. Several profiles are of one field.
     interface : Interface, optional
@@ -92,11 +91,9 @@ def fit_field(
         standard deviation, where it is known (SI).
     anisotropy : bool or float
         Of maps: ratio of correlation lengths along y and x. False: 1; True: estimated.
-    gaps : {"refuse", "skip"}
-        Whether missing values (NaN, missing points, values that were filled in) are an error or
-        are left out. Nothing is filled in.
     quantity : str
-        What it is, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
+        What was measured, for its unit: 'strength', 'normal_pressure', 'friction_coefficient',
+        ... A field of friction coefficients says so itself.
     bootstrap : int
         Repetitions, at least 20: as many from the fitted field, and from fields with correlation
         lengths at either end of a first interval of it.
@@ -106,29 +103,26 @@ def fit_field(
         Of the repetitions, not negative.
     workers : int, optional
         Threads; all cores by default. The numbers do not depend on it.
-    time_limit : float, optional
-        Seconds; the intervals then come from the repetitions that are done, and it is an error if
-        these are fewer than 20.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
     Returns
     -------
     FieldFit
-        With `field`, `parameters`, `interval` and `plot()`.
+        With `field`, `parameters` and `interval`; `stiction.plot.fit` draws it.
 
     Raises
     ------
     InputError
         Naming all that does not fit: unknown units, points that repeat or are not equally spaced,
-        gaps, constant or short records, values outside the bounds of the marginal.
+        constant or short records, values outside the bounds of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If the records hold fewer than ten correlation lengths, the marginal or the spectrum is far
-        from what its family can do, the noise hides the cut-off of the spectrum, a parameter lies
-        at the end of what is looked for, or values are outliers.
+        If the records hold fewer than ten correlation lengths, the p-value of the marginal or of
+        the spectrum is below 1 %, the noise hides the cut-off of the spectrum, a parameter lies at
+        the end of the range that is searched, or values are outliers.
 
     Notes
     -----
@@ -161,56 +155,46 @@ def fit_field(
     >>> bool(low < 1e-3 < high)
     True
     """
-    families, spectral = _checked(
-        interface, marginal, spectrum, detrend, noise, anisotropy, gaps, quantity, bootstrap,
-        confidence, seed, workers, time_limit, progress,
-    )  # fmt: skip
-    records = records_of(profiles, interface, quantity, gaps == "skip")
+    families, spectral = _families(marginal, spectrum, anisotropy, noise)
+    if quantity not in UNITS:
+        raise InputError(unknown_name("quantity", quantity, UNITS))
+    records = records_of(profiles, interface, quantity)
     if spectral.anisotropy != 1.0 and records[0].values.ndim == 1:
         raise InputError("anisotropy: is of maps; the profiles are lines, leave it out")
     spacing = max(max(record.spacings) for record in records)
-    spectral = replace(
-        spectral, lengths=(spacing, 2.0 * max(max(record.lengths) for record in records))
-    )
-    windows = make_windows(records, int(detrend))
+    longest = max(max(record.lengths) for record in records)
+    spectral = replace(spectral, lengths=(spacing, 2.0 * longest))
+    windows = make_windows(records, detrend)
     rows = [record.values[record.measured] for record in records]
-    count = usable_cores() if workers is None else int(workers)
+    count = usable_cores() if workers is None else workers
     times = 3 if "correlation_length" in spectral.free else 1
-    with Meter("fit_field", times * int(bootstrap), progress, time_limit=time_limit) as meter:
-        found, setting, compared = _best(families, spectral, rows, windows, int(detrend))
-        options = (setting, int(bootstrap), int(seed), count, meter)
-        around = repeat(found, *options)
-        ends = None
-        if len(around.fits) >= FEWEST:
-            fields = at_ends(around, setting, float(confidence))
-            ends = fields and (repeat(fields[0], *options), repeat(fields[1], *options))
-        cut_short = meter.over
-    asked = times * int(bootstrap)
-    if len(around.fits) < FEWEST:
-        why = (
-            "time_limit: the time was over after"
-            if cut_short
-            else f"marginal: {setting.marginal.name!r} could be fitted to only"
-        )
-        advice = "allow more time" if cut_short else "take another marginal"
+    with Meter("fit_field", times * bootstrap, progress) as meter:
+        found, setting, compared = _best(families, spectral, rows, windows, detrend)
+        options = (setting, bootstrap, seed, count, meter)
+        repeated = [repeat(found, *options)]
+        if times == 3 and len(repeated[0].fits) >= FEWEST:
+            fields = at_ends(repeated[0], setting, confidence)
+            repeated += [repeat(field, *options) for field in fields]
+    done = [len(one.fits) for one in repeated]
+    if min(done) < FEWEST:
         raise InputError(
-            f"{why} {len(around.fits)} of {asked} repetitions, and intervals take at least"
-            f" {FEWEST}; {advice}"
+            f"marginal: {setting.marginal.name!r} could be fitted to only {sum(done)} of"
+            f" {times * bootstrap} repetitions; take another marginal"
         )
+    values = np.concatenate(
+        [detrended(r, w, setting.degree) for r, w in zip(rows, windows, strict=True)]
+    )
     return _result(
-        setting, compared, around, ends, records, rows, interface,
-        confidence=float(confidence), quantity=quantity, asked=asked,
-        cut_short=cut_short,
+        setting, compared, repeated, records, values, rows, interface, confidence, quantity,
+        times * bootstrap,
     )  # fmt: skip
 
 
-def _checked(
-    interface: Any, marginal: Any, spectrum: Any, detrend: Any, noise: Any, anisotropy: Any,
-    gaps: Any, quantity: Any, bootstrap: Any, confidence: Any, seed: Any, workers: Any,
-    time_limit: Any, progress: Any,
-) -> tuple[list[Family], SpectrumFamily]:  # fmt: skip
-    """The families to fit, or everything that is wrong with the arguments."""
-    problems = check_time_limit(time_limit)
+def _families(
+    marginal: Any, spectrum: Any, anisotropy: Any, noise: Any
+) -> tuple[list[Family], SpectrumFamily]:
+    """The families to fit, or everything that is wrong with them."""
+    problems: list[str] = []
 
     def collect(function: Any, *given: Any) -> Any:
         try:
@@ -219,29 +203,6 @@ def _checked(
             problems.extend(error.problems)
             return None
 
-    if interface is not None:
-        collect(check, "interface", interface, Interface)
-    collect(check, "gaps", gaps, Literal["refuse", "skip"])
-    collect(check_quantity, quantity)
-    collect(check, "progress", progress, Progress)
-    if not (is_whole(detrend, 0) and detrend <= HIGHEST_DEGREE):
-        problems.append(f"detrend: must be a degree from 0 to 3, got {describe(detrend)}")
-    if not (isinstance(noise, bool) or (is_finite(noise) and noise >= 0.0)):
-        problems.append(
-            f"noise: must be True, False or a standard deviation >= 0, got {describe(noise)}"
-        )
-    if not (isinstance(anisotropy, bool) or (is_finite(anisotropy) and anisotropy > 0.0)):
-        problems.append(
-            f"anisotropy: must be True, False or a positive ratio, got {describe(anisotropy)}"
-        )
-    if not is_whole(bootstrap, FEWEST):
-        problems.append(f"bootstrap: must be a whole number >= {FEWEST}, got {describe(bootstrap)}")
-    if not (is_real(confidence) and 0.0 < confidence < 1.0):
-        problems.append(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
-    if not is_whole(seed, 0):
-        problems.append(f"seed: must be a whole number >= 0, got {describe(seed)}")
-    if workers is not None and not is_whole(workers, 1):
-        problems.append(f"workers: must be a whole number >= 1, got {describe(workers)}")
     several = isinstance(marginal, list | tuple)
     families = [collect(family_of, one) for one in (marginal if several else [marginal])]
     if not families:
@@ -306,139 +267,87 @@ def lengths_held(found: Estimate, windows: Sequence[Any]) -> float:
 def _result(
     setting: Setting,
     compared: dict[str, Goodness],
-    around: Repetitions,
-    ends: tuple[Repetitions, Repetitions] | None,
+    repeated: Sequence[Repetitions],
     records: Sequence[Record],
+    values: Array,
     rows: Sequence[Array],
     interface: Interface | None,
-    *,
     confidence: float,
     quantity: str,
     asked: int,
-    cut_short: bool,
 ) -> FieldFit:
-    found, repeated = around.world, around.fits
-    parameters = parameters_of(found, setting)
-    if ends is not None and min(len(one.fits) for one in ends) < FEWEST:
-        ends = None
-    used = len(repeated) + sum(len(one.fits) for one in ends or ())
+    around = repeated[0]
+    found, fits = around.truth, [one.estimate for one in around.fits]
+    ends = (repeated[1], repeated[2]) if len(repeated) == 3 else None
     rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
-    values = np.concatenate(rows)
-    interval = intervals(around, ends, setting, confidence, values)
-    further = {
-        "marginal": sum(one.estimate.distance >= found.distance for one in repeated),
-        "spectrum": sum(one.estimate.roughness >= found.roughness for one in repeated),
-    }
     observed = tuple(observe(rows, setting.windows))
+    p_values = {
+        "marginal": _p_value(found.distance, [one.distance for one in fits]),
+        "spectrum": _p_value(found.roughness, [one.roughness for one in fits]),
+    }
     held = lengths_held(found, setting.windows)
-    texts = _doubts(found, setting, observed, held) + _misfits(
-        found, setting, further, len(repeated)
-    )
+    doubts = _doubts(found, setting, observed, held)
+    doubts += [Doubt(name, p, FAR) for name, p in p_values.items() if p <= FAR]
+    used = sum(len(one.fits) for one in repeated)
     if used < asked:
-        why = "the time was over" if cut_short else "the family could not be fitted to the others"
-        texts.append(f"intervals are from {used} of {asked} repetitions: {why}")
-    for text in texts:
-        warn_accuracy(text)
+        doubts.append(Doubt("repetitions", used, asked))
+    for doubt in doubts:
+        warn_accuracy(str(doubt))
+    field = found.field(quantity)
     if interface is not None:
-        found.field.modes(interface)
-        found.field.warn_if_inaccurate(interface)
-    details = Details(
-        values, tuple(records), found, setting, observed,
-        tuple(one.estimate for one in repeated),
-    )  # fmt: skip
+        field.modes(interface)
+        field.warn_if_inaccurate(interface)
+    points = sum(record.values.size for record in records)
     return FieldFit(
-        field=found.field,
-        parameters=parameters,
-        interval=interval,
+        field=field,
+        parameters=parameters_of(found, setting),
+        interval=intervals(around, ends, setting, confidence, values),
         confidence=confidence,
-        repetitions=tuple(one.estimate.field for one in repeated),
+        repetitions=tuple(one.field(quantity) for one in fits),
         families=compared,
-        misfit={name: count / len(repeated) for name, count in further.items()},
+        p_values=p_values,
         lengths_held=held,
+        missing=(points - values.size, points),
         quantity=quantity,
-        warnings=tuple(texts),
-        cut_short=cut_short,
-        _details=details,
+        doubts=tuple(doubts),
+        _details=Details(values, tuple(records), found, setting, observed, tuple(fits)),
     )
+
+
+def _p_value(own: float, others: Sequence[float]) -> float:
+    """Of data that are a record of their model (Barnard's test; Davison and Hinkley, 1997)."""
+    return (sum(one >= own for one in others) + 1) / (len(others) + 1)
 
 
 def _doubts(
-    found: Estimate,
-    setting: Setting,
-    observed: Sequence[Observed],
-    held: float,
-) -> list[str]:
+    found: Estimate, setting: Setting, observed: Sequence[Observed], held: float
+) -> list[Doubt]:
     """What stands in the way of trusting a fit."""
-    texts = []
-    length = found.model.spectrum.correlation_length
+    doubts = []
     if held < ENOUGH_LENGTHS:
-        texts.append(
-            f"the records hold only {held:.2g} correlation lengths ({length:.3g} m), too few for"
-            " intervals to be trusted; about ten are needed: measure a longer piece, or several"
-        )
-    if noise_hides_cutoff(found, observed):
-        texts.append(
-            f"the noise ({found.model.noise:.3g}) hides the cut-off of the spectrum: where its"
-            " density has fallen to a quarter it lies below the noise; the correlation length"
-            " rests on the family of the spectrum, not on the data"
-        )
-    family, vector = setting.spectrum, setting.spectrum.vector(found.model)
-    for name, at, (low, high) in zip(family.free, vector, family.limits, strict=True):
-        if name in ("variance", "noise_share"):
-            continue
-        if min(at - low, high - at) < AT_LIMIT * (high - low):
-            texts.append(
-                f"{name} lies at the end of the range that was searched: the data do not tell it;"
-                f" give it (spectrum={{'type': {family.name!r}, {name!r}: ...}}) or another"
-                " spectrum"
-            )
-    return texts
+        doubts.append(Doubt("lengths_held", held, ENOUGH_LENGTHS))
+    left = max(_power_at_cutoff(found, one) for one in observed)
+    if left <= found.model.noise**2:
+        doubts.append(Doubt("noise", found.model.noise, math.sqrt(left)))
+    family = setting.spectrum
+    for name, at, limits in zip(
+        family.free, family.vector(found.model), family.limits, strict=True
+    ):
+        near = np.abs(limits - at) < AT_LIMIT * (limits[1] - limits[0])
+        if name in ("correlation_length", "exponent", "anisotropy") and near.any():
+            ends = back(name, at), back(name, limits[near.argmax()])
+            doubts.append(Doubt(name, *ends))
+    return doubts
 
 
-def _misfits(
-    found: Estimate, setting: Setting, further: Mapping[str, int], count: int
-) -> list[str]:
-    """Whether marginal and spectrum are far from the data, as far as the repetitions can tell.
+def _power_at_cutoff(found: Estimate, observed: Observed) -> float:
+    """What is left of the field's power where it has fallen to a quarter, as the noise counts it.
 
-    Of data that are a record of their model, at most k of n repetitions are further from theirs
-    with a probability of (k + 1) / (n + 1) (Barnard's test; Davison and Hinkley, 1997, section
-    4.2): fewer than 99 cannot show that a share is below 1 %.
+    The noise is white: each ordinate expects its variance, the taper being normalised.
     """
-    differences = {
-        "marginal": (
-            f"the values are far from any {setting.marginal.name} marginal: the distribution"
-            f" functions differ by {found.distance:.2g}, ",
-            "; compare families (marginal=['beta', 'lognormal', 'weibull', ...]) or look at plot()",
-        ),
-        "spectrum": (
-            f"the periodogram is far from any {setting.spectrum.name} spectrum, ",
-            "; take another spectrum or a higher detrend, or look at plot()",
-        ),
-    }
-    enough = math.ceil(1.0 / FAR) - 1
-    texts = []
-    for name, (difference, advice) in differences.items():
-        if further[name] + 1 <= FAR * (count + 1):
-            texts.append(f"{difference}more than in 99 % of simulated records{advice}")
-        elif further[name] == 0:
-            family = getattr(setting, name).name
-            texts.append(
-                f"none of {count} simulated records is as far from its {name} as the data from"
-                f" {family!r}: too few to tell whether it suits; {enough} repetitions can"
-            )
-    return texts
-
-
-def noise_hides_cutoff(found: Estimate, observed: Sequence[Observed]) -> bool:
-    """Whether the field's power lies below that of the noise where it has fallen to a quarter."""
     model = found.model
     if model.noise_share <= 0.0:
-        return False
-    for one in observed:
-        quiet = replace(model, noise_share=0.0, variance=model.variance * (1.0 - model.noise_share))
-        power = quiet.expectation(one)
-        visible = (one.weights > 0.0) & (power >= 0.25 * power[one.weights > 0.0].max())
-        # The noise is white: each ordinate expects its variance, the taper being normalised.
-        if power[visible].min() >= model.noise**2:
-            return False
-    return True
+        return math.inf
+    quiet = replace(model, noise_share=0.0, variance=model.variance * (1.0 - model.noise_share))
+    power = quiet.expectation(observed)[observed.weights > 0.0]
+    return float(power[power >= 0.25 * power.max()].min())

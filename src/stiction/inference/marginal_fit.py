@@ -1,7 +1,11 @@
-"""Marginals by maximum likelihood, family by family, from what few numbers each needs.
+"""Marginals by maximum likelihood, with the measurement noise that values carry.
 
-Values along a record are correlated; the likelihood takes them for independent, which leaves the
-estimate consistent (a composite likelihood) and its error to the bootstrap.
+Values with noise are counted in bins; the probability of a bin is that of the marginal, convolved
+with normal noise by Gauss-Hermite quadrature of its distribution function, which stays smooth where
+a density does not. So values that noise carried beyond a bound of the marginal are no trouble.
+Without noise the likelihood is the density at the values. Values along
+a record are correlated; the likelihood takes them for independent, which leaves the estimate
+consistent (a composite likelihood) and its error to the bootstrap.
 """
 
 from __future__ import annotations
@@ -10,27 +14,32 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.stats
-from scipy.optimize import brentq, minimize
-from scipy.special import betaln, digamma, polygamma
+from scipy.special import betainc, betaln, gamma, gammainc, ndtr
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.inference.noisy_marginal import without_noise
+from stiction.inference.scoring import climb
 from stiction.model import describe, is_finite
 from stiction.random.marginals import (
     Beta,
     Gamma,
     Lognormal,
+    Marginal,
     ScipyMarginal,
     TruncatedNormal,
     Weibull,
     marginal_of,
 )
 
+BINS = 160
+NODES = 9
+LEAST = 1e-12
+"""Probability of a bin."""
+DIFFERENCE = 1e-5
 WIDEST = 10.0
 """Ranges of the values that free bounds may lie away from them: beyond, they are not seen."""
 INSIDE = 1e-2
@@ -38,6 +47,67 @@ INSIDE = 1e-2
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
 MOST_NOISE = 0.95
+ANY = (-30.0, 30.0)
+
+_X, _W = np.polynomial.hermite_e.hermegauss(NODES)
+_W = _W / _W.sum()
+
+KEEPABLE: dict[str, tuple[str, ...]] = {
+    "beta": ("low", "high"),
+    "lognormal": ("low",),
+    "weibull": ("low",),
+    "gamma": ("low",),
+    "truncated_normal": ("low", "high"),
+    "normal": (),
+    "uniform": (),
+}
+"""Families that are fitted here, and which of their parameters may be given."""
+
+
+class Above(NamedTuple):
+    """A family above a bound, as functions of u = (value - bound)/scale and its shape.
+
+    `moments` are, from the shape, the mean above the bound over the scale, and the deviation over
+    that mean.
+    """
+
+    made: Any
+    distribution: Callable[[Array, float], Array]
+    log_density: Callable[[Array, float], Array]
+    moments: Callable[[float], tuple[float, float]]
+
+
+ABOVE = {
+    "lognormal": Above(
+        Lognormal,
+        lambda u, s: ndtr(np.log(u) / s),
+        lambda u, s: -np.log(u) - math.log(s) - 0.5 * (np.log(u) / s) ** 2,
+        lambda s: (math.exp(0.5 * s * s), math.sqrt(math.expm1(s * s))),
+    ),
+    "weibull": Above(
+        Weibull,
+        lambda u, k: -np.expm1(-(u**k)),
+        lambda u, k: math.log(k) + (k - 1.0) * np.log(u) - u**k,
+        lambda k: (gamma(1 + 1 / k), math.sqrt(gamma(1 + 2 / k) / gamma(1 + 1 / k) ** 2 - 1)),
+    ),
+    "gamma": Above(
+        Gamma,
+        lambda u, a: gammainc(a, u),
+        lambda u, a: (a - 1.0) * np.log(u) - u - math.lgamma(a),
+        lambda a: (a, a**-0.5),
+    ),
+}
+
+
+class Search(NamedTuple):
+    """A family as a function of a vector between limits."""
+
+    start: Array
+    limits: Array
+    distribution: Callable[[Array, Array], Array]
+    """From a vector and values to probabilities."""
+    log_density: Callable[[Array, Array], Array]
+    marginal: Callable[[Array], Any]
 
 
 @dataclass(frozen=True)
@@ -48,53 +118,91 @@ class Family:
     ----------
     name : str
         As in study files.
-    fixed : mapping of str to float
+    fixed : tuple of (str, float)
     """
 
     name: str
     fixed: tuple[tuple[str, float], ...] = ()
 
-    def fit(self, values: Array, noise: float = 0.0) -> Any:
-        """The marginal of values (points,) that carry noise of a standard deviation."""
+    def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
+        """Return the marginal of values (points,) that carry noise of a standard deviation.
+
+        Parameters
+        ----------
+        values : (points,) array
+        noise : float
+        start : marginal, optional
+            Of this family, to begin with.
+        """
+        quiet, deviation = self.quiet(values, noise), float(values.std())
+        if noise**2 <= NEGLIGIBLE * deviation**2:
+            noise, values = 0.0, quiet
+        search = self._search(values, quiet, noise, start)
+        if not isinstance(search, Search):
+            return search
+        counts, terms = np.ones(values.size), lambda v: search.log_density(v, values)
+        if noise:
+            counts, edges = np.histogram(values, bins=BINS)
+            shifted = edges[:, None] - noise * _X
+
+            def terms(v: Array) -> Array:
+                return np.log(_in_bins(search.distribution(v, shifted)))
+
+        def value_of(v: Array) -> tuple[float, Array]:
+            found: Array = terms(v)
+            return float(counts @ found), found
+
+        def derivatives(v: Array, at: Array) -> tuple[Array, Array]:
+            sides = np.where(v + DIFFERENCE <= search.limits[:, 1], DIFFERENCE, -DIFFERENCE)
+            slopes = np.stack([(terms(v + step) - at) / step.sum() for step in np.diag(sides)])
+            return slopes @ counts, (slopes * counts) @ slopes.T
+
+        found = climb(search.start, search.limits, value_of, derivatives, longest=0.5, settled=1e-5)
+        return search.marginal(found)
+
+    def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Any:
+        """The family as a function of a vector; or the marginal where nothing is searched."""
         fixed = dict(self.fixed)
-        quiet = self.quiet(values, noise)
-        if self.name not in _OWN:
+        if self.name == "normal":
+            spread = math.sqrt(max(float(values.var()) - noise**2, float(quiet.var())))
+            return ScipyMarginal("norm", (("loc", float(values.mean())), ("scale", spread)))
+        if self.name == "uniform":
+            ends = (("loc", float(quiet.min())), ("scale", float(np.ptp(quiet))))
+            return ScipyMarginal("uniform", ends)
+        if self.name not in KEEPABLE:
             return _by_scipy(self.name, quiet, fixed)
-        found = _OWN[self.name](quiet, fixed)
-        if noise**2 <= NEGLIGIBLE * float(values.var()):
-            return found
-        return without_noise(found, fixed, values, noise)
+        if self.name == "beta":
+            return _beta(values, quiet, noise, fixed, start)
+        low, high = fixed.get("low", 0.0), fixed.get("high")
+        if self.name == "truncated_normal":
+            return _truncated_normal(quiet, low, high)
+        return _above(self.name, quiet, low, start)
 
     def quiet(self, values: Array, noise: float) -> Array:
-        """Values drawn together to the variance that they would have without noise."""
+        """Return values drawn together to the variance that they would have without noise."""
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
-        return self._inside(mean + math.sqrt(1.0 - share) * (values - mean))
+        low, high = self.bounds()
+        margin = INSIDE * float(np.ptp(values))
+        values = mean + math.sqrt(1.0 - share) * (values - mean)
+        values = np.where(values <= low, low + margin, values)
+        return np.where(values >= high, high - margin, values)
 
     def parameters(self, marginal: Any) -> dict[str, float]:
-        """What was estimated, by name."""
+        """Return what was estimated, by name."""
         if isinstance(marginal, ScipyMarginal):
             found = dict(marginal.parameters)
         else:
-            found = {
-                field.name: getattr(marginal, field.name)
-                for field in dataclasses.fields(marginal)
-                if field.name != "type" and getattr(marginal, field.name) is not None
-            }
-        known = {*dict(self.fixed), *(_BOUNDS.get(self.name, {}))}
-        return {name: float(value) for name, value in found.items() if name not in known}
+            names = [field.name for field in dataclasses.fields(marginal) if field.name != "type"]
+            found = {name: getattr(marginal, name) for name in names}
+        known = {"low", *dict(self.fixed)} if self.name != "beta" else dict(self.fixed)
+        return {n: float(v) for n, v in found.items() if v is not None and n not in known}
 
     def bounds(self) -> tuple[float, float]:
-        """Support as far as it is known before anything is fitted."""
-        bounds = _BOUNDS.get(self.name, {}) | dict(self.fixed)
+        """Return the support as far as it is known before anything is fitted."""
+        zero = {"low": 0.0} if self.name in (*ABOVE, "truncated_normal") else {}
+        bounds = zero | dict(self.fixed)
         return bounds.get("low", -math.inf), bounds.get("high", math.inf)
-
-    def _inside(self, values: Array) -> Array:
-        """Values that noise carried beyond a bound, moved to just inside."""
-        low, high = self.bounds()
-        margin = INSIDE * float(np.ptp(values))
-        values = np.where(values <= low, low + margin, values)
-        return np.where(values >= high, high - margin, values)
 
     def check(self, values: Array) -> None:
         """Refuse values that the family cannot have."""
@@ -110,7 +218,7 @@ class Family:
 
 
 def family_of(given: Any) -> Family:
-    """A family from its name, a table with some of its parameters, or a marginal as a template."""
+    """Return the family of a name, or of a table with some of its parameters."""
     if isinstance(given, str):
         given = {"type": given}
     if not isinstance(given, Mapping):
@@ -121,12 +229,11 @@ def family_of(given: Any) -> Family:
         )
     fixed = {str(key): value for key, value in given.items() if key != "type"}
     name = str(given.get("type"))
-    if name in _OWN:
-        known = _KEEPABLE[name]
-    else:
+    known = KEEPABLE.get(name, ())
+    if name not in KEEPABLE:
         family = getattr(scipy.stats, name, None)
         if not isinstance(family, scipy.stats.rv_continuous):
-            raise InputError(unknown_name("marginal", name, [*_OWN, "norm", "weibull_max"]))
+            raise InputError(unknown_name("marginal", name, [*KEEPABLE, "norm", "weibull_max"]))
         shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
         known = (*shapes, "loc", "scale")
     problems = [unknown_name(f"marginal.{name}", key, known) for key in fixed if key not in known]
@@ -140,128 +247,111 @@ def family_of(given: Any) -> Family:
     return Family(name, tuple((key, float(value)) for key, value in fixed.items()))
 
 
-def _lognormal(values: Array, fixed: dict[str, float]) -> Lognormal:
-    low = fixed.get("low", 0.0)
-    logs = np.log(values - low)
-    mu, variance = float(logs.mean()), float(logs.var())
-    excess = math.exp(mu + 0.5 * variance)
-    mean = low + excess
-    return Lognormal(mean=mean, cv=math.sqrt(math.expm1(variance)) * excess / mean, low=low)
+def _above(name: str, quiet: Array, low: float, start: Any) -> Search:
+    family = ABOVE[name]
+    if start is None:
+        mean = float(quiet.mean())
+        start = family.made(mean=mean, cv=float(quiet.std()) / mean, low=low)
+    shape, _, scale = start.distribution.args
 
+    def marginal(v: Array) -> Marginal:
+        above, ratio = family.moments(math.exp(v[1]))
+        mean = low + math.exp(v[0]) * above
+        found: Marginal = family.made(mean=mean, cv=ratio * (mean - low) / mean, low=low)
+        return found
 
-def _gamma(values: Array, fixed: dict[str, float]) -> Gamma:
-    low = fixed.get("low", 0.0)
-    excess = values - low
-    mean = float(excess.mean())
-    gap = math.log(mean) - float(np.log(excess).mean())
-    shape = brentq(lambda a: math.log(a) - digamma(a) - gap, 1e-3, 1e9, xtol=1e-12, rtol=1e-12)
-    return Gamma(mean=low + mean, cv=mean / math.sqrt(shape) / (low + mean), low=low)
+    def unit(v: Array, y: Array) -> Array:
+        return np.maximum((y - low) * math.exp(-v[0]), 1e-300)
 
-
-def _weibull(values: Array, fixed: dict[str, float]) -> Weibull:
-    low = fixed.get("low", 0.0)
-    logs = np.log(values - low)
-    top = float(logs.max())
-    average = float(logs.mean())
-
-    def score(shape: float) -> float:
-        weight = np.exp(shape * (logs - top))
-        return float(weight @ logs / weight.sum()) - 1.0 / shape - average
-
-    shape = brentq(score, 0.2, 500.0, xtol=1e-10)
-    power = np.exp(shape * (logs - top)).mean()
-    scale = math.exp(top) * float(power) ** (1.0 / shape)
-    frozen = scipy.stats.weibull_min(shape, low, scale)
-    mean = float(frozen.mean())
-    return Weibull(mean=mean, cv=float(frozen.std()) / mean, low=low)
-
-
-def _truncated_normal(values: Array, fixed: dict[str, float]) -> TruncatedNormal:
-    # An exponential family in y and y^2: maximum likelihood equates the moments.
-    # Where they are wider than any cut normal distribution, the likelihood rises towards an
-    # exponential or uniform one; the widest that can still be told from it is taken.
-    mean, cv = float(values.mean()), float(values.std()) / float(values.mean())
-    low, high = fixed.get("low", 0.0), fixed.get("high")
-    for _ in range(60):
-        try:
-            return TruncatedNormal(mean=mean, cv=cv, low=low, high=high)
-        except InputError:
-            cv *= 0.97
-    raise InputError("marginal: no normal distribution cut at these bounds resembles the values")
-
-
-def _normal(values: Array, fixed: dict[str, float]) -> ScipyMarginal:
-    moments = (("loc", float(values.mean())), ("scale", float(values.std())))
-    return ScipyMarginal("norm", moments)
-
-
-def _uniform(values: Array, fixed: dict[str, float]) -> ScipyMarginal:
-    return ScipyMarginal(
-        "uniform", (("loc", float(values.min())), ("scale", float(np.ptp(values))))
+    return Search(
+        np.log([scale, shape]),
+        np.array([(-700.0, 700.0), (-5.0, 5.0) if name == "lognormal" else (-1.6, 7.0)]),
+        lambda v, y: family.distribution(unit(v, y), math.exp(v[1])),
+        lambda v, y: family.log_density(unit(v, y), math.exp(v[1])) - v[0],
+        marginal,
     )
 
 
-def _shapes(log_up: float, log_down: float, start: tuple[float, float]) -> tuple[float, float]:
-    """alpha, beta >= 1 of the greatest likelihood, by Newton, from E log u and E log(1 - u)."""
-    a, b = start
-    for _ in range(60):
-        both = digamma(a + b)
-        ga, gb = log_up - digamma(a) + both, log_down - digamma(b) + both
-        common = polygamma(1, a + b)
-        haa, hbb = polygamma(1, a) - common, polygamma(1, b) - common
-        determinant = haa * hbb - common * common
-        da, db = (hbb * ga + common * gb) / determinant, (haa * gb + common * ga) / determinant
-        a, b = float(np.clip(a + da, 0.5 * a, 2.0 * a)), float(np.clip(b + db, 0.5 * b, 2.0 * b))
-        if abs(da) < 1e-9 * a and abs(db) < 1e-9 * b:
-            break
-    return a, b
+def _truncated_normal(quiet: Array, low: float, high: float | None) -> Search:
+    unit, mean, top = float(quiet.std()), float(quiet.mean()), math.inf if high is None else high
 
+    def parts(v: Array) -> tuple[float, float, float, float]:
+        middle, width = mean + unit * v[0], unit * math.exp(v[1])
+        return middle, width, (low - middle) / width, (top - middle) / width
 
-def _beta_at(values: Array, low: float, high: float) -> tuple[float, float, float]:
-    """alpha, beta and the mean log likelihood, bounds given."""
-    width = high - low
-    u = (values - low) / width
-    up, down = float(np.log(u).mean()), float(np.log1p(-u).mean())
-    mean, variance = float(u.mean()), float(u.var())
-    total = max(mean * (1.0 - mean) / variance - 1.0, 0.1)
-    a, b = _shapes(up, down, (max(mean * total, 0.1), max((1.0 - mean) * total, 0.1)))
-    value = (a - 1.0) * up + (b - 1.0) * down - float(betaln(a, b)) - math.log(width)
-    return a, b, value
+    def distribution(v: Array, y: Array) -> Array:
+        middle, width, below, above = parts(v)
+        reached = ndtr((np.clip(y, low, top) - middle) / width) - ndtr(below)
+        found: Array = np.clip(reached / max(ndtr(above) - ndtr(below), 1e-300), 0.0, 1.0)
+        return found
 
+    def log_density(v: Array, y: Array) -> Array:
+        middle, width, below, above = parts(v)
+        mass = max(ndtr(above) - ndtr(below), 1e-300)
+        found: Array = -0.5 * ((y - middle) / width) ** 2 - math.log(width * mass)
+        return found
 
-def _beta(values: Array, fixed: dict[str, float]) -> Beta:
-    least, most = float(values.min()), float(values.max())
-    room = most - least
-
-    def ends(at: Array) -> tuple[float, float]:
-        place = iter(at)
-        free_low = "low" not in fixed
-        low = least - room * math.exp(next(place)) if free_low else fixed["low"]
-        high = most + room * math.exp(next(place)) if "high" not in fixed else fixed["high"]
-        return low, high
-
-    free = 2 - len({"low", "high"} & fixed.keys())
-
-    def loss(at: Array) -> float:
-        if np.any(np.abs(at + 3.5) > 3.5 + math.log(WIDEST)):
-            return 1e9 + float(np.sum(np.abs(at)))
-        low, high = ends(at)
-        a, b, value = _beta_at(values, low, high)
-        # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
-        return -value + 10.0 * (max(0.0, 1.0 - a) ** 2 + max(0.0, 1.0 - b) ** 2)
-
-    if free:
-        options = {"xatol": 1e-3, "fatol": 1e-8, "maxiter": 200}
-        starts = [np.full(free, -3.0), np.full(free, -1.0)]
-        found = min(
-            (minimize(loss, s, method="Nelder-Mead", options=options) for s in starts),
-            key=lambda one: one.fun,
+    def marginal(v: Array) -> TruncatedNormal:
+        middle, width, below, above = parts(v)
+        frozen = scipy.stats.truncnorm(below, above, middle, width)
+        mean, cv = float(frozen.mean()), float(frozen.std()) / float(frozen.mean())
+        # Near an exponential or uniform distribution, which the likelihood may tend to, the
+        # widest is taken that its moments still determine.
+        for _ in range(60):
+            try:
+                return TruncatedNormal(mean=mean, cv=cv, low=low, high=high)
+            except InputError:
+                cv *= 0.97
+        raise InputError(
+            "marginal: no normal distribution cut at these bounds resembles the values"
         )
-        low, high = ends(found.x)
-    else:
-        low, high = fixed["low"], fixed["high"]
-    a, b, _ = _beta_at(values, low, high)
-    return Beta(alpha=a, beta=b, low=low, high=high)
+
+    return Search(
+        np.zeros(2), np.array([(-8.0, 8.0), (-3.0, 2.5)]), distribution, log_density, marginal
+    )
+
+
+def _beta(values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any) -> Search:
+    mean, unit = float(values.mean()), float(values.std())
+    sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
+    room = {"low": mean - float(values.min()), "high": float(values.max()) - mean}
+    widest = WIDEST * float(np.ptp(values))
+
+    def parts(v: Array) -> tuple[float, float, float, float]:
+        ends = fixed | {
+            name: mean + side * unit * math.exp(at)
+            for (name, side), at in zip(sides.items(), v[2:], strict=True)
+        }
+        return math.exp(v[0]), math.exp(v[1]), ends["low"], ends["high"]
+
+    def distribution(v: Array, y: Array) -> Array:
+        a, b, low, high = parts(v)
+        found: Array = betainc(a, b, np.clip((y - low) / (high - low), 0.0, 1.0))
+        return found
+
+    def log_density(v: Array, y: Array) -> Array:
+        a, b, low, high = parts(v)
+        u = (y - low) / (high - low)
+        shapes = (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u)
+        found: Array = shapes - betaln(a, b) - math.log(high - low)
+        return found
+
+    def marginal(v: Array) -> Beta:
+        a, b, low, high = parts(v)
+        return Beta(alpha=a, beta=b, low=low, high=high)
+
+    if start is None:
+        ends = {name: mean + 1.1 * side * room[name] for name, side in sides.items()} | fixed
+        u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
+        total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, 0.2)
+        start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
+    distances = [side * (getattr(start, name) - mean) / unit for name, side in sides.items()]
+    # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
+    least = {name: 0.5 if noise else room[name] / unit * (1.0 + 1e-9) for name in sides}
+    limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
+    limits += [(math.log(least[name]), math.log((room[name] + widest) / unit)) for name in sides]
+    first = np.log([start.alpha, start.beta, *np.maximum(distances, 1e-3)])
+    return Search(first, np.array(limits), distribution, log_density, marginal)
 
 
 def _by_scipy(name: str, values: Array, fixed: dict[str, float]) -> Any:
@@ -276,30 +366,18 @@ def _by_scipy(name: str, values: Array, fixed: dict[str, float]) -> Any:
     return marginal_of(family(*found))
 
 
-_OWN: dict[str, Callable[[Array, dict[str, float]], Any]] = {
-    "beta": _beta,
-    "lognormal": _lognormal,
-    "weibull": _weibull,
-    "gamma": _gamma,
-    "truncated_normal": _truncated_normal,
-    "normal": _normal,
-    "uniform": _uniform,
-}
-_KEEPABLE = {
-    "beta": ("low", "high"),
-    "lognormal": ("low",),
-    "weibull": ("low",),
-    "gamma": ("low",),
-    "truncated_normal": ("low", "high"),
-    "normal": (),
-    "uniform": (),
-}
-_BOUNDS: dict[str, dict[str, float]] = {
-    "lognormal": {"low": 0.0},
-    "weibull": {"low": 0.0},
-    "gamma": {"low": 0.0},
-    "truncated_normal": {"low": 0.0},
-}
+def _in_bins(reached: Array) -> Array:
+    """Probabilities of bins from the distribution function at their edges, (bins + 1, nodes)."""
+    below = reached @ _W if reached.shape[1] == NODES else reached[:, 0]
+    found: Array = np.maximum(np.diff(below), LEAST)
+    return found
+
+
+def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
+    """Of values in bins, marginal and noise together; the width of a bin is left out."""
+    counts, edges = np.histogram(values, bins=BINS)
+    expected = _in_bins(marginal.distribution.cdf(edges[:, None] - noise * _X))
+    return float(counts @ np.log(expected) / values.size)
 
 
 def distance(marginal: Any, values: Array) -> float:

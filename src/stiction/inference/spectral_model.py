@@ -14,8 +14,12 @@ from stiction.arrays import Array
 EDGE = 0.2
 """Share of the truncation over which a spectrum is faded out: a sharper end would be taken for a
 precise measure of the correlation length, which it is in simulations only."""
+LEFT_OUT = 1e-4
+"""Share of the variance above the end of a spectrum that is not truncated."""
 FOLDS = 6
 """Multiples of the sampling wavenumber that are folded back one by one."""
+NEAR, FEW = 1, 65
+"""Of those multiples on a line the ones that need all wavenumbers, and how many the others do."""
 ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of the record."""
 
@@ -44,9 +48,10 @@ class Grid:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Variance of z in each mode of a real transform of the grid; it sums to 1 over all.
 
-        The spectrum fades out at its truncation; what lies above the sampling
-        wavenumber is folded back, and what lies above `FOLDS` times that, which is flat by then,
-        evenly. With `end_seen` false it is truncated at the sampling wavenumber at the lowest.
+        The spectrum fades out at its truncation; what lies above the sampling wavenumber is folded
+        back, and what lies above `FOLDS` times that, which is flat by then, evenly. With
+        `end_seen` false it is not truncated: what a truncation leaves out of a rough spectrum
+        would be taken for noise.
         """
         dimensions = len(self.shape)
         cutoff = spectrum.cutoff(dimensions)
@@ -54,6 +59,7 @@ class Grid:
         steps = [s / n for s, n in zip(sampling, self.whole, strict=True)]
         stretch = (1.0, anisotropy)[: len(self.shape)]
         if not end_seen:
+            cutoff = spectrum.quantile(1.0 - LEFT_OUT, dimensions)
             cutoff = max(cutoff, *(a * s for a, s in zip(stretch, sampling, strict=True)))
         ranges = [
             min(FOLDS, math.ceil(cutoff / (a * s) + 0.5))
@@ -85,10 +91,18 @@ class Grid:
         def kept(k: Array) -> Array:
             return np.clip((end - k) / (EDGE * end) + 0.5, 0.0, 1.0)
 
+        def added(at: Array, folds: Array) -> Array:
+            k = np.abs(at + folds[:, None] * sampling[0])
+            found: Array = np.sum(spectrum.density(k) * kept(k), axis=0)
+            return found
+
         if len(axes) == 1:
-            folds = np.arange(-ranges[0], ranges[0] + 1)[:, None] * sampling[0]
-            k = np.abs(axes[0] + folds)
-            line: Array = np.sum(spectrum.density(k) * kept(k), axis=0)
+            near = min(ranges[0], NEAR)
+            line = added(axes[0], np.arange(-near, near + 1))
+            if ranges[0] > near:  # smooth by then
+                far = np.arange(near + 1, ranges[0] + 1)
+                few = np.linspace(0.0, axes[0][-1], FEW)
+                line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
             return line
         found = np.zeros((axes[0].size, axes[1].size))
         for p in range(-ranges[0], ranges[0] + 1):

@@ -13,6 +13,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
+from stiction.inference.scoring import climb
 from stiction.inference.whittle import Model, Observed, loss
 from stiction.model import describe, is_finite
 from stiction.random.spectra import (
@@ -34,7 +35,6 @@ NOISE = (-0.5, 0.95)
 would have, by chance; were it cut at zero, the errors of small noises could not be told."""
 VARIANCES = (1e-200, 1e200)
 ANISOTROPIES = (0.05, 20.0)
-STEPS = 40
 DIFFERENCE = 1e-4
 SETTLED = 1e-3
 """Gain of log likelihood below which scoring ends; a standard error is worth a half."""
@@ -97,7 +97,7 @@ class SpectrumFamily:
 
     def model(self, vector: Array, shares: Array) -> Model:
         """The model of a vector of parameters."""
-        found = {n: _back(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
+        found = {n: back(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
         variance = found.pop("variance")
         anisotropy = found.pop("anisotropy", self.anisotropy)
         known = min((self.noise or 0.0) ** 2 / variance, NOISE[1])
@@ -133,7 +133,7 @@ def _forth(name: str, value: float) -> float:
     return value if name == "noise_share" else math.log(value)
 
 
-def _back(name: str, value: float) -> float:
+def back(name: str, value: float) -> float:
     if name == "exponent":
         return 0.5 + math.exp(value)
     return value if name == "noise_share" else math.exp(value)
@@ -207,49 +207,19 @@ def fit_spectrum(
 ) -> Array:
     """The vector of parameters of the greatest likelihood, from a start.
 
-    Fisher scoring with the damping of Levenberg and Marquardt: with d = d log E/d theta the score
-    is sum w d (I/E - 1) and the information sum w d d^T.
+    With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d d^T.
     """
 
-    def signals(at: Array) -> list[Array]:
+    def value_of(at: Array) -> tuple[float, list[Array]]:
         model = family.model(at, shares)
-        return [model.signal(one) for one in observed]
-
-    def loss_of(at: Array, signal: Sequence[Array]) -> float:
-        model = family.model(at, shares)
+        signal = [model.signal(one) for one in observed]
         mixed = [model.with_noise(s, one) for s, one in zip(signal, observed, strict=True)]
-        return loss(mixed, observed)
+        return -loss(mixed, observed), signal
 
-    limits = family.limits
-    at = np.clip(start, limits[:, 0], limits[:, 1])
-    signal = signals(at)
-    value = loss_of(at, signal)
-    damping = 1e-3
-    for _ in range(STEPS):
-        score, information = _score(family, at, shares, observed, signal)
-        # What pushes against its limit is held there, or the others could not move.
-        held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
-        free = np.flatnonzero(~held)
-        information, score = information[np.ix_(free, free)], score[free]
-        diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information) + 1e-300)
-        while damping < 1e6:
-            step = np.zeros(at.size)
-            step[free] = np.linalg.solve(information + damping * diagonal, score)
-            step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
-            new = np.clip(at + step, limits[:, 0], limits[:, 1])
-            new_signal = signals(new)
-            new_value = loss_of(new, new_signal)
-            if new_value <= value:
-                break
-            damping *= 10.0
-        else:
-            break
-        gain = value - new_value
-        at, signal, value = new, new_signal, new_value
-        damping = max(0.1 * damping, 1e-9)
-        if gain < SETTLED:
-            break
-    return at
+    def derivatives(at: Array, signal: Sequence[Array]) -> tuple[Array, Array]:
+        return _score(family, at, shares, observed, signal)
+
+    return climb(start, family.limits, value_of, derivatives, longest=LONGEST, settled=SETTLED)
 
 
 def _score(

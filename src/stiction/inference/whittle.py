@@ -30,7 +30,7 @@ FLOOR = 1e-3
 """Of the highest power, averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS = 10
-REACH, POINTS = 6.0, 481
+REACH, POINTS = 6.0, 121
 
 
 def hermite_shares(marginal: Any) -> Array:
