@@ -67,6 +67,13 @@ def _count(value: Any) -> Any:
     return count
 
 
+def as_list(value: Any) -> Any:
+    """Return arrays and ranges as lists, for annotations of sequences."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return list(value) if isinstance(value, range) else value
+
+
 def is_whole(value: Any, least: int) -> bool:
     """Whether a value is a whole number (1e4 too), and not less than `least`."""
     number = whole(value)
@@ -118,6 +125,11 @@ def at_least(least: int) -> Any:
     return Annotated[int, BeforeValidator(read)]
 
 
+Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
+Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
+"""Whole numbers from 1 and from 0; 1e4 counts as one."""
+
+
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     """A number, a read-only float64 array of shape (*shape), or what a problem will place.
 
@@ -160,9 +172,6 @@ def _plain(value: Any) -> Any:
 
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
-Count: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=1)]
-Number: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=0)]
-"""A whole number that is not negative."""
 PROFILE_SCHEMA = [
     {"type": "number"},
     {"type": "array", "items": {"type": "number"}},
@@ -481,10 +490,23 @@ def _without_return(function: Any) -> types.FunctionType:
 def _instances(annotation: Any) -> Any:
     """The annotation with model classes that take instances only."""
     if dataclasses.is_dataclass(annotation) and isinstance(annotation, type):
-        return InstanceOf[annotation]  # type: ignore[valid-type]
+        return _instance_of((annotation,))
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
-        return typing.Union[tuple(map(_instances, typing.get_args(annotation)))]  # noqa: UP007
+        members = typing.get_args(annotation)
+        classes = tuple(one for one in members if dataclasses.is_dataclass(one))
+        rest = tuple(one for one in members if one not in classes)
+        if classes:
+            return typing.Union[(_instance_of(classes), *rest)]
     return annotation
+
+
+def _instance_of(classes: tuple[type, ...]) -> Any:
+    def read(value: Any, _: Any) -> Any:
+        if not isinstance(value, classes):
+            raise ValueError("must be " + " or ".join(_article(one.__name__) for one in classes))
+        return value
+
+    return Annotated[Any, WrapValidator(read)]
 
 
 _LONG = 6

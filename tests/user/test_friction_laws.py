@@ -143,7 +143,7 @@ def test_law_that_is_misspelt(tmp_path, problem, make_strength):
 
 
 def test_polygon_along_a_law_says_what_is_wrong():
-    with pytest.raises(st.InputError, match="pieces: must be greater than or equal to 2, got 1"):
+    with pytest.raises(st.InputError, match="pieces: must be a whole number >= 2, got 1"):
         st.PiecewiseWeakening.from_law(EXPONENTIAL, 1)
     with pytest.raises(st.InputError, match=r"law: must be a FrictionLaw, got"):
         st.PiecewiseWeakening.from_law("exponential", 4)

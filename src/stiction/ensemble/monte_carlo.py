@@ -227,7 +227,7 @@ def monte_carlo(
     time_limit: Seconds | None = None,
     pilot: Flag = True,
 ) -> xr.Dataset:
-    """Onset of many random interfaces.
+    """Compute the onset of many random interfaces.
 
     Sample i depends on (seed, i) only: not on the number of samples, the workers or the executor.
 

@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import (
     BeforeValidator,
     Discriminator,
-    Field,
     GetJsonSchemaHandler,
     Tag,
     WrapSerializer,
@@ -26,7 +25,16 @@ from pydantic_core import CoreSchema
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.friction.parameters import FUNCTIONS, Exponential, Linear, Polygon
-from stiction.model import Count, OptionalProfile, Profile, Real, checked, is_unplaced, model
+from stiction.model import (
+    OptionalProfile,
+    Profile,
+    Real,
+    as_list,
+    at_least,
+    checked,
+    is_unplaced,
+    model,
+)
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
@@ -313,11 +321,7 @@ class ExponentialWeakening(FrictionLaw):
         return Exponential()
 
 
-def _list(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(_list)]
+Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(as_list)]
 
 
 @model(kw_only=True)
@@ -493,8 +497,11 @@ class PiecewiseWeakening(FrictionLaw):
         return Linear() if self.linear else Polygon(*self.corners)
 
 
+Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
+
+
 @checked
-def _check_pieces(law: FrictionLaw, pieces: Annotated[Count, Field(ge=2)]) -> int:
+def _check_pieces(law: FrictionLaw, pieces: Pieces) -> int:
     problems = contradictions(law)
     scale, value = law.scale
     if is_unplaced(value):
