@@ -281,13 +281,14 @@ def _parameters(owner: Any) -> dict[str, Any]:
     return {name: hints.get(name, Any) for name in inspect.signature(owner).parameters}
 
 
-def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
-    """Path as the user wrote it, and the keys valid in its last-but-one step.
+def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str], list[Any]]:
+    """Path as the user wrote it, the keys valid in its last-but-one step, models valid in the last.
 
     Pydantic numbers positional arguments and puts the chosen member of a union into the path.
     """
     path: list[str] = []
     owners: list[Any] = [owner]
+    inside: list[Any] = []
     for step in location:
         members = {getattr(one, "type", None): one for one in owners}
         if len(owners) > 1 and step in members:
@@ -299,9 +300,11 @@ def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[
         if isinstance(step, int) and step < len(found):
             step = list(found)[step]
         path.append(str(step))
-        if step in found and step is not location[-1]:
-            owners = _models_in(found[str(step)])
-    return path, list(dict.fromkeys(name for one in owners for name in _parameters(one)))
+        inside = _models_in(found.get(str(step)))
+        if inside and step is not location[-1]:
+            owners = inside
+    names = dict.fromkeys(name for one in owners for name in _parameters(one))
+    return path, list(names), inside
 
 
 def explain(
@@ -325,7 +328,7 @@ def explain(
         names = list(_parameters(owner))
         return [f"{owner.__name__}: give its arguments by name (valid: {', '.join(names)})"]
     for item in items:
-        steps, valid = _walk(owner, (*prefix, *item["loc"]))
+        steps, valid, inside = _walk(owner, (*prefix, *item["loc"]))
         path = ".".join([root, *steps] if root else steps)
         kind, message, given = item["type"], item["msg"], item.get("input")
         message = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
@@ -347,6 +350,9 @@ def explain(
                 texts.append(f"{path}: {message}, got {describe(given)}")
         elif kind == "is_instance_of":
             texts.append(f"{path}: must be {_article(item['ctx']['class'])}, got {describe(given)}")
+        elif inside and kind in ("dataclass_type", "model_attributes_type"):
+            expected = " or ".join(_article(one.__name__) for one in inside)
+            texts.append(f"{path}: must be {expected}, got {describe(given)}")
         else:
             message = message.removeprefix("Input should be ")
             texts.append(f"{path}: must be {message}, got {describe(given)}")
