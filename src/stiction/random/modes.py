@@ -47,11 +47,6 @@ class Modes:
         return self.sigma.size - 1
 
     @property
-    def has_mean(self) -> bool:
-        """Whether the mean mode is drawn."""
-        return self.dimension > 2 * self.count
-
-    @property
     def highest(self) -> tuple[int, ...]:
         """Largest wave number in each direction, in units of 2 pi/length."""
         return tuple(int(most) for most in np.abs(self.numbers).max(axis=1))

@@ -8,12 +8,12 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-import pydantic
+from scipy.optimize import brentq
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import Flag, Positive, check, check_memory, describe, model, real_array, whole
+from stiction.model import Flag, Numbers, Positive, check, check_memory, describe, model, whole
 from stiction.random.mapping import (
     correlation_of_mapped,
     from_normal,
@@ -100,7 +100,7 @@ class RandomField:
         return float(self.marginal.distribution.std())
 
     def modes(self, interface: Interface) -> Modes:
-        """The modes of this field on an interface.
+        """Return the modes of this field on an interface.
 
         Raises
         ------
@@ -108,14 +108,12 @@ class RandomField:
             If truncation leaves no mode: the correlation length is too long for the interface. If
             a line is given an anisotropy.
         """
-        if not isinstance(interface, Interface):
-            raise InputError(f"interface: must be an Interface, got {describe(interface)}")
-        return _modes(self, interface)
+        return _modes(self, check("interface", interface, Interface))
 
     def draws(
         self, interface: Interface, samples: int, seed: int, first: int = 0, *, stream: int = 0
     ) -> Array:
-        """Standard normal draws of samples first .. first + samples - 1.
+        """Draw samples number `first`, `first` + 1, ..., standard normal numbers.
 
         Draw j of sample i depends on (seed, stream, i, j) only: not on the batch, the spectrum or
         the marginal.
@@ -134,17 +132,13 @@ class RandomField:
         counts = check_counts(samples=samples, seed=seed, first=first, stream=stream)
         modes = self.modes(interface)
         check_memory("samples", 8.0 * counts["samples"] * (modes.dimension + interface.size))
-        ranks = modes.ranks
         block = block_of(len(interface.shape))
-        return standard_normal(**counts, ranks=ranks, mean_mode=self.mean_mode, block=block)
+        return standard_normal(**counts, ranks=modes.ranks, mean_mode=self.mean_mode, block=block)
 
     def gaussian(self, interface: Interface, draws: Array) -> Array:
-        """The underlying Gaussian field z of given draws, (samples, *shape), of unit variance."""
+        """Compute the Gaussian field z of given draws, (samples, *shape), of unit variance."""
         modes = self.modes(interface)
-        try:
-            draws = real_array(draws)
-        except TypeError as error:
-            raise InputError(f"draws: must be numbers; {error}") from None
+        draws = check("draws", draws, Numbers)
         if draws.ndim != 2 or draws.shape[1] != modes.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {modes.dimension}), got shape {draws.shape}"
@@ -154,7 +148,7 @@ class RandomField:
         return gaussian(draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape)
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
-        """The map from draws to profiles.
+        """Map draws to profiles.
 
         Parameters
         ----------
@@ -236,7 +230,7 @@ class RandomField:
             )
 
     def correlation(self, interface: Interface, *, of: str = "strength") -> Array:
-        """Correlation at the lags ``interface.coordinates``, (*shape), on the periodic interface.
+        """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
         Parameters
         ----------
@@ -271,9 +265,9 @@ class RandomField:
         return coefficients
 
     def efolding_length(self, *, of: str = "strength") -> float:
-        """Distance at which the correlation falls to 1/e, m, truncation included, infinite line.
+        """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
-        On a plane it is that along x, to the accuracy at which a cut has the line's correlation.
+        Truncation is included. On a plane it is that along x, but for what truncation leaves out.
 
         Parameters
         ----------
@@ -283,17 +277,15 @@ class RandomField:
         if _which(of) == "z":
             return self.spectrum.efolding_length
         coefficients = self._map_coefficients()
-        low, high = 0.0, 1.0
-        for _ in range(60):  # the correlation of the mapped field is monotone in that of z
-            rho = 0.5 * (low + high)
-            if correlation_of_mapped(np.array([rho]), coefficients)[0] < math.exp(-1.0):
-                low = rho
-            else:
-                high = rho
-        return lag_of_correlation(self.spectrum, high)
+        # The correlation of the mapped field is monotone in that of z.
+        rho = brentq(
+            lambda rho: correlation_of_mapped(np.array(rho), coefficients) - math.exp(-1.0),
+            0.0, 1.0, xtol=1e-16,
+        )  # fmt: skip
+        return lag_of_correlation(self.spectrum, float(rho))
 
     def with_efolding_length(self, length: float, *, of: str = "strength") -> RandomField:
-        """The same field with a correlation that falls to 1/e at `length` (m).
+        """Return the same field with a correlation that falls to 1/e at `length` (m).
 
         Parameters
         ----------
@@ -304,10 +296,7 @@ class RandomField:
         """
         if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")
-        try:
-            length = pydantic.TypeAdapter(Positive).validate_python(length)
-        except pydantic.ValidationError:
-            raise InputError(f"length: must be a positive number, got {length!r}") from None
+        length = check("length", length, Positive)
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = self.spectrum.with_correlation_length(xi)
         return dataclasses.replace(self, spectrum=spectrum)
