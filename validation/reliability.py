@@ -17,7 +17,7 @@ import numpy as np
 import stiction as st
 from stiction.criterion.local import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
-from stiction.reliability.estimate import failure_probability
+from stiction.reliability.failure import failure_probability
 from stiction.reliability.limit_state import make_limit_state
 
 MILLION = 1_000_000
@@ -47,7 +47,7 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
         for seed in range(1, REPEATS + 1)
     ]
     ratio = np.array([one.probability for one in found]) / reference
-    error = math.sqrt(np.mean([one.coefficient_of_variation**2 for one in found]))
+    error = math.sqrt(np.mean([one.cv**2 for one in found]))
     held = np.mean([one.interval[0] <= reference <= one.interval[1] for one in found])
     print(
         f"  {method.type:16s} {algorithm:11s} mean {ratio.mean():.3f}"
@@ -108,7 +108,7 @@ def main():
         share = math.log1p(-rule) / math.log1p(-counted)
         print(
             f"  {chance:g}: {counted:.4f}, {rule:.4f} (log survival {share:.2f} of it),"
-            f" {found.probability:.4f} +- {found.coefficient_of_variation:.0%}"
+            f" {found.probability:.4f} +- {found.cv:.0%}"
         )
 
 

@@ -40,7 +40,7 @@ _HOMES = {
     "onset": "methods",
     "monte_carlo": "ensemble.monte_carlo",
     "fit_field": "inference.fit",
-    "failure_probability": "reliability.estimate",
+    "failure_probability": "reliability.failure",
     "design_stress": "reliability.design",
     "failure_curve": "reliability.curve",
     "read_peaks": "inference.peaks",

@@ -70,7 +70,7 @@ from stiction.reliability.curve import failure_curve as failure_curve
 from stiction.reliability.design import (
     design_stress as design_stress,
 )
-from stiction.reliability.estimate import failure_probability as failure_probability
+from stiction.reliability.failure import failure_probability as failure_probability
 from stiction.solid import Solid as Solid
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from importance import Mixture
 from scipy.integrate import quad
 
 import stiction as st
-from stiction.reliability.importance import Mixture
 
 BETA = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
 LINE = st.Interface(length=4.0, nodes=128)

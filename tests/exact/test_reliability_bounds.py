@@ -9,15 +9,13 @@ from scipy.stats import binom, nbinom
 
 import stiction as st
 from stiction.progress import SILENT
-from stiction.reliability.estimate import failure_probability
-from stiction.reliability.limit_state import make_limit_state
-from stiction.reliability.plain_monte_carlo import Count, count_failures, tally
-from stiction.reliability.pooling import Tail
+from stiction.reliability.counting import Count, count_failures, tally
+from stiction.reliability.failure import failure_probability
+from stiction.reliability.tail import Tail
 from stiction.reliability.uncertainty import (
     ancestral_variance,
     binomial_interval,
     chain_correlation,
-    effective_size,
     generator,
     lognormal_interval,
 )
@@ -34,17 +32,17 @@ def test_beyond_the_bounds_nothing_is_sampled(system, stress, expected):
     result = failure_probability(*system, stress, method=st.LocalCriterion())
     assert result.probability == expected
     assert result.interval == (expected, expected)
-    assert result.coefficient_of_variation == 0.0
+    assert result.cv == 0.0
     assert result.evaluations == 0
     assert result.algorithm == "exact"
     assert result.stress_above_bound == stress - 0.66e6
 
 
 def test_all_of_a_count_is_not_certainty():
-    assert Count(0, 100).coefficient_of_variation == math.inf
+    assert Count(0, 100).cv == math.inf
     # As if one in 101 had held.
-    assert Count(100, 100).coefficient_of_variation == pytest.approx(1.0 / math.sqrt(101 * 100))
-    assert Count(50, 100).coefficient_of_variation == pytest.approx(0.1)
+    assert Count(100, 100).cv == pytest.approx(1.0 / math.sqrt(101 * 100))
+    assert Count(50, 100).cv == pytest.approx(0.1)
 
 
 def test_bounds_follow_load_and_initial_stress():
@@ -71,7 +69,7 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     profiles = field.sample(problem.interface, samples=200)
     found = st.onset(problem, profiles, method=st.LocalCriterion())
     assert float(found["critical_stress"].min()) < 0.66e6
-    state = make_limit_state(problem, field, st.LocalCriterion(), 0, "critical_stress", 1)
+    state = st.external.limit_state(problem, field, st.LocalCriterion())
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
 
@@ -120,11 +118,6 @@ def test_chain_correlation_of_known_chains():
     assert chain_correlation(np.ones((10, 5), dtype=bool)) == 0.0
 
 
-def test_effective_size():
-    assert effective_size(np.array([2.0, 2.0, 0.0, 2.0])) == pytest.approx(3.0)
-    assert effective_size(np.zeros(4)) == 0.0
-
-
 def test_tally_numbers_the_failures_from_the_first_sample_on():
     count = tally(np.array([3.0, 1.0, 2.0, 1.0, 2.0, 0.5]), 1.5, 1000)
     assert (count.failures, count.samples) == (3, 6)
@@ -167,7 +160,7 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     # Three standard errors of two thousand runs: 2 %. Counting until the estimate looks precise
     # enough is 9 % high in the first case.
     assert abs(found.mean() - 1.0) < 3.0 * found.std() / math.sqrt(repeats)
-    reported = np.array([count.coefficient_of_variation for count, _ in counts])
+    reported = np.array([count.cv for count, _ in counts])
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
     if most == 10**6:
         assert reported.max() <= target_cv
@@ -233,4 +226,4 @@ def test_runs_are_pooled_by_their_size():
     assert tail.probability(1.0) == pytest.approx(0.2 * 1e-3 + 0.6 * 2e-3)
     # Standard errors of the parts: 0.2 * 1e-3 * 0.2 and 0.6 * 2e-3 * 0.1; nothing seen adds none.
     error = math.hypot(0.4e-4, 1.2e-4)
-    assert tail.coefficient_of_variation(1.0) == pytest.approx(error / 1.4e-3)
+    assert tail.cv(1.0) == pytest.approx(error / 1.4e-3)

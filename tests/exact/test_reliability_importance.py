@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import scipy.stats
+from importance import Mixture, design_point
 
 import stiction as st
-from stiction.reliability.importance import Mixture, design_point
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from stiction.reliability.pooling import Tail, run_until_precise
+from stiction.reliability.guide import agreement
 from stiction.reliability.subset import descend
-from stiction.reliability.tail_runs import stress_interval
-from stiction.reliability.two_level import agreement, bridge
+from stiction.reliability.tail import Tail, repeat_until_precise
+from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
 DIMENSION = 600
@@ -94,7 +94,7 @@ def test_quantiles_of_pooled_runs():
     for beta in (1.0, 3.0, 4.5):
         chance = norm.cdf(-beta)
         # dP/P = beta d(beta): the pooled c.o.v. is below 0.06, so the quantile is good to 0.02.
-        cv = tail.coefficient_of_variation(-beta)
+        cv = tail.cv(-beta)
         assert cv < 0.07
         assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cv / beta)
 
@@ -102,14 +102,14 @@ def test_quantiles_of_pooled_runs():
 def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
     tail = Tail(descents()[:10])
     chance, cv = norm.cdf(-4.0), 0.3
-    low, high = stress_interval(tail, chance, cv, 0.95, -9.0)
+    low, high = tail.stress_interval(chance, cv, 0.95, -9.0)
     width = log_width(cv, 0.95)
     # Ten pooled runs step by some 1e-4 of the probability.
     assert tail.probability(low) == pytest.approx(chance * math.exp(-width), rel=0.01)
     assert tail.probability(high) == pytest.approx(chance * math.exp(width), rel=0.01)
     # Below what any run has seen there is only the bound.
-    assert stress_interval(tail, 1e-8, 2.0, 0.95, -9.0)[0] == -9.0
-    assert stress_interval(tail, chance, math.inf, 0.95, -9.0)[0] == -9.0
+    assert tail.stress_interval(1e-8, 2.0, 0.95, -9.0)[0] == -9.0
+    assert tail.stress_interval(chance, math.inf, 0.95, -9.0)[0] == -9.0
 
 
 @pytest.mark.slow
@@ -122,15 +122,15 @@ def test_runs_until_precise_are_unbiased(beta):
             rng = generator(seed, 1, number)
             return descend(linear, DIMENSION, rng=rng, samples=samples, threshold=-beta)
 
-        runs = run_until_precise(
+        runs = repeat_until_precise(
             make,
-            lambda runs: Tail(runs).coefficient_of_variation(-beta),
+            lambda runs: Tail(runs).cv(-beta),
             target_cv=0.2,
             first=1000,
             largest=5000,
             max_evaluations=10**7,
         )
-        return Tail(runs).probability(-beta), Tail(runs).coefficient_of_variation(-beta)
+        return Tail(runs).probability(-beta), Tail(runs).cv(-beta)
 
     found, reported = np.array([one(seed) for seed in range(REPEATS)]).T
     found /= norm.cdf(-beta)
@@ -176,7 +176,7 @@ def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
     run = next(run for run in runs if run.last < 1.0)
     seen = math.exp(run.log_probability) * np.mean(run.values < -4.0)
     assert run.probability(-4.0) == pytest.approx(seen / run.last, rel=1e-12)
-    assert run.wobble > 0.0
+    assert run.last_variance > 0.0
 
 
 def test_a_poor_first_stage_is_told_by_its_ranks():

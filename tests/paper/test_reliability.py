@@ -4,9 +4,9 @@ import dataclasses
 import math
 
 import pytest
+from importance import by_importance
 
 import stiction as st
-from stiction.reliability.estimate import failure_probability
 
 
 def longer(problem, times):
@@ -21,17 +21,10 @@ def growth(mean_mode, stress):
     own = st.paper.strength(problem, 0.5)
     field = st.RandomField(own.marginal, own.spectrum, mean_mode)
     short, long = (
-        failure_probability(
-            one,
-            field,
-            stress,
-            method=st.LocalCriterion(),
-            algorithm="importance",
-            target_cv=0.07,
-        )
+        by_importance(one, field, stress, st.LocalCriterion(), 0.07)
         for one in (problem, longer(problem, 4))
     )
-    error = math.hypot(short.coefficient_of_variation, long.coefficient_of_variation)
+    error = math.hypot(short.cv, long.cv)
     return long.probability / short.probability, error
 
 

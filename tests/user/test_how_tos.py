@@ -68,7 +68,7 @@ def critical_slip(found):
 def failure(found):
     """Two algorithms agree, and P = 1e-6 lies between 1 and 3 kPa above the bound."""
     one, other = found["found"], found["again"]
-    error = np.hypot(one.coefficient_of_variation, other.coefficient_of_variation)
+    error = np.hypot(one.cv, other.cv)
     assert abs(np.log(one.probability / other.probability)) < 4.0 * error  # joint standard errors
     assert 1e3 < found["design"].stress_above_bound < 3e3
 

@@ -24,7 +24,7 @@ def test_openturns_works_on_the_limit_state(monkeypatch, tmp_path, capsys):
     pytest.importorskip("openturns")
     found, said = run_example("outside_openturns", monkeypatch, tmp_path, capsys)
     theirs, own = found["found"], found["own"]
-    error = np.hypot(theirs.getCoefficientOfVariation(), own.coefficient_of_variation)
+    error = np.hypot(theirs.getCoefficientOfVariation(), own.cv)
     ratio = theirs.getProbabilityEstimate() / own.probability
     assert abs(np.log(ratio)) < 4.0 * error  # joint standard errors
     assert "OpenTURNS" in said

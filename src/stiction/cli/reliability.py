@@ -44,7 +44,7 @@ def reliability(
     from stiction.plot.style import save_figure
     from stiction.reliability.curve import failure_curve
     from stiction.reliability.design import design_stress
-    from stiction.reliability.estimate import failure_probability
+    from stiction.reliability.failure import failure_probability
     from stiction.study.export import write_result
     from stiction.study.study import Study
 

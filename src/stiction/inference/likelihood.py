@@ -23,7 +23,7 @@ from stiction.inference.onset_table import (
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.progress import Meter
-from stiction.reliability.limit_state import LimitState
+from stiction.reliability.limit_state import LimitState, no_single_length
 
 BATCHES = 8
 """Parts of the sample, each left out once, by which the Monte Carlo error is estimated."""
@@ -182,7 +182,7 @@ def make_model(
 def least_peak(experiment: Experiment, variable: str) -> float:
     """Least possible peak; -inf where none is known."""
     own = experiment
-    bound = LimitState(own.problem, own.random, own.method).bounds[0]
+    bound = LimitState(own).bounds[0]
     if variable != "friction_coefficient":
         return bound
     return -np.inf if "normal_pressure" in own.random.names else bound / own.pressure
@@ -214,7 +214,7 @@ def moved(few: Array, many: Array) -> Array:
 def local_refused(prior: Prior) -> str | None:
     """Why the local criterion cannot be a first stage, at the middle of the prior."""
     problem, random = prior.at(prior.theta(np.full((1, prior.dimension), 0.5))[0])
-    return LimitState(problem, random, LocalCriterion()).no_single_length()
+    return no_single_length(problem, random)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from stiction.errors import InputError
 from stiction.plot.axes import add_friction_scale, need, on_axes, problem_of, unit_for
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, series
 from stiction.problem import Problem
-from stiction.reliability.result import FailureProbability, bounded
+from stiction.reliability.answer import FailureProbability, bounded
 
 NEAR = 4.0
 """Nucleation lengths on either side of a weak spot that are drawn on a line."""

@@ -14,9 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
 from stiction.model import check_memory
-from stiction.progress import TimeUp
+from stiction.arrays import Array
 from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
 
 Integers = NDArray[np.int64]
@@ -87,7 +86,7 @@ class Population:
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """A finished run: populations from all samples down to the rarest.
+    """A finished repetition: populations from all samples down to the rarest.
 
     Attributes
     ----------
@@ -98,7 +97,7 @@ class Descent:
     evaluations : int
         Calls of the function, counted by samples.
     complete : bool
-        Whether the run got where it was to go.
+        Whether it reached the threshold or the probability.
     """
 
     samples: int
@@ -117,6 +116,10 @@ class Descent:
         none = np.empty((0, 0))
         populations = tuple(replace(population, draws=none) for population in self.populations)
         return replace(self, populations=populations)
+
+    def population(self, value: float) -> Population:
+        """Return the rarest population that holds a value, with its draws if they are kept."""
+        return self._below(value)[0]
 
     def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
         holder = self.populations[0]
@@ -165,10 +168,7 @@ def _grow(
         noise *= step
         candidate = math.sqrt(1.0 - step * step) * states[t - 1]
         candidate += noise
-        try:
-            outcome = function(candidate)
-        except TimeUp as up:
-            raise TimeUp(up.values, (t - 1) * chains + up.spent) from None
+        outcome = function(candidate)
         taken = outcome < ceiling
         states[t] = np.where(taken[:, None], candidate, states[t - 1])
         found[t] = np.where(taken, outcome, found[t - 1])
@@ -221,7 +221,7 @@ def descend(
     probability : float
         Or stop when a level's lowest share reaches this probability.
     floor : float
-        No value is below it. Where the lowest share of a level lies on it, the run is complete:
+        No value is below it. Where the lowest share of a level lies on it, it is complete:
         there is nothing further down.
     level_probability : float
         Share p_0 of samples that go on.
@@ -231,12 +231,6 @@ def descend(
     Returns
     -------
     Descent
-        Not complete if the function raised `TimeUp` on the way.
-
-    Raises
-    ------
-    TimeUp
-        If the function did so within its first few samples.
 
     Notes
     -----
@@ -253,14 +247,7 @@ def descend(
     samples = count * max(2, round(samples / count))
     check_memory("algorithm 'subset'", COPIES * 8.0 * samples * dimension, ADVICE)
     draws = rng.standard_normal((samples, dimension))
-    cut = False
-    try:
-        values = function(draws)
-    except TimeUp as up:
-        if up.values.size < 3:
-            raise
-        cut, values, samples = True, up.values, up.values.size
-        draws, count = draws[:samples], max(2, round(samples * level_probability))
+    values = function(draws)
     ancestors, chains = np.arange(samples), samples
     ceiling, log_probability = math.inf, 0.0
     step, acceptance, evaluations = FIRST_STEP, 1.0, samples
@@ -301,19 +288,15 @@ def descend(
         seeds = rng.permutation(np.flatnonzero(chosen))
         steps = max(2, round(samples / max(seeds.size, 1)))
         cost = seeds.size * (steps - 1)
-        over = cut or (max_evaluations is not None and evaluations + cost > max_evaluations)
+        over = max_evaluations is not None and evaluations + cost > max_evaluations
         if complete or stuck or over:
             break
         log_probability += math.log(share)
         ceiling = lowest
         family = ancestors[seeds]
-        try:
-            draws, values, acceptance, step = _grow(
-                function, draws[seeds], values[seeds], ceiling, steps, step, rng
-            )
-        except TimeUp as up:
-            evaluations += up.spent
-            break
+        draws, values, acceptance, step = _grow(
+            function, draws[seeds], values[seeds], ceiling, steps, step, rng
+        )
         ancestors, chains = np.tile(family, steps), seeds.size
         evaluations += cost
     return Descent(samples, tuple(populations), tuple(levels), evaluations, complete)

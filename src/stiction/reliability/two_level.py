@@ -1,6 +1,6 @@
-"""Two levels: a cheap limit state goes down the tail, the exact one is asked at the end only.
+"""Two levels: an inexpensive limit state, the guide, goes down the tail; the exact one ends it.
 
-With L the cheap stress and E the exact one, for any ceiling b,
+With L the guide's stress and E the exact one, for any ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s),
 
@@ -9,7 +9,7 @@ small, so that a few hundred exact evaluations do what thousands would.
 
 The last factor is measured by walks that start from failures with L < b. Failures which L does not
 see, and to which no short walk leads, stay unseen: whether L ranks samples as E does has to be
-known from elsewhere (`agreement`).
+known from elsewhere (`stiction.reliability.guide`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.progress import TimeUp
 from stiction.reliability.subset import (
     Descent,
     Function,
@@ -31,20 +30,20 @@ from stiction.reliability.subset import (
 )
 from stiction.reliability.uncertainty import ancestral_variance
 
-CHEAP = 5
-"""Cheap samples a level for each exact one of the middle factor."""
+GUIDING = 5
+"""Samples of the guide a level for each exact one of the middle factor."""
 COVERED = 0.95
-"""Smallest last factor: below it the walk must first find what the cheap stress does not see."""
+"""Smallest last factor: below it the walk must first find what the guide's stress does not see."""
 STEPS = 10
 FORGOTTEN = 5
 """Exact steps of each walk in the failure set, and how many of them are forgotten."""
-ROOM = 2.5
-"""The cheap level should be this many times likelier than the probability asked for, or more."""
+MARGIN = 2.5
+"""The guide's level should be this many times likelier than the probability asked for, or more."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """One run over both levels.
+    """One repetition over both levels.
 
     Attributes
     ----------
@@ -53,30 +52,33 @@ class Bridge:
     log_probability : float
         Logarithm of the estimate of P(L < b).
     values, ancestors : (samples,) arrays
-        Exact stress of samples with L < b, and the first cheap samples they descend from.
-    last, wobble : float
+        Exact stress of samples with L < b, and the guide's first samples they descend from.
+    share : float
+        Share of them that fails.
+    last, last_variance : float
         P(L < b | E < s), and the squared coefficient of variation of its estimate.
     evaluations, first_stage_evaluations : int
-        Of the exact limit state and of the cheap one.
+        Of the exact limit state and of the guide.
     ceiling : float
         b, Pa.
     descent : Descent
-        Of the cheap limit state, without draws.
+        Of the guide, without draws.
     failing, failing_values : arrays
         Draws and exact stress of failing samples.
     acceptance : float
         Share of steps accepted by the walks in the failure set.
     complete : bool
         Whether the exact limit state was asked. If it found no failure, the estimate is zero:
-        leaving such a run out of a mean would favour runs that found one.
+        leaving it out of a mean would favour repetitions that found one.
     """
 
     samples: int
     log_probability: float
     values: Array
     ancestors: NDArray[np.int64]
+    share: float
     last: float
-    wobble: float
+    last_variance: float
     evaluations: int
     first_stage_evaluations: int
     ceiling: float
@@ -98,27 +100,14 @@ class Bridge:
         return float(self.values.min()), float(self.values.max())
 
     def probability(self, value: float) -> float:
-        """Estimate of P(E < value), for values near the threshold of the run."""
+        """Estimate of P(E < value), for values near its threshold."""
         share = float(np.mean(self.values < value)) if self.values.size else 0.0
         return math.exp(self.log_probability) * share / self.last
 
     def relative_variance(self, value: float) -> float:
         """Squared coefficient of variation of `probability(value)`."""
         family = self.ancestors[self.values < value]
-        return ancestral_variance(family, self.values.size) + self.wobble
-
-
-def agreement(cheap: Array, exact: Array) -> float:
-    """Share of the exactly weakest fiftieth of samples that is in the cheaply weakest tenth.
-
-    Parameters
-    ----------
-    cheap, exact : (samples,) arrays
-        Stresses of the same samples; a few hundred.
-    """
-    weakest = np.argsort(exact)[: max(5, exact.size // 50)]
-    seen = np.argsort(cheap)[: max(10, exact.size // 10)]
-    return float(np.isin(weakest, seen).mean())
+        return ancestral_variance(family, self.values.size) + self.last_variance
 
 
 def _threshold(population: Population, values: Array, probability: float) -> float:
@@ -128,14 +117,14 @@ def _threshold(population: Population, values: Array, probability: float) -> flo
 
 
 def _covered(
-    states: Array, cheap: Function, ceiling: float, families: NDArray[np.int64], samples: int
+    states: Array, guide: Function, ceiling: float, families: NDArray[np.int64], samples: int
 ) -> tuple[float, float]:
     """P(L < b | E < s) from walkers in the failure set, and its relative variance.
 
     Walkers of one ancestor are alike: each family is one observation.
     """
     walkers = families.size
-    covered = (cheap(states) < ceiling).reshape(-1, walkers)
+    covered = (guide(states) < ceiling).reshape(-1, walkers)
     last = max(float(covered.mean()), 1.0 / samples)
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last)
@@ -143,7 +132,7 @@ def _covered(
 
 
 def bridge(
-    cheap: Function,
+    guide: Function,
     exact: Function,
     dimension: int,
     *,
@@ -158,7 +147,7 @@ def bridge(
 
     Parameters
     ----------
-    cheap, exact : callable
+    guide, exact : callable
         From draws (k, dimension) to values (k,).
     dimension : int
     samples : int
@@ -172,12 +161,12 @@ def bridge(
         No stress is below it.
     """
     descent = descend(
-        cheap,
+        guide,
         dimension,
         rng=rng,
-        samples=CHEAP * samples,
+        samples=GUIDING * samples,
         threshold=-math.inf if threshold is None else threshold,
-        probability=ROOM * probability,
+        probability=MARGIN * probability,
         floor=floor,
     )
     first_stage, spent = descent.evaluations, 0
@@ -187,11 +176,7 @@ def bridge(
             break
         looked = rng.permutation(population.values.size)[:samples]
         draws, families = population.draws[looked], population.ancestors[looked]
-        try:
-            values = exact(draws)
-        except TimeUp as up:  # a part of them would not be a fair sample of the families
-            spent += up.spent
-            break
+        values = exact(draws)
         spent += looked.size
         if threshold is not None:
             limit = threshold
@@ -205,65 +190,62 @@ def bridge(
                 break
             if threshold is None:  # this level is rarer than the probability asked for
                 continue
-        last, wobble, acceptance = 1.0, 0.0, 1.0
+        last, last_variance, acceptance = 1.0, 0.0, 1.0
         kept, kept_values = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
             walkers = min(kept_values.size, max(16, samples // STEPS), room)
-            try:
-                states, found, acceptance, _ = conditional_chains(
-                    exact,
-                    kept[:walkers],
-                    kept_values[:walkers],
-                    limit,
-                    STEPS,
-                    descent.levels[-1].step,
-                    rng,
-                )
-                spent += states.shape[0]
-                later = states[walkers * FORGOTTEN :]
-                last, wobble = _covered(
-                    later, cheap, population.ceiling, families[failed][:walkers], samples
-                )
-            except TimeUp as up:
-                spent += up.spent
-                break
+            states, found, acceptance, _ = conditional_chains(
+                exact,
+                kept[:walkers],
+                kept_values[:walkers],
+                limit,
+                STEPS,
+                descent.levels[-1].step,
+                rng,
+            )
+            spent += states.shape[0]
+            later = states[walkers * FORGOTTEN :]
+            last, last_variance = _covered(
+                later, guide, population.ceiling, families[failed][:walkers], samples
+            )
             first_stage += later.shape[0]
             kept, kept_values = states[-walkers:], found[-walkers:]
         best = Bridge(
-            samples,
-            population.log_probability,
-            values,
-            families,
-            last,
-            wobble,
-            spent,
-            first_stage,
-            population.ceiling,
-            descent.light(),
-            kept,
-            kept_values,
-            acceptance,
-            True,
+            samples=samples,
+            log_probability=population.log_probability,
+            values=values,
+            ancestors=families,
+            share=float(failed.mean()),
+            last=last,
+            last_variance=last_variance,
+            evaluations=spent,
+            first_stage_evaluations=first_stage,
+            ceiling=population.ceiling,
+            descent=descent.light(),
+            failing=kept,
+            failing_values=kept_values,
+            acceptance=acceptance,
+            complete=True,
         )
         if last >= COVERED:
             break
     if best is not None:
         return best
-    nothing = np.zeros(0, dtype=np.int64)
     return Bridge(
-        samples,
-        -math.inf,
-        np.zeros(0),
-        nothing,
-        1.0,
-        0.0,
-        spent,
-        first_stage,
-        -math.inf,
-        descent.light(),
-        np.empty((0, dimension)),
-        np.zeros(0),
-        0.0,
-        False,
+        samples=samples,
+        log_probability=-math.inf,
+        values=np.zeros(0),
+        ancestors=np.zeros(0, dtype=np.int64),
+        share=0.0,
+        last=1.0,
+        last_variance=0.0,
+        evaluations=spent,
+        first_stage_evaluations=first_stage,
+        ceiling=-math.inf,
+        descent=descent.light(),
+        failing=np.empty((0, dimension)),
+        failing_values=np.zeros(0),
+        acceptance=0.0,
+        complete=False,
     )

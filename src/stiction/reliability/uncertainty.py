@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtrit
 
-from stiction.arrays import Array
-
 Integers = NDArray[np.int64]
 
 
@@ -106,12 +104,6 @@ def chain_correlation(failed: NDArray[np.bool_]) -> float:
         covariance = float(np.mean(indicator[:-lag] * indicator[lag:])) - mean * mean
         total += 2.0 * (1.0 - lag / steps) * covariance / variance
     return max(0.0, total)
-
-
-def effective_size(weights: Array) -> float:
-    """Number of equal weights with the same relative variance (Kish, 1965)."""
-    total = float(weights.sum())
-    return total * total / float(np.sum(weights * weights)) if total > 0.0 else 0.0
 
 
 def generator(seed: int, *key: int) -> np.random.Generator:

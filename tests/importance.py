@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+import stiction as st
 from stiction.arrays import Array
 from stiction.criterion.windows import windows_of
-from stiction.problem import Problem
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
@@ -51,7 +51,7 @@ def _slope(field: RandomField, z: Array) -> Array:
     return difference / (2.0 * h)
 
 
-def _draws_of(field: RandomField, problem: Problem, nodal: Array) -> Array:
+def _draws_of(field: RandomField, problem: st.Problem, nodal: Array) -> Array:
     """Draws u = A^T w, where z = A u is the field of draws u at the nodes."""
     modes = field.modes(problem.interface)
     spectrum = np.fft.fftn(nodal)
@@ -65,7 +65,7 @@ def _draws_of(field: RandomField, problem: Problem, nodal: Array) -> Array:
     return draws
 
 
-def design_point(problem: Problem, field: RandomField, excess: float) -> DesignPoint:
+def design_point(problem: st.Problem, field: RandomField, excess: float) -> DesignPoint:
     """Most likely draws whose nucleation stress at the first node is as low as given.
 
     Parameters
@@ -120,7 +120,7 @@ def design_point(problem: Problem, field: RandomField, excess: float) -> DesignP
     return DesignPoint(draws, float(np.linalg.norm(draws)), converged)
 
 
-def _critical_weight(problem: Problem) -> Array:
+def _critical_weight(problem: st.Problem) -> Array:
     """Weight of the critical patch around the first node, (*shape)."""
     windows = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
     return windows[len(windows) // 2].weight
@@ -208,3 +208,41 @@ class Mixture:
         parts = [logsumexp(a * projected, axis=1) - 0.5 * a * a * square for a in self.sizes]
         mixture: Array = logsumexp(np.stack(parts), axis=0) - np.log(self.nodes * len(self.sizes))
         return -mixture
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Probability, its coefficient of variation, and how many equal weights it is worth."""
+
+    probability: float
+    cv: float
+    effective_size: float
+
+
+def by_importance(
+    problem: st.Problem,
+    field: RandomField,
+    stress: float,
+    method: st.LocalCriterion,
+    cv: float,
+    *,
+    seed: int = 0,
+    event: str = "critical_stress",
+) -> Answer:
+    """P(onset < stress) by sampling around the most likely weak spot, until `cv` is reached."""
+    point = design_point(problem, field, stress)
+    assert point.converged
+    modes = field.modes(problem.interface)
+    mixture = Mixture(point.draws, problem.interface.shape, modes.numbers[:, 1:], field.mean_mode)
+    state = st.external.limit_state(problem, field, method, event=event)
+    rng = np.random.default_rng((seed, 4))
+    weights = np.empty(0)
+    while True:
+        draws = mixture.sample(1000, rng)
+        failed = state(draws) < stress
+        new = np.where(failed, np.exp(mixture.log_weights(draws)), 0.0)
+        weights = np.append(weights, new)
+        mean, error = weights.mean(), weights.std() / math.sqrt(weights.size)
+        if mean > 0.0 and error <= cv * mean:
+            size = weights.sum() ** 2 / np.sum(weights * weights)
+            return Answer(float(mean), float(error / mean), float(size))

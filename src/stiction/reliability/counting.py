@@ -48,7 +48,7 @@ class Count:
         return (self.failures - last) / (self.samples - last)
 
     @property
-    def coefficient_of_variation(self) -> float:
+    def cv(self) -> float:
         """Standard error over the estimate."""
         last = int(self.until_failure)
         if self.failures <= last:
@@ -58,7 +58,7 @@ class Count:
         return math.sqrt(held / (self.failures - last))
 
     def interval(self, confidence: float) -> tuple[float, float]:
-        """Clopper and Pearson's; of a count until a failure, by the negative binomial law."""
+        """Return Clopper and Pearson's, or of a count until a failure the negative binomial one."""
         low, high = binomial_interval(self.failures, self.samples, confidence)
         if self.until_failure:
             high = binomial_interval(self.failures - 1, self.samples - 1, confidence)[1]
@@ -66,13 +66,13 @@ class Count:
 
 
 def tally(values: Array, stress: float, first: int = 0) -> Count:
-    """The count among samples first, first + 1, ... of these stresses at onset."""
+    """Count among samples first, first + 1, ... of these stresses at onset."""
     failed = np.flatnonzero(values < stress)
     return Count(failed.size, values.size, first + failed[:SHOWN])
 
 
 def failures_wanted(target_cv: float) -> int:
-    """How many failures make the standard error small enough: it falls like 1/sqrt(r - 1)."""
+    """Return how many failures make the error small enough: it falls like 1/sqrt(r - 1)."""
     return 2 + math.ceil(1.0 / (target_cv * target_cv))
 
 
@@ -88,7 +88,7 @@ def count_failures(
 ) -> tuple[Count, int]:
     """Count until there are enough failures, among at least `least` samples.
 
-    Stopping when the estimate looks precise enough would favour runs that saw many failures
+    Stopping when the estimate looks precise enough would favour counts that saw many failures
     early. So the number of failures is fixed beforehand, and what was computed beyond the last of
     them does not count.
 
@@ -124,13 +124,13 @@ def count_failures(
             rest = max_evaluations - done
             size = math.ceil((wanted - failures) * done / failures) if failures else rest
             size = min(size, rest)
-            state.meter.expect(size, at_most=not failures)
         try:
             values = state(state.draws(seed, start + done, min(size, BATCH)))
         except TimeUp as up:
             values = up.values
         parts.append(values < stress)
         done, failures = done + values.size, failures + int(parts[-1].sum())
+        state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
         if state.meter.over:
             break
     if not done:

@@ -1,0 +1,301 @@
+"""The lower tail of the stress at onset: independent repetitions, pooled until precise enough."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.progress import SILENT, Meter, TimeUp
+from stiction.reliability.guide import POOR, first_stage, resembles, two_levels_refused
+from stiction.reliability.limit_state import LimitState
+from stiction.reliability.subset import descend
+from stiction.reliability.two_level import bridge
+from stiction.reliability.uncertainty import generator, log_width
+
+MARGIN = 1.1
+"""The variance known so far is itself an estimate; aim a little further."""
+SUBSET, SUBSET_MOST = 1_000, 5_000
+"""Samples a level of the first repetition of subset simulation and of the largest."""
+BRIDGE, BRIDGE_MOST = 200, 1_000
+"""Exact samples of the first repetition over two levels and of the largest."""
+DEEPER = 0.3
+"""Repetitions go on to this share of a probability, to know the lower end of the interval."""
+PILOT = 500
+"""Plain samples that tell whether a less expensive method is a guide."""
+
+
+class Repetition(Protocol):
+    """One independent estimate of a stretch of the lower tail."""
+
+    @property
+    def samples(self) -> int:
+        """Size; the variance falls like one over it."""
+
+    @property
+    def evaluations(self) -> int:
+        """Samples that the method was asked for."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether it came to an estimate."""
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lowest and highest stress seen, Pa."""
+
+    def light(self) -> Any:
+        """Return the same without what only the last repetition is asked for."""
+
+    def probability(self, value: float) -> float:
+        """Return the estimate of P(onset < value)."""
+
+    def relative_variance(self, value: float) -> float:
+        """Return the squared coefficient of variation of it."""
+
+
+AnyRepetition = TypeVar("AnyRepetition", bound=Repetition)
+
+
+@dataclass(frozen=True, eq=False)
+class Tail:
+    """The lower tail of the stress at onset from pooled repetitions.
+
+    Attributes
+    ----------
+    repetitions : sequence
+    algorithm, reason : str
+        'subset' or 'two_level', and why.
+    spent : int
+        Evaluations of the method in all, those to choose the algorithm included.
+    """
+
+    repetitions: Sequence[Any]
+    algorithm: str = "subset"
+    reason: str = ""
+    spent: int = 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether it reaches as far down as asked for."""
+        return bool(self.repetitions[0].complete)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lowest and highest stress seen, Pa."""
+        lows, highs = zip(*(one.extent for one in self.repetitions), strict=True)
+        return min(lows), max(highs)
+
+    @property
+    def first_stage_evaluations(self) -> int:
+        """Samples that only the less expensive method was asked for."""
+        return sum(getattr(one, "first_stage_evaluations", 0) for one in self.repetitions)
+
+    @property
+    def weights(self) -> list[float]:
+        """Each repetition's part in the mean: its size, which does not depend on its outcome."""
+        total = sum(one.samples for one in self.repetitions)
+        return [one.samples / total for one in self.repetitions]
+
+    def probability(self, stress: float) -> float:
+        """Return the estimate of P(onset below `stress`)."""
+        parts = zip(self.weights, self.repetitions, strict=True)
+        return float(sum(weight * one.probability(stress) for weight, one in parts))
+
+    def cv(self, stress: float) -> float:
+        """Return its coefficient of variation; infinite where no sample is so low."""
+        whole = self.probability(stress)
+        if whole == 0.0:
+            return math.inf
+        variance = 0.0
+        for weight, one in zip(self.weights, self.repetitions, strict=True):
+            part = weight * one.probability(stress)
+            if part > 0.0:
+                variance += part * part * one.relative_variance(stress)
+        return math.sqrt(variance) / whole
+
+    def quantile(self, probability: float) -> float:
+        """Return the stress below which the onset lies with this probability."""
+        low, high = self.extent
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            if self.probability(middle) < probability:
+                low = middle
+            else:
+                high = middle
+        return high
+
+    def stress_interval(
+        self, probability: float, cv: float, confidence: float, lowest: float
+    ) -> tuple[float, float]:
+        """Return stresses whose estimated probabilities bracket the one asked for."""
+        least, highest = self.extent
+        if not math.isfinite(cv):
+            return lowest, highest
+        width = min(log_width(cv, confidence), 700.0)
+        below = probability * math.exp(-width)
+        seen = self.probability(float(np.nextafter(least, math.inf)))
+        low = self.quantile(below) if below >= seen else lowest
+        return low, self.quantile(min(probability * math.exp(width), 1.0))
+
+
+def repeat_until_precise(
+    make: Callable[[int, int, int], AnyRepetition],
+    judge: Callable[[Sequence[AnyRepetition]], float],
+    *,
+    target_cv: float,
+    first: int,
+    largest: int,
+    max_evaluations: int,
+    meter: Meter = SILENT,
+    enough: Callable[[AnyRepetition], bool] = lambda one: False,
+) -> list[AnyRepetition]:
+    """Return repetitions whose pooled coefficient of variation is at most the target.
+
+    Parameters
+    ----------
+    make : callable
+        (samples, number of the repetition, evaluations left) to a repetition.
+    judge : callable
+        Coefficient of variation of some repetitions together.
+    target_cv : float
+    first, largest : int
+        Size of the first repetition and of the largest; many of moderate size bound the memory.
+    max_evaluations : int
+    meter : Meter
+        If its time is over, no repetition is begun, and one that is not finished does not count.
+    enough : callable
+        Whether the first repetition is such that no more are wanted.
+
+    Returns
+    -------
+    list of repetitions
+        All complete, or a single incomplete one.
+
+    Raises
+    ------
+    TimeUp
+        If the time is over before the first repetition is finished.
+    """
+    done: list[AnyRepetition] = []
+    spent, size = 0, first
+    while True:
+        try:
+            one = make(size, len(done), max_evaluations - spent)
+        except TimeUp:
+            if not done:
+                raise
+            return done
+        spent += one.evaluations
+        if not one.complete:
+            return done or [one]
+        done = [*(earlier.light() for earlier in done), one]
+        cv = judge(done)
+        meter.note = f"{len(done)} repetitions, c.o.v. {cv:.2g} (target {target_cv:g})"
+        if cv <= target_cv or (len(done) == 1 and enough(one)):
+            return done
+        total = sum(each.samples for each in done)
+        price = sum(each.evaluations for each in done) / total
+        wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
+        affordable = (max_evaluations - spent) / price
+        size = int(min(max(wanted, first), largest, affordable))
+        if size < first or meter.over:
+            return done
+
+
+def sample_tail(
+    state: LimitState,
+    *,
+    algorithm: str,
+    target_cv: float,
+    seed: int,
+    budget: int,
+    stress: float | None = None,
+    probability: float = 0.0,
+    reason: str = "as asked",
+    pilot: tuple[Array, Array] | None = None,
+) -> Tail:
+    """Sample the lower tail down to a stress, or down to a probability.
+
+    Parameters
+    ----------
+    state : LimitState
+    algorithm : {"auto", "subset", "two_level"}
+        'auto' takes two levels where a less expensive method is a guide to the weakest samples:
+        where it picks the same ones among some plain samples, and the first repetition finds
+        failures among the samples that it leads to.
+    target_cv : float
+        Of the probability at the stress, or at its own quantile.
+    seed, budget : int
+        The budget counts evaluations of the method.
+    stress : float, optional
+        Pa.
+    probability : float
+        Where no stress is given.
+    reason : str
+        Why the tail is sampled.
+    pilot : (draws, stresses), optional
+        Plain samples that are there already, and are not counted here.
+
+    Raises
+    ------
+    TimeUp
+        If the time is over before there is an estimate.
+    """
+    spent = 0
+    auto = algorithm == "auto"
+    if auto:
+        algorithm = "subset"
+        if two_levels_refused(state) is None:
+            if pilot is None:
+                draws = state.draws(seed, 0, min(PILOT, budget // 5))
+                pilot, spent = (draws, state(draws)), draws.shape[0]
+            good, text = resembles(state, *pilot)
+            algorithm, reason = ("two_level" if good else "subset"), f"{reason}; {text}"
+
+    def make(samples: int, number: int, left: int) -> Any:
+        rng = generator(seed, 3 if algorithm == "two_level" else 1, number)
+        if algorithm == "two_level":
+            guide = state.by(first_stage(state))
+            return bridge(
+                guide, state, state.dimension, samples=samples, rng=rng, max_evaluations=left,
+                threshold=stress, probability=probability, floor=state.bounds[0],
+            )  # fmt: skip
+        return descend(
+            state, state.dimension, samples=samples, rng=rng, max_evaluations=left,
+            threshold=-math.inf if stress is None else stress,
+            probability=DEEPER * probability, floor=state.bounds[0],
+        )  # fmt: skip
+
+    def judge(repetitions: Sequence[Any]) -> float:
+        tail = Tail(repetitions)
+        return tail.cv(tail.quantile(probability) if stress is None else stress)
+
+    def repeated() -> list[Any]:
+        usual, largest = (
+            (BRIDGE, BRIDGE_MOST) if algorithm == "two_level" else (SUBSET, SUBSET_MOST)
+        )
+        return repeat_until_precise(
+            make,
+            judge,
+            target_cv=target_cv,
+            # Fewer than usual where the budget would not even hold four levels.
+            first=min(usual, max((budget - spent) // 4, 20)),
+            largest=largest,
+            max_evaluations=budget - spent,
+            meter=state.meter,
+            enough=lambda one: auto and algorithm == "two_level" and one.share < POOR,
+        )
+
+    found = repeated()
+    if auto and algorithm == "two_level" and found[0].complete and found[0].share < POOR:
+        spent += sum(one.evaluations for one in found)
+        label = first_stage(state).label
+        reason += f"; of what fails by the {label} {found[0].share:.1%} fails: a poor guide"
+        algorithm = "subset"
+        found = repeated()
+    return Tail(found, algorithm, reason, spent + sum(one.evaluations for one in found))
