@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.model import check_memory
 from stiction.arrays import Array
+from stiction.model import check_memory
 from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
 
 Integers = NDArray[np.int64]
