@@ -18,7 +18,6 @@ import stiction as st
 from stiction.criterion.local import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
 from stiction.reliability.failure import failure_probability
-from stiction.reliability.limit_state import make_limit_state
 
 MILLION = 1_000_000
 REPEATS = 50
@@ -64,7 +63,7 @@ def main():
     local, exact = LocalCriterion(), Equilibrium()
     problem = st.paper.problem(nodes=512)
     field = st.paper.strength(problem, correlation_ratio=0.5)
-    state = make_limit_state(problem, field, local, 0, {}, "critical_stress", 1)
+    state = st.external.limit_state(problem, field, local, workers=1)
     start = time.perf_counter()
     parts = [state(state.draws(12345, first, 1000)) for first in range(0, MILLION, 1000)]
     onset = np.sort(np.concatenate(parts))
@@ -73,27 +72,16 @@ def main():
         stress = float(onset[int(chance * MILLION)])
         print(f"P = {chance:g} +- {1.0 / math.sqrt(chance * MILLION):.1%} by counting")
         repetition(problem, field, stress, chance, local, "subset", 0.1)
-        repetition(problem, field, stress, chance, local, "importance", 0.05)
     stress = 661.6e3
     for method in (local, exact):
         precise = failure_probability(
-            problem,
-            field,
-            stress,
-            method=method,
-            algorithm="importance",
-            target_cv=0.015,
-            seed=99,
-            workers=1,
+            problem, field, stress, method=method, algorithm="subset", target_cv=0.03, seed=99
         )
-        print(f"{method.type} by importance sampling: {precise}")
-        for name in ("subset", "importance", "two_level")[: 2 if method is local else 3]:
-            target = 0.1 if name == "importance" else 0.3
-            repetition(problem, field, stress, precise.probability, method, name, target)
+        print(f"{method.type}: {precise}")
+        for name in ("subset", "two_level")[: 1 if method is local else 2]:
+            repetition(problem, field, stress, precise.probability, method, name, 0.3)
     long = longer(problem, 4)
-    states = [
-        make_limit_state(one, field, local, 0, {}, "critical_stress", 1) for one in (problem, long)
-    ]
+    states = [st.external.limit_state(one, field, local, workers=1) for one in (problem, long)]
     counts = [
         np.concatenate([s(s.draws(7, i, 1000)) for i in range(0, 40_000, 1000)]) for s in states
     ]

@@ -18,12 +18,12 @@ from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError, warn_accuracy
 from stiction.methods import label, study_attributes
 from stiction.model import _count, _number
+from stiction.problem import PROFILES
 from stiction.progress import Meter, duration
 from stiction.reliability.guide import too_slow, two_levels_refused
 from stiction.reliability.limit_state import Event, LimitState
 from stiction.reliability.subset import Level
 from stiction.results import ONSET_VARIABLES, along
-from stiction.sample import PROFILES
 
 TargetCv: TypeAlias = Annotated[
     float, BeforeValidator(_number), Field(ge=1e-6, allow_inf_nan=False)
