@@ -30,6 +30,20 @@ os.environ["STICTION_CACHE_DIR"] = str(
 )
 
 
+def pytest_addoption(parser):
+    parser.addoption("--fuzz-count", type=int, default=150, help="trials of each test in fuzz/")
+    parser.addoption("--fuzz-seed", type=int, default=5)
+
+
+@pytest.fixture
+def fuzz(request):
+    """How many trials, and the seed that chooses them."""
+    from types import SimpleNamespace
+
+    option = request.config.getoption
+    return SimpleNamespace(count=option("--fuzz-count"), seed=option("--fuzz-seed"))
+
+
 @pytest.fixture
 def solid():
     import stiction as st

@@ -150,6 +150,8 @@ def _expand(distribution: Any, reach: float) -> tuple[Array, float]:
     z = np.arange(-half, half + 1) * STEP
     # Without the mean: it would cost a narrow marginal its digits.
     mean, variance = float(distribution.mean()), float(distribution.var())
+    if not variance > 0.0:
+        raise InputError("marginal: its standard deviation is zero in double precision")
     value = quantile_of_normal(distribution, z) - mean
     # Far out some of scipy's families have no quantile; what that costs shows in the rest.
     value[(np.abs(z) > REACH) & ~np.isfinite(value)] = 0.0

@@ -1,27 +1,24 @@
-"""Mutated study files: is each valid or refused with a message, soon and in little memory?
-
-    python campaigns/studies.py --count 3000 --seed 0
+"""Mutated study files are refused with a message or right, soon and in little memory.
 
 Values of a study are replaced, removed, renamed, moved and swept, or bytes of the file changed.
-What is called valid is described as `stiction check` does, and one sample of it computed.
+What is called valid is described as `stiction check` does, and one sample of it computed. More of
+them: pytest tests/fuzz --fuzz-count 3000 --fuzz-seed 771.
 """
 
 from __future__ import annotations
 
 import copy
 import random
-import sys
-import tempfile
 import tomllib
 import warnings
 from pathlib import Path
 from typing import Any
 
 import tomli_w
+from harness import trial
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from harness import Summary, command_line, finish, trial
+from stiction.cli.check import _description
+from stiction.study.study import Study
 
 STUDY = """
 title = "a study"
@@ -65,13 +62,6 @@ first = 0
 keep = ["strength"]
 keep_samples = [0, 3]
 keep_limit = 1e8
-[cluster]
-jobs = 2
-cores = 2
-memory = "1GB"
-queue = "long"
-interface = "lo"
-options = { job_extra_directives = ["--exclusive"] }
 [[sweep]]
 "random.strength.spectrum.correlation_length" = [0.02, 0.03]
 [[sweep]]
@@ -145,36 +135,27 @@ def mutation(chance: random.Random) -> tuple[str, bytes]:
     return "; ".join(texts), tomli_w.dumps(tree).encode("utf-8", "surrogatepass")
 
 
-def _use(path: Path) -> None:
-    """What `check` says of it, and one sample of a study that is not large."""
-    from stiction.cli.studies import _description
-    from stiction.ensemble.plan import compute
-    from stiction.study.study import Study
-
+def use(path: Path) -> None:
+    """Describe a study, and compute one sample of it if it is not large."""
     study = Study.from_toml(path)
     _description(study)
-    plan = study.plans[0]
-    interface = plan.problem.interface
-    if max(interface.size, plan.random.dimension(interface)) <= 2**15:
-        compute(plan, study.ensemble.first, 1)
+    point = study.experiments[0]
+    interface = point.problem.interface
+    if max(interface.size, point.dimension) <= 2**15:
+        point.results(point.seed, study.ensemble.first, 1)
 
 
-def campaign(count: int, seed: int = 0) -> Summary:
-    """So many mutated studies."""
-    chance, summary = random.Random(seed), Summary(seed)
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):
+    chance, faults = random.Random(fuzz.seed), []
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        path = Path(folder) / "study.toml"
-        path.write_text(STUDY)
-        _use(path)  # compiles kernels
-        while summary.trials < count:
+        use(path)  # compiles kernels
+        for number in range(fuzz.count):
             name, data = mutation(chance)
             path.write_bytes(data)
-            outcome, detail = trial(lambda: _use(path))
-            summary.note(f"study {summary.trials} ({name})", outcome, detail)
-    return summary
-
-
-if __name__ == "__main__":
-    options = command_line(__doc__, 3000)
-    finish(campaign(options.count, options.seed))
+            outcome, detail = trial(lambda: use(path))
+            if outcome.startswith("FAULT"):
+                faults.append(f"study {number} ({name}): {outcome}: {detail}")
+    assert not faults, "\n".join(faults)

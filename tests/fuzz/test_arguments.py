@@ -1,0 +1,215 @@
+"""Bad arguments to everything public are refused with an `InputError`, and soon.
+
+Every argument of every public call is replaced, one at a time, by values of wrong types, shapes,
+signs and sizes. A call may also work: some of the values are valid. More of them:
+pytest tests/fuzz -m slow --fuzz-count 8000 --fuzz-seed 771.
+"""
+
+import inspect
+import random
+import warnings
+from contextlib import suppress
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.stats
+from harness import trial
+
+import stiction as st
+
+NODES = 64
+LEFT_ALONE = {"self", "store", "checkpoint", "to", "type"}
+"""Arguments that say where to write, or are constants."""
+
+
+class _Odd:
+    """Compares with nothing but itself and has no hash."""
+
+    def __eq__(self, other):
+        raise TypeError("compares with nothing")
+
+    __hash__ = None
+
+
+def _cycle():
+    ring = []
+    ring.append(ring)
+    return ring
+
+
+VALUES = {
+    "None": None,
+    "True": True,
+    "numpy bool": np.bool_(True),
+    "text": "x",
+    "empty text": "",
+    "text of a number": "1",
+    "text with an escape": "\x1b[2J",
+    "text with a null": "a\0b",
+    "surrogate": "\udcff",
+    "long text": "x" * 100_000,
+    "bytes": b"x",
+    "zero": 0,
+    "minus zero": -0.0,
+    "one": 1,
+    "minus one": -1,
+    "half": 0.5,
+    "one and a half": 1.5,
+    "whole float": 4.0,
+    "nan": float("nan"),
+    "infinity": float("inf"),
+    "minus infinity": float("-inf"),
+    "huge": 1e308,
+    "tiny": 1e-308,
+    "denormal": 5e-324,
+    "1e13": 10**13,
+    "1e30": 10**30,
+    "2**63": 2**63,
+    "10**400": 10**400,
+    "complex": 1j,
+    "numpy complex": np.complex128(1j),
+    "float16": np.float16(2.0),
+    "int8": np.int8(-3),
+    "uint64": np.uint64(2**63),
+    "Decimal": Decimal("1.5"),
+    "Fraction": Fraction(1, 3),
+    "date": np.datetime64("2020-01-01"),
+    "empty list": [],
+    "list of one": [1],
+    "list of text": ["x"],
+    "list of None": [None],
+    "ragged list": [[1.0], [1.0, 2.0]],
+    "cycle": _cycle(),
+    "tuple": (),
+    "pair": (2.0, 1.0),
+    "dict": {},
+    "dict of one": {"a": 1},
+    "dict with a type": {"type": "x"},
+    "dict of lists": {"type": ["beta"]},
+    "set": {1},
+    "range": range(3),
+    "generator": (i for i in ()),
+    "empty array": np.zeros(0),
+    "0-d array": np.array(1.0),
+    "0-d text": np.array("x"),
+    "row": np.ones(NODES),
+    "row of nan": np.full(NODES, np.nan),
+    "row of huge": np.full(NODES, 1e308),
+    "row of zeros": np.zeros(NODES),
+    "matrix": np.ones((2, NODES)),
+    "cube": np.ones((2, 2, 2)),
+    "no samples": np.ones((0, NODES)),
+    "complex array": np.ones(NODES, dtype=complex),
+    "object array": np.array([object()] * NODES),
+    "text array": np.array(["x"] * NODES),
+    "bool array": np.ones(NODES, dtype=bool),
+    "masked array": np.ma.masked_array(np.ones(NODES), mask=[True] * NODES),
+    "record array": np.zeros(3, dtype=[("a", "f8")]),
+    "object": object(),
+    "odd object": _Odd(),
+    "class": _Odd,
+    "function": lambda *args: None,
+    "function that fails": lambda *args: 1 / 0,
+    "module": np,
+    "ellipsis": ...,
+    "path": Path("/nonexistent/file"),
+    "device": Path("/dev/null"),
+    "scipy frozen": scipy.stats.norm(),
+    "scipy discrete": scipy.stats.poisson(3),
+    "other class": st.LocalCriterion,
+    "other object": st.Load(),
+}
+
+
+def calls():
+    """Functions and classes with arguments that work and take little time."""
+    solid = {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}
+    interface = st.Interface(length=0.1, nodes=NODES)
+    friction = st.LinearWeakening(weakening_rate=0.1e12)
+    problem = st.Problem(st.Solid(**solid), interface, friction)
+    beta = {"alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6}
+    spectrum = st.PowerLawSpectrum(correlation_length=0.02)
+    strength = st.RandomField(st.Beta(**beta), spectrum)
+    tau_p = strength.sample(interface, samples=2)
+    local, rupture = st.LocalCriterion(), st.Rupture(loading_rate=1e9, max_steps=50_000)
+    ensemble = st.Ensemble(samples=2)
+    study = st.Study(problem=problem, random=strength, method=local, ensemble=ensemble)
+    given = {"problem": problem, "random": strength, "method": local}
+    tail = {**given, "target_cv": 0.5, "max_evaluations": 5000, "workers": 1}
+    mean = {"mean": 1e6, "cv": 0.2}
+    moments = {"problem": problem, "strength": strength}
+    return [
+        (st.Solid, solid),
+        (st.Interface, {"length": 0.1, "nodes": NODES}),
+        (st.LinearWeakening, {"weakening_rate": 1e11}),
+        (st.ExponentialWeakening, {"critical_slip": 1e-6}),
+        (st.Load, {"normal_pressure": 1e6}),
+        (st.GradientLoad, {"amplitude": 0.1}),
+        (st.Problem, {"solid": problem.solid, "interface": interface, "friction": friction}),
+        (problem.sample, {"profiles": tau_p}),
+        (st.Beta, beta),
+        (st.Lognormal, mean),
+        (st.Weibull, mean),
+        (st.PowerLawSpectrum, {"correlation_length": 0.02, "power_kept": 0.9}),
+        (st.SquaredExponentialSpectrum, {"correlation_length": 0.02}),
+        (st.ExponentialSpectrum, {"correlation_length": 0.02, "truncation": 3.0}),
+        (st.CustomSpectrum, {"function": lambda k: np.exp(-k), "max_wavenumber": 500.0}),
+        (st.RandomField, {"marginal": st.Beta(**beta), "spectrum": spectrum}),
+        (st.RandomInterface, {"strength": strength}),
+        (strength.sample, {"interface": interface}),
+        (strength.correlation, {"interface": interface}),
+        (strength.with_efolding_length, {"length": 0.02}),
+        (st.LocalCriterion, {}),
+        (st.Equilibrium, {}),
+        (st.Rupture, {"loading_rate": 1e9}),
+        (st.onset, {"problem": problem, "profiles": tau_p, "method": local}),
+        (st.equilibrium_path, {"problem": problem, "profiles": tau_p[0], "loads": [1e5, 2e5]}),
+        (st.simulate_rupture,
+         {"problem": problem, "profiles": tau_p[0], "method": rupture, "stop": "onset"}),
+        (st.monte_carlo, {**given, "samples": 2, "workers": 1, "progress": False}),
+        (st.theory.nucleation_stress, {"problem": problem, "tau_p": tau_p}),
+        (st.theory.nucleation_statistics, moments),
+        (st.theory.rice_distribution, {**moments, "profiles": 64}),
+        (st.statistics.density, {"values": np.linspace(0.7e6, 0.9e6, 50)}),
+        (st.failure_probability, {**tail, "stress": 0.8e6}),
+        (st.design_stress, {**tail, "probability": 0.1}),
+        (st.Ensemble, {"samples": 2, "keep": ("strength",)}),
+        (st.Study, {**given, "ensemble": ensemble}),
+        (study.run, {"workers": 1, "progress": False}),
+        (st.Study.from_dict, {"given": study.to_dict()}),
+        (st.Study.from_toml, {"path": "/nonexistent/x.toml"}),
+        (st.Study.from_result, {"result": study.run()}),
+        (study.to_toml, {"path": "/nonexistent/x.toml"}),
+        (st.open_run, {"path": "/nonexistent"}),
+        (st.paper.strength, {"problem": st.paper.problem(256)}),
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_bad_arguments_are_refused(fuzz, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    chance, faults, refused = random.Random(fuzz.seed), [], 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        known = calls()
+        for function, good in known:  # compiles kernels, which takes longer than a trial may
+            with suppress(st.InputError, st.RunError):
+                function(**good)
+    trials = [
+        (function, good, name, value)
+        for function, good in known
+        for name in inspect.signature(function).parameters
+        if name not in LEFT_ALONE
+        for value in VALUES
+    ]
+    for function, good, name, value in chance.sample(trials, min(fuzz.count, len(trials))):
+        given = good | {name: VALUES[value]}
+        outcome, detail = trial(lambda function=function, given=given: function(**given))
+        refused += outcome == "refused"
+        if outcome.startswith("FAULT"):
+            faults.append(f"{function.__qualname__}({name} = {value}): {outcome}: {detail}")
+    assert refused > fuzz.count // 2
+    assert not faults, "\n".join(faults)
