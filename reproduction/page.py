@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import platform
 import re
+import tomllib
 from collections import Counter
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +19,7 @@ from reproduction.claims import Data, Finding, rounded
 from reproduction.modulus import compare
 from reproduction.rules import Verdict
 
+TEXTS = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
 STYLES = {
     Verdict.FAILS: "fails",
     Verdict.CORRECTED: "corrected",
@@ -68,14 +70,14 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
         ruptures=data.size.ruptures,
         short=texts.in_short(data),
         counts=_counts(found),
-        departures=texts.DEPARTURES,
+        departures=TEXTS["departure"],
         figures=[_figure(number, image, data) for number, image in images.items()],
         few=texts.few_and_many(data),
         readings=readings,
         best=max(reading.likelihood for reading in readings) or 1.0,
         claims=[(title, [_claim(f) for f in rows], opened) for title, rows, opened in sections],
-        not_judged=texts.NOT_JUDGED,
-        errata=texts.ERRATA,
+        not_judged=TEXTS["not_judged"],
+        errata=TEXTS["erratum"],
         provenance=_provenance(data, runner),
         warnings=warned,
     )
@@ -99,14 +101,11 @@ def _counts(found) -> dict:
 
 
 def _figure(number: int, image: Path, data: Data) -> dict:
-    about = texts.CAPTIONS[number]
     encoded = base64.b64encode(image.read_bytes()).decode()
-    return {
+    about = TEXTS["figure"][str(number)]
+    return about | {
         "number": number,
-        "title": about.title,
-        "paper": about.paper,
-        "ours": about.ours(data),
-        "caption": about.caption,
+        "ours": texts.OURS[number](data),
         "image": f"data:image/png;base64,{encoded}",
     }
 
@@ -143,7 +142,7 @@ def _provenance(data: Data, runner) -> list[tuple[str, str]]:
          f" {size.trend:,} a point over the wide range; {size.what_if} a what-if by equilibrium"),
         ("Ruptures", f"{size.ruptures} at each of three correlation lengths;"
          f" {size.arrests} a what-if; {size.dynamic:,} at each correlation length in the Monte"
-         " Carlo study by elastodynamics" + ("" if size.dynamic else " (with --full: 2,000)")),
+         " Carlo study by elastodynamics" + ("" if size.dynamic else " (with --full: 1,000)")),
         ("Versions", f"stiction {st.__version__}, Python {platform.python_version()}, "
          + ", ".join(f"{name} {version(name)}" for name in packages)),
         ("Time", ", ".join(f"{name} {value:.0f} s" for name, value in seconds if value >= 1.0)

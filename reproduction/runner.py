@@ -34,8 +34,8 @@ QUICK = Size(samples=500, ruptures=4, readings=200, trend=300, what_if=40, arres
              few=6)  # fmt: skip
 USUAL = Size(samples=10_000, ruptures=20, readings=1000, trend=2500, what_if=200, arrests=6,
              dynamic=0, few=24)  # fmt: skip
-FULL = Size(samples=10_000, ruptures=20, readings=4000, trend=10_000, what_if=1000, arrests=200,
-            dynamic=2000, few=60)  # fmt: skip
+FULL = Size(samples=10_000, ruptures=20, readings=2000, trend=10_000, what_if=400, arrests=200,
+            dynamic=1000, few=60)  # fmt: skip
 
 
 class Runner:

@@ -78,14 +78,3 @@ def discrete_weights(problem=PROBLEM):
             weights = np.abs(vector[:, 0])
             return weights / weights.sum()
         width += 1
-
-
-def public(name: str, module: str):
-    """Return a public function of `stiction`, in its module or at the top."""
-    return getattr(getattr(st, module, st), name, None) or getattr(st, name)
-
-
-nucleation_stress = public("nucleation_stress", "theory")
-nucleation_statistics = public("nucleation_statistics", "theory")
-griffith_length = public("griffith_length", "theory")
-density = public("density", "statistics")

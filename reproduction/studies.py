@@ -75,7 +75,7 @@ def _moments(run: Runner, samples: int) -> xr.Dataset:
         count = min(250, samples - first)
         seed = run.seed_of(ratio)
         tau_p = strength(ratio).sample(interface, samples=count, seed=seed, first=first)
-        tau_n = setting.nucleation_stress(PROBLEM, tau_p)
+        tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)
         bound = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * transform, interface.size, axis=1)
         d = tau_n / MEAN - 1.0
         powers = [d.mean(axis=1), (d * d).mean(axis=1), (d * d * d).mean(axis=1)]
@@ -118,7 +118,7 @@ def _theory(run: Runner) -> xr.Dataset:
     interface = PROBLEM.interface
     ratios = np.geomspace(0.02, 20.0, 41)
     usable = ratios[ratios > 0.1]
-    own = [setting.nucleation_statistics(PROBLEM, strength(r)).variance_ratio for r in usable]
+    own = [st.theory.nucleation_statistics(PROBLEM, strength(r)).variance_ratio for r in usable]
     fields = [strength(ratio) for ratio in RATIOS]
     return xr.Dataset(
         {
@@ -129,7 +129,7 @@ def _theory(run: Runner) -> xr.Dataset:
             ),
             "variance_ratio": (
                 "correlation_ratio",
-                [setting.nucleation_statistics(PROBLEM, f).variance_ratio for f in fields],
+                [st.theory.nucleation_statistics(PROBLEM, f).variance_ratio for f in fields],
             ),
             "periodic": ("usable", own),
             "infinite": ("ratio", [infinite_variance_ratio(ratio) for ratio in ratios]),
@@ -145,7 +145,7 @@ def infinite_variance_ratio(ratio: float) -> float:
     nodes = 2 ** math.ceil(math.log2(length / H * max(16.0, 8.0 / ratio)))
     problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=length, nodes=nodes))
     field = strength(ratio, mean_mode=True)
-    return float(setting.nucleation_statistics(problem, field).variance_ratio)
+    return float(st.theory.nucleation_statistics(problem, field).variance_ratio)
 
 
 def readings(run: Runner) -> xr.Dataset:
@@ -228,7 +228,7 @@ def _representative(run: Runner) -> xr.Dataset:
             "weakened": weakened,
             "patch_length": patch_length,
             "strength": ("x", tau_p),
-            "tau_n": ("x", np.ravel(setting.nucleation_stress(PROBLEM, tau_p))),
+            "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
         },
         coords={"time": found["time"].values, "x": PROBLEM.interface.x},
     )
@@ -315,7 +315,7 @@ def _window(run: Runner, samples: int) -> xr.Dataset:
         friction = dataclasses.replace(fine.friction, weakening_rate=setting.W * factor)
         problem = dataclasses.replace(fine, friction=friction)
         tau_p = strength(ratio).sample(fine.interface, samples=count, seed=run.seed, first=first)
-        tau_n = setting.nucleation_stress(problem, tau_p)
+        tau_n = st.theory.nucleation_stress(problem, tau_p)
         return tau_n.min(axis=1), tau_p.min(axis=1)
 
     firsts = range(0, samples, 250)
@@ -350,8 +350,8 @@ def _modes(run: Runner) -> xr.Dataset:
         spectrum = dataclasses.replace(field.spectrum, truncation=None, power_kept=1.0 - 1e-7)
         more = dataclasses.replace(field, spectrum=spectrum)
         tau_p = field.sample(interface, samples=200, seed=run.seed)
-        usual = setting.nucleation_stress(PROBLEM, tau_p).min(axis=1)
-        rounded = setting.nucleation_stress(PROBLEM, tau_p, weights="rounded").min(axis=1)
+        usual = st.theory.nucleation_stress(PROBLEM, tau_p).min(axis=1)
+        rounded = st.theory.nucleation_stress(PROBLEM, tau_p, weights="rounded").min(axis=1)
         cut = np.fft.rfft(tau_p, axis=1)
         highest = 2.0 * 2.5 * 2.0 * np.pi / (ratio * H)
         cut[:, 2.0 * np.pi * np.fft.rfftfreq(interface.size, interface.spacing) > highest] = 0.0
@@ -360,7 +360,7 @@ def _modes(run: Runner) -> xr.Dataset:
             "cut": np.fft.irfft(cut, interface.size, axis=1),
         }
         changes = {
-            name: setting.nucleation_stress(PROBLEM, rows).min(axis=1) / usual - 1.0
+            name: st.theory.nucleation_stress(PROBLEM, rows).min(axis=1) / usual - 1.0
             for name, rows in others.items()
         } | {"rounded": rounded / usual - 1.0}
         parts.append(xr.Dataset({name: ("sample", found) for name, found in changes.items()}))
@@ -437,7 +437,7 @@ def _mechanism(run: Runner, samples: int) -> xr.Dataset:
         return st.onset(problem, profile, method=EXACT, progress=False)
 
     def local_stress(profile):
-        return float(setting.nucleation_stress(PROBLEM, profile).min())
+        return float(st.theory.nucleation_stress(PROBLEM, profile).min())
 
     result = xr.Dataset(coords={"x": PROBLEM.interface.x})
     one = dips((0.0, 0.30))
@@ -462,7 +462,7 @@ def _mechanism(run: Runner, samples: int) -> xr.Dataset:
     result["lowering"] = ("distance", lowering)
     result = result.assign_coords(distance=list(apart))
     pair = dips((-8.0, 0.30), (6.0, 0.298), (7.5, 0.28))
-    tau_n = np.ravel(setting.nucleation_stress(PROBLEM, pair))
+    tau_n = np.ravel(st.theory.nucleation_stress(PROBLEM, pair))
     result["pair_strength"], result["pair_tau_n"] = ("x", pair), ("x", tau_n)
     result["pair_local"] = PROBLEM.interface.x[tau_n.argmin()]
     found = onset(pair)
@@ -496,7 +496,7 @@ def _contest(run: Runner) -> dict:
             tau_p = strength(ratio).sample(
                 PROBLEM.interface, seed=run.seed_of(ratio), first=int(number)
             )
-            tau_n = np.ravel(setting.nucleation_stress(PROBLEM, tau_p))
+            tau_n = np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))
             near = setting.distance(PROBLEM.interface.x, place[number]) < 0.5 * H
             there = tau_n[near].min()
             contest.append(there / tau_n.min() - 1.0)
@@ -580,7 +580,7 @@ def _driving(run: Runner, count: int) -> xr.Dataset:
         there = np.isfinite(length)
         if there.any():
             centre = 0.5 * problem.interface.extent
-            griffith[there] = setting.griffith_length(
+            griffith[there] = st.theory.griffith_length(
                 problem, stress[there], energy, centre=centre, arrest=True
             )
         dynamic = np.nan

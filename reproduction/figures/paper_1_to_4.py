@@ -45,7 +45,7 @@ def figure_1(d: Data):
     for name, style in (("correlation", "-"), ("gaussian_correlation", ":")):
         inset.plot(lag, d["theory"][name].sel(correlation_ratio=0.25), style, color=INK, lw=0.9)
     inset.set(xlim=(0, 0.6), ylabel=r"$C$", yticks=(0, 1))
-    inset.text(0.5, 0.25, r"$\xi/h_\mathrm{n}$", ha="center")
+    inset.text(0.3, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend([r"$\tau_\mathrm{p}$", "$z$"], loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
     density.plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=COLOURS[0])
@@ -114,7 +114,7 @@ def figure_2(d: Data):
     right.set(xlabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", ylim=(0, 1.02), xlim=(0.6, 1.75))
     right.tick_params(labelleft=False)
     left.legend(loc="upper left")
-    right.legend(loc="upper left")
+    right.legend(loc="center right")
     letter(left, "a", x=-0.2)
     axes = figure.add_subplot(grid[1, :])
     k = np.geomspace(0.03, 10, 300)

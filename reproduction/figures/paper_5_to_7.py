@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+import stiction as st
 from reproduction import setting
 from reproduction.claims import Data
 from reproduction.figures.style import (
@@ -40,8 +41,12 @@ def figure_5(d: Data):
         draws = field.draws(PROBLEM.interface, 1, 0)  # one draw, as in the paper's (a) and (b)
         tau_p = field.profiles(PROBLEM.interface, draws)
         upper[0].plot(x, tau_p[0] / MEAN, **line(ratio), lw=0.9, label=f"{ratio:g}")
-        lower[0].plot(x, setting.nucleation_stress(PROBLEM, tau_p)[0] / MEAN, **line(ratio), lw=0.9)
-        least = setting.density(d.at("moments", "weakest_strength", ratio), bounds=(LOW, HIGH))
+        lower[0].plot(
+            x, st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN, **line(ratio), lw=0.9
+        )
+        least = st.statistics.density(
+            d.at("moments", "weakest_strength", ratio), bounds=(LOW, HIGH)
+        )
         upper[2].plot(least.value / least.value.max(), least.x / MEAN, **line(ratio))
         counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
         edges = np.linspace(LOW, HIGH, counts.size + 1)
@@ -70,7 +75,7 @@ def figure_5(d: Data):
     letter(lower[0], "b", x=-0.12)
     stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
     for ratio in RATIOS:
-        found = setting.density(d.stress(ratio), bounds=(LOW, HIGH))
+        found = st.statistics.density(d.stress(ratio), bounds=(LOW, HIGH))
         stress.plot(found.x / MEAN, found.value * MEAN, **line(ratio))
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
         share = share / d.size.samples * 20
