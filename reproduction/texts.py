@@ -212,8 +212,8 @@ OURS = {
     ),
     16: lambda d: (
         "With strength skewed to high values the critical stress is higher and varies"
-        " more. The form of the spectrum hardly matters. Uniform d_c in place of uniform W raises the"
-        " critical stress by up to some 3 %."
+        " more. The form of the spectrum hardly matters. Uniform d_c in place of uniform W raises"
+        " the critical stress by up to some 3 %."
     ),
 }
 """What we find in each figure."""
