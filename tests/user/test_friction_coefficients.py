@@ -54,23 +54,6 @@ def test_coefficients_times_a_pressure_are_a_strength():
     np.testing.assert_allclose(along.critical_stress, same.critical_stress, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "marginal",
-    [
-        st.Beta(alpha=1.5, beta=3.0, low=0.3, high=0.8),
-        {"type": "weibull_min", "c": 3.0, "scale": 0.5},
-        st.TruncatedNormal(mean=0.5, cv=0.2, low=0.3, high=0.9),
-    ],
-)
-def test_every_marginal_scales(marginal):
-    field = st.RandomField(marginal, SPECTRUM, of="friction_coefficient")
-    result = st.monte_carlo(
-        joint(PRESSURE), field, method=LOCAL, samples=3, seed=2, keep=["strength"]
-    )
-    unscaled = field.sample(joint(PRESSURE).interface, samples=3, seed=2)
-    np.testing.assert_allclose(result["strength"], PRESSURE * unscaled, rtol=1e-8)
-
-
 def test_a_random_pressure_carries_the_strength_with_it():
     """Where strength is mu p, a higher pressure alone changes no coefficient at onset."""
     pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)

@@ -23,16 +23,6 @@ def text(path, unit="MPa", x_unit="mm", shuffled=True, without=0):
     return path
 
 
-@pytest.mark.parametrize("units", [("MPa", "mm"), ("Pa", "m")])
-def test_maps_as_text_honour_units_and_places(tmp_path, units):
-    path = text(tmp_path / "map.csv", *units)
-    found = st.read_profile(path, interface=PLANE)
-    np.testing.assert_allclose(found, VALUES, rtol=1e-8)  # nine digits in the file
-    path.write_text(path.read_text().replace(f"({units[0]})", "(kg)"))
-    with pytest.raises(st.InputError, match="no unit of stress"):
-        st.read_profile(path, interface=PLANE)
-
-
 def test_a_millimetre_taken_for_a_metre_is_refused(tmp_path):
     path = text(tmp_path / "map.csv")
     path.write_text(path.read_text().replace("(mm)", "(m)"))
@@ -121,23 +111,6 @@ def test_heights_whose_axes_changed_places_are_refused(tmp_path):
     array = xr.DataArray(VALUES.T, dims=("x", "y"), coords={"x": turned[1], "y": turned[0]})
     with pytest.raises(st.InputError, match="y reaches from 0 to 0.019375 m"):
         st.read_profile(array, interface=PLANE, strength=lambda h: h)
-
-
-def test_missing_heights_stay_gaps(tmp_path):
-    path = text(tmp_path / "heights.csv", without=3)
-    path.write_text(path.read_text().replace("strength (MPa)", "z (um)"))
-    found = st.read_profile(path, interface=PLANE, strength=lambda h: 1e12 * h, gaps="skip")
-    assert int(np.isnan(found).sum()) == 3
-
-
-def test_a_variable_that_says_nothing_is_no_strength(tmp_path):
-    """As on a line: one variable alone is not taken for a strength because it is alone."""
-    heights = xr.Dataset({"z": (("x", "y"), VALUES)})
-    heights.to_netcdf(tmp_path / "map.nc")
-    with pytest.raises(st.InputError, match="plainly the strength"):
-        st.read_profile(tmp_path / "map.nc", interface=PLANE)
-    found = st.read_profile(tmp_path / "map.nc", interface=PLANE, value="z", unit="kPa")
-    np.testing.assert_allclose(found, 1e3 * VALUES)
 
 
 @pytest.mark.parametrize("interface", [None, st.Interface(length=0.02, nodes=32)])

@@ -64,7 +64,10 @@ def read_record(path: str | Path) -> xr.DataArray:
         If a unit or a place is missing, or quantities are mixed.
     """
     path = check("path", path, FilePath)
-    table = read_table(path)
+    try:
+        table = read_table(path)
+    except InputError as error:
+        raise InputError([f"{path}: {text}" for text in error.problems]) from None
     if not table.names[0] or not table.names[0].lower().startswith(("time", "t")):
         raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
     columns: list[Array] = []
