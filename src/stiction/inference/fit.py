@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field, ValidationInfo
 
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
@@ -28,7 +28,7 @@ from stiction.inference.records import Record, records_of
 from stiction.inference.spectrum_fit import SpectrumFamily, back, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.interface import Interface
-from stiction.model import Progress, Real, at_least, checked
+from stiction.model import Progress, Real, at_least, checked, is_finite
 from stiction.profiles import UNITS
 from stiction.progress import Meter
 
@@ -40,8 +40,18 @@ FAR = 0.01
 AT_LIMIT = 1e-3
 FEWEST = 20
 """Repetitions that determine a tail of errors."""
-NotNegative = Annotated[Real, Field(ge=0.0)]
-Positive = Annotated[Real, Field(gt=0.0)]
+
+
+def _known_or_estimated(value: Any, info: ValidationInfo) -> bool | float:
+    """A number, or whether it is estimated."""
+    least = 0.0 if info.field_name == "noise" else 1e-300
+    if not (isinstance(value, bool) or (is_finite(value) and value >= least)):
+        number = "number >= 0" if info.field_name == "noise" else "positive number"
+        raise ValueError(f"must be True, False or a {number}")
+    return value if isinstance(value, bool) else float(value)
+
+
+KnownOrEstimated = Annotated[bool | float, BeforeValidator(_known_or_estimated)]
 Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
@@ -53,8 +63,8 @@ def fit_field(
     marginal: Any = MARGINALS,
     spectrum: Any = "power_law",
     detrend: Literal[0, 1, 2, 3] = 0,
-    noise: bool | NotNegative = True,
-    anisotropy: bool | Positive = False,
+    noise: KnownOrEstimated = True,
+    anisotropy: KnownOrEstimated = False,
     quantity: str = "strength",
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
@@ -128,7 +138,8 @@ def fit_field(
     -----
     The marginal is found by maximum likelihood, of values and noise together. The spectrum comes
     from a Whittle likelihood whose expectation is exact for the window: taper, gaps, the removal of
-    the trend and aliasing are in it, as is the truncation of the spectrum (Sykulski et al., 2019;
+    the trend and aliasing are in it, as is a truncation of the spectrum that is given; otherwise it
+    is whole (Sykulski et al., 2019;
     Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian field z by
     Hermite expansion (Grigoriu, 1995). A likelihood's own curvature understates the error; the
     intervals come from fits to records simulated from the fitted field, reflected about the
