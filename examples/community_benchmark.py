@@ -67,14 +67,14 @@ def simulate(spacing: float, end_time: float = 9.0) -> Found:
     run = st.simulate_rupture(
         problem,
         tau_p,
-        method=st.Rupture(loading_rate=1.0, implicit=False),
-        load=([0.0, 100.0], [0.0, 0.0]),  # the initial stress is all there is
-        stop="time",
-        end_time=end_time,
-        arrival=BROKEN,
-        variables=(),
-        steps=False,
-        stations={name: middle + KM * np.array(place) for name, place in STATIONS.items()},
+        method=st.Rupture(
+            load=([0.0, 100.0], [0.0, 0.0]),  # the initial stress is all there is
+            implicit=False,
+            stop="time",
+            end_time=end_time,
+            arrival=BROKEN,
+        ),
+        save=st.Save([], stations={n: middle + KM * np.array(at) for n, at in STATIONS.items()}),
     )
     x, y = (run[dim].values - length / 2 for dim, length in zip("xy", PERIOD, strict=True))
     return Found(x, y, run.arrival_time.values, run)

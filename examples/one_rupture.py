@@ -9,7 +9,8 @@ import stiction as st
 problem = st.paper.problem(nodes=512)
 tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
 
-run = st.simulate_rupture(problem, tau_p, method=st.Rupture(loading_rate=20e6), every=8)
+method = st.Rupture(loading_rate=20e6)
+run = st.simulate_rupture(problem, tau_p, method=method, save=st.Save(every=8))
 print(f"{run.sizes['time']} frames, {run.sizes['step']} steps")
 print(f"critical stress {float(run.critical_stress) / 1e6:.4f} MPa")
 print(f"stress drop {float(run.stress_drop) / 1e6:.4f} MPa")

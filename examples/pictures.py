@@ -37,8 +37,9 @@ def main(
         profiles[ratio] = strength.sample(problem.interface, samples=min(samples, 2000), seed=0)
     save(monte_carlo(problem, onsets, profiles), folder / "monte_carlo.png")
     run = st.simulate_rupture(
-        problem, profiles[RATIOS[0]][0], method=st.Rupture(loading_rate=2e7), every=4
-    )
+        problem, profiles[RATIOS[0]][0], method=st.Rupture(loading_rate=2e7),
+        save=st.Save(every=4),
+    )  # fmt: skip
     save(rupture(run, problem), folder / "rupture.png")
     first, last = (1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3])
     return first, last

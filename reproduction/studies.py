@@ -197,7 +197,7 @@ def _representative(run: Runner) -> xr.Dataset:
     ratio = SIMULATED[0]
     tau_p = strength(ratio).sample(PROBLEM.interface, seed=run.seed_of(ratio))[0]
     found = st.simulate_rupture(
-        PROBLEM, tau_p, method=RUPTURE, variables=("slip_rate", "slip"), every=6, steps=False,
+        PROBLEM, tau_p, method=RUPTURE, save=st.Save(["slip_rate", "slip"], every=6),
         progress=False,
     )  # fmt: skip
     slip, interface = found["slip"].values, PROBLEM.interface
@@ -609,11 +609,11 @@ def _held(problem, tau_p, stress: float) -> float:
     """Return the length of the patch in which a rupture comes to rest under a load that is held
     just above that of the first arrested event, m."""
     rise = 1.005 * stress / setting.LOADING_RATE
+    load = ([0.0, rise, rise + 1.0], [0.0, 1.005 * stress, 1.005 * stress])
+    method = st.Rupture(load=load, stop="rest", end_time=rise + 1e-3)
     found = st.simulate_rupture(
-        problem, tau_p, method=RUPTURE, stop="rest", end_time=rise + 1e-3,
-        load=([0.0, rise, rise + 1.0], [0.0, 1.005 * stress, 1.005 * stress]),
-        variables=("slip",), every=100_000, every_implicit=100_000, steps=False, progress=False,
-    )  # fmt: skip
+        problem, tau_p, method=method, save=st.Save(["slip"], every=1_000_000), progress=False
+    )
     slip = found["slip"].values[-1]
     labels = patches(slip > 1e-2 * slip.max())
     longest = np.bincount(labels[labels >= 0]).max(initial=0)

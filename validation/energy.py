@@ -28,14 +28,12 @@ def rupture(steps: int, barrier: float = 1e6, end: float = 40e-6):
     return st.simulate_rupture(
         problem,
         strength,
-        method=st.Rupture(loading_rate=1.0, implicit=False, time_step=end / steps),
-        load=([0.0, 1.0], [LOAD, LOAD]),
-        variables=[],
-        every=max(1, steps // 250),
-        steps=False,
-        stop="time",
-        end_time=end,
-    )
+        method=st.Rupture(
+            load=([0.0, 1.0], [LOAD, LOAD]), implicit=False, time_step=end / steps,
+            stop="time", end_time=end,
+        ),
+        save=st.Save([], every=max(1, steps // 250)),
+    )  # fmt: skip
 
 
 def compute() -> list[tuple[int, float]]:

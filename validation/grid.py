@@ -27,9 +27,7 @@ def after_onset(nodes: int, ratio: float, sample: int) -> tuple[np.ndarray, floa
             problem,
             tau_p,
             method=st.Rupture(loading_rate=2e7),
-            variables=["slip"],
-            every=1,
-            steps=False,
+            save=st.Save(["slip"], every=1),
         )
     drop = FALL * np.mean(tau_p - problem.friction.residual_strength)
     stress, slip = run["mean_stress"].values, run["slip"].values

@@ -29,13 +29,10 @@ def by_exponentials(tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Times and slip at every step."""
     step = 0.37 * PROBLEM.interface.spacing / SOLID.shear_wave_speed
     method = st.Rupture(
-        loading_rate=LOADING, implicit=False, kernel_tolerance=tolerance, time_step=step
-    )
-    start = TAU_P.min() / LOADING
-    run = st.simulate_rupture(
-        PROBLEM, TAU_P, method=method, variables=["slip"], every=1, steps=False, stop="time",
-        end_time=start + STEPS * step,
+        loading_rate=LOADING, implicit=False, kernel_tolerance=tolerance, time_step=step,
+        stop="time", end_time=TAU_P.min() / LOADING + STEPS * step,
     )  # fmt: skip
+    run = st.simulate_rupture(PROBLEM, TAU_P, method=method, save=st.Save(["slip"], every=1))
     return run["time"].values, run["slip"].values
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
-from stiction.dynamics.energies import rupture_speed
+from stiction.dynamics.summary import rupture_speed
 from stiction.plot.style import COLUMN, new_figure, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
@@ -37,11 +37,8 @@ def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
     run = st.simulate_rupture(
         problem,
         np.where(np.abs(x) < 0.75 * griffith, 0.98 * load, STRENGTH),
-        method=st.Rupture(loading_rate=1.0, implicit=False),
-        load=([0.0, 1.0], [load, load]),
-        variables=[],
-        every=500,
-        steps=False,
+        method=st.Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
+        save=st.Save([], every=500),
     )
     found = rupture_speed(run["arrival_time"].values, [spacing], [problem.nucleation_length])
     right = slice(nodes // 2, nodes // 2 + int(0.425 * nodes))

@@ -46,15 +46,14 @@ def simulated(steps: int) -> tuple[np.ndarray, np.ndarray]:
     run = st.simulate_rupture(
         problem,
         np.full(INTERFACE.nodes, 1.001e6),
-        method=st.Rupture(loading_rate=1.0, implicit=False, time_step=END * UNIT / steps),
-        load=([0.0, 1.0], [2e6, 2e6]),
+        method=st.Rupture(
+            load=([0.0, 1.0], [2e6, 2e6]), implicit=False, time_step=END * UNIT / steps,
+            stop="time", end_time=END * UNIT,
+        ),
         initial_slip=1e-3 + 1e-6 * np.cos(K * INTERFACE.x),
         initial_load=2e6,
-        variables=["slip"],
-        every=1,
-        stop="time",
-        end_time=END * UNIT,
-    )
+        save=st.Save(["slip"], every=1),
+    )  # fmt: skip
     mode = np.fft.rfft(run["slip"].values, axis=1)[:, 2].real / (INTERFACE.nodes / 2) / 1e-6
     return run["time"].values / UNIT, mode
 

@@ -12,7 +12,8 @@ import stiction as st
 
 problem = st.paper.problem(nodes=512)
 tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
-run = st.simulate_rupture(problem, tau_p, method=st.Rupture(loading_rate=2e7), every=4)
+method = st.Rupture(loading_rate=2e7)
+run = st.simulate_rupture(problem, tau_p, method=method, save=st.Save(every=4))
 st.plot.rupture(run)
 
 # %%

@@ -7,10 +7,9 @@ from stiction import plot as plot
 from stiction import statistics as statistics
 from stiction import theory as theory
 from stiction.criterion.local import LocalCriterion as LocalCriterion
-from stiction.dynamics.compared import RuptureMisfit as RuptureMisfit
 from stiction.dynamics.method import Rupture as Rupture
+from stiction.dynamics.save import Save as Save
 from stiction.dynamics.simulate import simulate_rupture as simulate_rupture
-from stiction.dynamics.stream import open_rupture as open_rupture
 from stiction.ensemble.experiment import Ensemble as Ensemble
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
 from stiction.equilibrium.method import Equilibrium as Equilibrium

@@ -45,7 +45,6 @@ _OWN = {
     "local_criterion": "criterion.local:LocalCriterion",
     "equilibrium": "equilibrium.method:Equilibrium",
     "rupture": "dynamics.method:Rupture",
-    "rupture_misfit": "dynamics.compared:RuptureMisfit",
 }
 
 

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics import monitor
 from stiction.dynamics.energies import radiated_energy
-from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import Rupture, make_run
 
 END = 40e-6
@@ -19,23 +17,20 @@ def rupture(nodes, steps):
     friction = st.LinearWeakening(weakening_rate=2e11, residual_strength=2e5)
     problem = st.Problem(solid, interface, friction)
     strength = 1e6 - 0.35e6 * np.exp(-(((interface.x - 0.05) / 0.012) ** 2))
-    method = Rupture(loading_rate=1.0, implicit=False, time_step=END / steps)
-    history = load_history(([0.0, 1.0], [7.5e5, 7.5e5]), None)
-    run = make_run(
-        method, problem.friction, method.medium(problem), problem.sample(strength), 0, history
-    )
-    run.control[monitor.SLID_STOP] = np.inf
+    method = Rupture(
+        load=([0.0, 1.0], [7.5e5, 7.5e5]), stop="time", end_time=1.0, implicit=False,
+        time_step=END / steps,
+    )  # fmt: skip
+    run = make_run(method, problem.friction, method.medium(problem), problem.sample(strength), 0)
     state = run.start(0.0)
     run.advance(state, steps)
-    energy = radiated_energy(
-        problem.friction, run.setting.nodes, run.medium.grid, state.fields
-    )  # fmt: skip
+    energy = radiated_energy(problem.friction, run.setting.nodes, run.medium.grid, state)
     return state, energy
 
 
 def test_slip_and_radiated_energy_converge_with_second_order_in_time():
     reference, energy = rupture(256, 8000)
-    assert reference.watch[monitor.SLID] == 256
+    assert reference.now["slid"] == 256
     slips, energies = [], []
     for steps in (500, 1000, 2000):
         state, radiated = rupture(256, steps)

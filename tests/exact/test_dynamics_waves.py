@@ -6,8 +6,6 @@ import pytest
 from scipy.special import j0, j1
 
 import stiction as st
-from stiction.dynamics import monitor
-from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import Rupture, make_run
 from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
@@ -60,11 +58,12 @@ def released(steps, end, mode="II"):
     problem = st.Problem(solid, interface, friction, mode=mode)
     k = interface.wavenumbers[2]
     unit = 1.0 / (k * solid.shear_wave_speed)
-    method = Rupture(loading_rate=1.0, implicit=False, time_step=end * unit / steps)
-    history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
+    method = Rupture(
+        load=([0.0, 1.0], [2e6, 2e6]), stop="time", end_time=1.0, implicit=False,
+        time_step=end * unit / steps,
+    )  # fmt: skip
     rows = problem.sample(np.full(32, 1.001e6))
-    run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
-    run.control[monitor.SLID_STOP] = np.inf
+    run = make_run(method, problem.friction, method.medium(problem), rows, 0)
     state = run.start(0.0, 1e-3 + 1e-6 * np.cos(k * interface.x))
     run.advance(state, steps)
     return state.slip_hat[2].real / 16.0 / 1e-6

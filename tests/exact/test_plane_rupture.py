@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics import monitor
-from stiction.dynamics.courant_limit import amplification
-from stiction.dynamics.loading import load_history
+from stiction.dynamics.medium import amplification
 from stiction.dynamics.method import make_run
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.elasticity.exponential_sum import ExponentialSum
@@ -39,7 +37,7 @@ def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
     method = st.Rupture(loading_rate=rate)
     step = min(method.medium(problem).step for problem in (line, plane))
     method = dataclasses.replace(method, time_step=step)
-    options = {"method": method, "progress": False, "every": 1}
+    options = {"method": method, "progress": False, "save": st.Save(every=1)}
     one = simulate_rupture(line, tau_p, **options)
     two = simulate_rupture(plane, np.array(on_plane), **options)
     assert int(one.explicit_steps) > 100
@@ -72,8 +70,8 @@ def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
     times = np.concatenate([[0.0], np.geomspace(1e-3, 1e5, 200)])
     for q in (1, 7, 20, 33, 50):
         share = kx.ravel()[q] ** 2 / (kx.ravel()[q] ** 2 + ky.ravel()[q] ** 2)
-        slot = grid.slot[q]
-        assert grid.share[slot] == pytest.approx(share, abs=1e-14)
+        slot = grid.entry[q]
+        assert grid.mode_two[slot] == pytest.approx(share, abs=1e-14)
         parts = np.where(np.arange(grid.poles.size) < grid.split, share, 1.0 - share)
         found = (np.exp(np.outer(times, grid.poles)) @ (parts * grid.weights)).real
         eta = solid.wave_speed_ratio
@@ -83,7 +81,7 @@ def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
         k = float(np.hypot(kx.ravel()[q], ky.ravel()[q]))
         static = share * static_stiffness("II", eta) + 1.0 - share
         assert grid.stiffness[0, q] == pytest.approx(0.5e9 * k * static, rel=1e-12)
-        assert grid.pace[slot] == pytest.approx(k * solid.shear_wave_speed, rel=1e-12)
+        assert grid.frequency[slot] == pytest.approx(k * solid.shear_wave_speed, rel=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.25, 0.45])
@@ -93,12 +91,12 @@ def test_no_wave_of_the_grid_grows_at_the_largest_step(ratio, lengths):
     problem = st.Problem(solid, st.Interface(length=lengths, nodes=(16, 16)), GENTLE)
     medium = st.Rupture(loading_rate=1.0).medium(problem)
     grid, eta = medium.grid, solid.wave_speed_ratio
-    for slot in range(1, grid.pace.size, 3):
-        share = grid.share[slot]
+    for slot in range(1, grid.frequency.size, 3):
+        share = grid.mode_two[slot]
         parts = np.where(np.arange(grid.poles.size) < grid.split, share, 1.0 - share)
         kernel = ExponentialSum(grid.poles, parts * grid.weights, 0.0, 0.0)
         static = share * static_stiffness("II", eta) + 1.0 - share
-        step = amplification(grid.pace[slot] * medium.largest_step, kernel, static)
+        step = amplification(grid.frequency[slot] * medium.largest_step, kernel, static)
         assert np.abs(np.linalg.eigvals(step)).max() < 1.0 + 1.1e-5
 
 
@@ -124,11 +122,12 @@ def point_load(steps, end, plane, load):
     """Slip on a freely sliding plane, less its mean, after a stress was put on it at t = 0."""
     friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(SOLID, plane, friction, st.Load(initial_stress=load))
-    method = st.Rupture(loading_rate=1.0, implicit=False, time_step=end / steps)
-    history = load_history(([0.0, 1.0], [2e6, 2e6]), None)
+    method = st.Rupture(
+        load=([0.0, 1.0], [2e6, 2e6]), stop="time", end_time=1.0, implicit=False,
+        time_step=end / steps,
+    )  # fmt: skip
     rows = problem.sample(np.full(plane.shape, 1.001e6), accept=("overstress",))
-    run = make_run(method, problem.friction, method.medium(problem), rows, 0, history)
-    run.control[monitor.SLID_STOP] = np.inf
+    run = make_run(method, problem.friction, method.medium(problem), rows, 0)
     state = run.start(0.0, np.full(plane.shape, 1e-3))
     run.advance(state, steps)
     slip = state.slip.reshape(plane.shape)

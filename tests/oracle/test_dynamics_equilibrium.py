@@ -74,12 +74,12 @@ def test_effect_of_the_loading_rate_is_smooth_and_vanishes(system):
 def test_a_run_from_an_equilibrium_finds_the_same_onset(system):
     strength = fields(system, 0.5, 1)[0]
     exact, slip = largest_load(system, strength)
-    method = Rupture(loading_rate=1e5)
+    method = Rupture(loading_rate=1e5, stop="onset")
     # The slip of the onset, scaled back, is in equilibrium at no load; so take the load of the
     # onset less a little, where that slip holds still.
     found = simulate_rupture(
         system, strength, method=method, initial_slip=slip * (1.0 - 1e-9),
-        initial_load=exact * (1.0 - 1e-6), stop="onset",
+        initial_load=exact * (1.0 - 1e-6),
     )  # fmt: skip
     assert float(found["critical_stress"]) == pytest.approx(exact, rel=5e-6)
     assert int(found["implicit_steps"]) > 0

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics import monitor
 from stiction.dynamics import slow_start as module
-from stiction.dynamics.loading import uniform_rate
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.slow_start import slow_start, static_setting
 
@@ -115,12 +113,12 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(problem, monk
         estimates = []
         for crossings in (20.0, 5.0, 1.25, 0.4):
             monkeypatch.setattr(module, "_CROSSINGS", crossings)
-            run = make_run(method, problem.friction, medium, rows, number, uniform_rate(2e7))
+            run = make_run(method, problem.friction, medium, rows, number)
             state = slow_start(setting, run, rows, number, 2e7)
-            estimates.append(state.watch[monitor.START_ERROR])
+            estimates.append(state.now["start_error"])
             run.advance(state, 10_000)
-            error = abs(state.watch[monitor.PEAK_STRESS] - rest["critical_stress"][number])
-            assert error < max(estimates[-1], 3e-5 * state.watch[monitor.SCALE])
+            error = abs(state.now["peak_stress"] - rest["critical_stress"][number])
+            assert error < max(estimates[-1], 3e-5 * state.now["scale"])
         assert np.all(np.diff(estimates) > 0.0)
 
 

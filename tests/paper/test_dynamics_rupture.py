@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics.energies import rupture_speed
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.simulate import simulate_rupture
+from stiction.dynamics.summary import rupture_speed
 
 RATE, STRENGTH = 1e12, 1e6
 
@@ -26,11 +26,8 @@ def final_speed(ratio, nodes):
     run = simulate_rupture(
         problem,
         np.where(np.abs(x) < 0.75 * griffith, 0.98 * load, STRENGTH),
-        method=Rupture(loading_rate=1.0, implicit=False),
-        load=([0.0, 1.0], [load, load]),
-        variables=[],
-        every=1000,
-        steps=False,
+        method=Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
+        save=st.Save([], every=1000),
     )
     speed = rupture_speed(run["arrival_time"].values, [spacing], [problem.nucleation_length])
     at = nodes // 2 + np.arange(int(0.38 * nodes), int(0.42 * nodes))
@@ -78,9 +75,8 @@ def test_no_fixed_slip_rate_marks_the_onset():
     tau_p = field.sample(problem.interface, samples=1, seed=1)[0]
     top = []
     for rate in (2e5, 2e7):
-        run = simulate_rupture(
-            problem, tau_p, method=Rupture(loading_rate=rate), stop="onset", variables=[]
-        )
+        method = Rupture(loading_rate=rate, stop="onset")
+        run = simulate_rupture(problem, tau_p, method=method, save=st.Save([]))
         peak = int(np.argmax(run["step_mean_stress"].values))
         top.append(float(run["step_top_slip_rate"][peak]))
     # 100 times the rate, 100 times the slip rate, to a factor of three.

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import stiction as st
-from stiction.dynamics import monitor
-from stiction.dynamics.checkpoint import read_checkpoint, write_checkpoint
-from stiction.dynamics.loading import uniform_rate
-from stiction.dynamics.method import Rupture, first_slip, make_run
+from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.method import Rupture, make_run
+from stiction.dynamics.save import read_checkpoint, write_checkpoint
 from stiction.dynamics.simulate import simulate_rupture
+from stiction.dynamics.state import ALL_SLID
 
 NODES = 128
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -31,33 +31,22 @@ def strength(seed, low=0.7e6, high=1.5e6):
 
 
 def fresh_run(profile, method=METHOD):
-    run = make_run(
-        method,
-        PROBLEM.friction,
-        method.medium(PROBLEM),
-        PROBLEM.sample(profile),
-        0,
-        uniform_rate(method.loading_rate),
-    )
-    return run, run.start(first_slip(run))
+    medium, rows = method.medium(PROBLEM), PROBLEM.sample(profile)
+    run = make_run(method, PROBLEM.friction, medium, rows, 0)
+    return run, run.start(run.first_slip())
 
 
 def same(left, right):
     """Equal bit by bit, including what a checkpoint holds."""
-    names = ("slip", "rate", "stress", "slip_hat", "past", "memory", "carried", "watch")
-    return all(
-        np.array_equal(getattr(left, name), getattr(right, name)) for name in names
-    ) and np.array_equal(left.arrival, right.arrival, equal_nan=True)
+    return all(a.tobytes() == b.tobytes() for a, b in zip(left, right, strict=True))
 
 
 @settings(max_examples=8, deadline=None)
 @given(seed=some.integers(0, 10_000), rate=some.sampled_from([1e4, 1e7, 1e9]))
 def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
     profile = strength(seed)
-    run = simulate_rupture(
-        PROBLEM, profile, method=Rupture(loading_rate=rate), every=5,
-        variables=("slip", "slip_rate", "shear_stress", "strength"), steps=False,
-    )  # fmt: skip
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=5)
+    run = simulate_rupture(PROBLEM, profile, method=Rupture(loading_rate=rate), save=save)
     total = run["work"].values[-1]
     assert run.attrs["stopped"] == "sliding"
     # Rounding of a difference of terms that are 1e3 times larger.
@@ -104,8 +93,8 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
     profile = strength(5)
     run, straight = fresh_run(profile)
     total, reason = run.advance(straight, 100_000)
-    assert reason == monitor.ALL_SLID
-    implicit = int(straight.watch[monitor.IMPLICIT_STEPS])
+    assert reason == ALL_SLID
+    implicit = int(straight.now["implicit_steps"])
     assert implicit > 10
     path = tmp_path / "state.npz"
     # In the implicit phase, just before, at and after the switch, in the rupture.
@@ -113,7 +102,7 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
         run, state = fresh_run(profile)
         run.advance(state, cut)
         write_checkpoint(path, run, state)
-        state = read_checkpoint(path, run)
+        state = read_checkpoint(path, run, run.start(0.0))
         run.advance(state, 100_000)
         assert same(state, straight), cut
 
@@ -124,7 +113,7 @@ def test_the_pass_over_the_memory_meets_whole_cache_lines(tmp_path):
     run.advance(state, 1)
     path = tmp_path / "state.npz"
     write_checkpoint(path, run, state)
-    again = read_checkpoint(path, run)
+    again = read_checkpoint(path, run, run.start(0.0))
     for array in (state.memory, again.memory, again.carried, run.tables.table, run.tables.packed):
         assert array.ctypes.data % 64 == 0
 
@@ -135,7 +124,7 @@ def test_restart_across_a_return_to_implicit_steps(tmp_path):
     profile[40:60] = 0.8e6
     run, straight = fresh_run(profile)
     count = 0
-    while straight.watch[monitor.ARRESTED] == 0 or straight.explicit:
+    while straight.now["arrested"] == 0 or straight.explicit:
         run.advance(straight, 5)
         count += 5
         assert count < 20_000
@@ -145,7 +134,7 @@ def test_restart_across_a_return_to_implicit_steps(tmp_path):
     for cut in (count // 3, count - count // 3 - 25, 25):
         run.advance(state, cut)
         write_checkpoint(path, run, state)
-        state = read_checkpoint(path, run)
+        state = read_checkpoint(path, run, run.start(0.0))
     run.advance(state, 3)
     assert not straight.explicit
     assert same(state, straight)
@@ -155,20 +144,17 @@ def test_radiated_energy_is_steady_after_arrest():
     profile = np.full(NODES, 3e6)
     profile[40:60] = 0.8e6
     run, state = fresh_run(profile)
-    while state.watch[monitor.ARRESTED] == 0:
+    while state.now["arrested"] == 0:
         run.advance(state, 20)
     # Hold the load: from here on nothing slips, and what was radiated stays radiated.
-    held = state.load
+    held = float(state.now["load"])
     run.history[0][:] = [0.0, 1e9]
     run.history[1][:] = [held, held * (1.0 + 1e-15)]
-    run.control[monitor.EXPLICIT_ONLY] = 1.0
-    run.control[monitor.CALM_COUNT] = np.inf
-    from stiction.dynamics.energies import radiated_energy
+    thresholds = run.thresholds._replace(explicit_only=True, calm_count=10**9)
+    run.setting = run.setting._replace(thresholds=thresholds)
 
     def radiated():
-        return radiated_energy(
-            PROBLEM.friction, run.setting.nodes, run.medium.grid, state.fields,
-        )  # fmt: skip
+        return radiated_energy(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
 
     run.advance(state, 3000)
     middle = radiated()
@@ -189,7 +175,9 @@ def test_arrested_event_is_counted_and_first_instability_below_the_critical_stre
 @pytest.mark.parametrize("rate", [1e5, 2e9])
 def test_work_is_the_load_times_the_slip_of_every_step(rate):
     """For a uniform load, int tau_0 d<slip> L by the trapezoidal rule, to round-off."""
-    run = simulate_rupture(PROBLEM, strength(7), method=Rupture(loading_rate=rate), variables=[])
+    run = simulate_rupture(
+        PROBLEM, strength(7), method=Rupture(loading_rate=rate), save=st.Save([])
+    )
     load = np.r_[float(run["load"][0]), run["step_load"].values]
     slip = np.r_[0.0, run["step_mean_slip"].values]
     work = np.cumsum(0.5 * (load[1:] + load[:-1]) * np.diff(slip)) * 0.05
@@ -203,10 +191,10 @@ def test_creep_stops_where_the_load_falls_and_never_runs_back():
     onset = float(METHOD.prepare(PROBLEM)(PROBLEM.sample(profile))["critical_stress"][0])
     high = 0.5 * (profile.min() + onset)
     low, end = 0.8 * high, 0.3
-    run = simulate_rupture(
-        PROBLEM, profile, method=METHOD, load=([0.0, 0.1, 0.2, end], [0.0, high, low, high]),
-        variables=["slip", "slip_rate", "shear_stress", "strength"], stop="time", end_time=end,
-    )  # fmt: skip
+    load = ([0.0, 0.1, 0.2, end], [0.0, high, low, high])
+    method = Rupture(load=load, stop="time", end_time=end)
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"])
+    run = simulate_rupture(PROBLEM, profile, method=method, save=save)
     slip, time = run["slip"].values, run["time"].values
     assert int(run["implicit_steps"]) > 30
     assert slip.max() > 0.0

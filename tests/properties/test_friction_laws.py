@@ -31,8 +31,7 @@ def runs():
             dataclasses.replace(problem, friction=law),
             strength,
             method=st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25),
-            variables=("slip", "slip_rate", "shear_stress", "strength"),
-            every=1,
+            save=st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=1),
         )
         for name, law in LAWS.items()
     }

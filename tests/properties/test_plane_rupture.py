@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics import monitor
 from stiction.dynamics.energies import radiated_energy
-from stiction.dynamics.loading import load_history
 from stiction.dynamics.method import make_run
+from stiction.dynamics.save import open_rupture
 from stiction.dynamics.simulate import simulate_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -46,14 +45,15 @@ def test_a_mirrored_strength_breaks_mirrored(axis):
 
 
 def test_a_restart_is_the_same_run_to_the_bit(tmp_path):
-    whole = simulate_rupture(PROBLEM, TAU_P, method=METHOD, progress=False, every=20)
+    whole = simulate_rupture(PROBLEM, TAU_P, method=METHOD, progress=False)
     for steps in (30, 130):  # while it creeps, and while it runs
         method = st.Rupture(loading_rate=1e8, max_steps=steps)
-        path = tmp_path / f"{steps}.npz"
-        simulate_rupture(PROBLEM, TAU_P, method=method, progress=False, checkpoint=path)
-        rest = simulate_rupture(PROBLEM, TAU_P, method=METHOD, progress=False, restart=path)
+        options = {"save": st.Save(to=tmp_path / f"{steps}"), "progress": False}
+        simulate_rupture(PROBLEM, TAU_P, method=method, **options)
+        rest = simulate_rupture(PROBLEM, TAU_P, method=METHOD, **options)
+        read = open_rupture(tmp_path / f"{steps}")
         for name in ("slip", "slip_rate", "shear_stress"):
-            assert np.array_equal(rest[name].values[-1], whole[name].values[-1])
+            assert np.array_equal(read[name].values[-1], whole[name].values[-1])
         for name in ("critical_stress", "critical_position", "rupture_speed", "arrival_time"):
             assert np.array_equal(rest[name].values, whole[name].values, equal_nan=True)
 
@@ -72,14 +72,15 @@ def test_a_sample_alone_and_in_a_batch_are_equal_to_the_bit():
 
 def ruptured(steps, end=2.4e-5):
     """Slip and radiated energy at a constant load that breaks the weak spot and runs on."""
-    method = st.Rupture(loading_rate=1.0, implicit=False, time_step=end / steps)
-    history = load_history(([0.0, 1.0], [7.5e5, 7.5e5]), None)
+    method = st.Rupture(
+        load=([0.0, 1.0], [7.5e5, 7.5e5]), stop="time", end_time=1.0, implicit=False,
+        time_step=end / steps,
+    )  # fmt: skip
     rows = PROBLEM.sample(TAU_P)
-    run = make_run(method, PROBLEM.friction, method.medium(PROBLEM), rows, 0, history)
-    run.control[monitor.SLID_STOP] = np.inf
+    run = make_run(method, PROBLEM.friction, method.medium(PROBLEM), rows, 0)
     state = run.start(0.0)
     run.advance(state, steps)
-    energy = radiated_energy(PROBLEM.friction, run.setting.nodes, run.medium.grid, state.fields)
+    energy = radiated_energy(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
     return state.slip, energy
 
 
@@ -101,10 +102,9 @@ def test_an_arrested_rupture_radiates_no_more():
     inside = (np.abs(X - 0.02) < 0.011) & (np.abs(Y - 0.015) < 0.009)
     tau_p = np.where(inside, 8e5, np.inf)
     tau_p[inside] -= 2e5 * bump(0.018, 0.014)[inside]
-    run = simulate_rupture(
-        PROBLEM, tau_p, method=METHOD, load=([0.0, 6e-3, 1.0], [0.0, 6.2e5, 6.2e5]),
-        stop="time", end_time=0.5, progress=False, every=20,
-    )  # fmt: skip
+    method = st.Rupture(load=([0.0, 6e-3, 1.0], [0.0, 6.2e5, 6.2e5]), stop="time", end_time=0.5)
+    save = st.Save(every=20)
+    run = simulate_rupture(PROBLEM, tau_p, method=method, save=save, progress=False)
     slip = run.slip.values[-1]
     assert np.all(slip[~inside] == 0.0)
     assert np.all(slip[inside] > 0.0)

@@ -8,9 +8,9 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
-from stiction.dynamics.arrays import Nodes
-from stiction.dynamics.scale import stress_scale
+from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.simulate import simulate_rupture
+from stiction.dynamics.state import Nodes
 from stiction.plot import film
 
 NODES, LENGTH = 256, 0.05
@@ -28,10 +28,10 @@ def barred(height, problem=PROBLEM):
     return np.where(np.abs(X - 0.5) < 0.15, height, TAU_P)
 
 
-def simulate(tau_p, problem=PROBLEM, **options):
-    return simulate_rupture(
-        problem, tau_p, **({"method": METHOD, "variables": ["slip"], "steps": False} | options)
-    )
+def simulate(tau_p, problem=PROBLEM, save=None, **method):
+    options = {} if "load" in method else {"loading_rate": 1e7}
+    method = st.Rupture(**(options | method))
+    return simulate_rupture(problem, tau_p, method=method, save=save or st.Save(["slip"]))
 
 
 @pytest.mark.parametrize("height", [1e12, 1.66e15, np.inf])
@@ -66,7 +66,7 @@ def test_the_stress_scale_is_the_mean_drop_where_strengths_are_alike_and_grows_w
 
 def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
     tau_p = barred(np.inf)
-    run = simulate(tau_p, variables=["slip", "slip_rate", "shear_stress", "strength"])
+    run = simulate(tau_p, save=st.Save(["slip", "slip_rate", "shear_stress", "strength"]))
     locked = np.isinf(tau_p)
     assert run.attrs["stopped"] == "sliding"
     assert np.all(run["slip"].values[:, locked] == 0.0)
@@ -81,8 +81,7 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
 
 
 def test_an_infinite_barrier_is_drawn_as_a_gap(tmp_path):
-    fields = ["slip_rate", "shear_stress"]
-    run = simulate(barred(np.inf), variables=fields, steps=True, every=20)
+    run = simulate(barred(np.inf), save=st.Save(["slip_rate", "shear_stress"], every=20))
     st.plot.rupture(run).figure.savefig(tmp_path / "figure.png")
     assert film(run, tmp_path / "film.gif", frames=2).exists()
 
@@ -116,10 +115,8 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
     end = 0.8e6 / 1e8 + 2.2e-4  # four times the period over c_s
     slips = []
     for implicit in (True, False):
-        method = st.Rupture(loading_rate=1e8, implicit=implicit)
-        run = simulate(
-            tau_p, problem, method=method, stop="time", end_time=end, every=500, steps=False
-        )
+        method = {"loading_rate": 1e8, "implicit": implicit, "stop": "time", "end_time": end}
+        run = simulate(tau_p, problem, save=st.Save(["slip"], every=500), **method)
         slips.append(float(run["mean_slip"][-1]))
     # What creep by implicit steps may put wrong before the event: 2e-4 at 1e8 Pa/s.
     assert slips[0] == pytest.approx(slips[1], rel=4e-4)
@@ -143,10 +140,7 @@ def test_one_node_of_no_strength_costs_next_to_nothing():
 def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps():
     initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
     problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
-    runs = [
-        simulate(TAU_P, problem, method=dataclasses.replace(METHOD, implicit=implicit))
-        for implicit in (True, False)
-    ]
+    runs = [simulate(TAU_P, problem, implicit=implicit) for implicit in (True, False)]
     assert runs[0].attrs["stopped"] == "sliding"
     arrival = [run["arrival_time"].values for run in runs]
     assert np.nanmin(arrival[0]) < 1e-5
@@ -181,9 +175,22 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
     assert later <= unknown <= later | {"rupture_speed", "median_rupture_speed"}
     assert int(one.arrested_events[0]) >= 1
     assert float(one.radiated_energy[0]) > 0.0
-    run = simulate(tau_p, problem, method=method)
+    run = simulate(tau_p, problem, stop=stop)
     assert run.attrs["stopped"] == "rest"
     assert float(run["top_slip_rate"][-1]) < 1e-3
+
+
+def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
+    """An overstressed patch that radiates: the mean stress falls below that without a load."""
+    initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
+    problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
+    held = {"load": ([0.0, 1.0], [0.0, 0.0]), "stop": "time", "end_time": 5e-5}
+    run = simulate(TAU_P, problem, **held)
+    assert np.isnan(float(run["critical_load"]))
+    assert float(run["critical_stress"]) < initial.mean()
+    # Nor where nothing becomes unstable.
+    run = simulate(TAU_P, load=([0.0, 0.1, 0.2], [0.0, 5e5, 5e5]), stop="time", end_time=0.3)
+    assert np.isnan(float(run["critical_load"]))
 
 
 def test_stop_is_an_option_of_studies(tmp_path):

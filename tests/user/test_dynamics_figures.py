@@ -19,7 +19,8 @@ def simulated():
     )
     x = problem.interface.x
     tau_p = 1e6 - 2e5 * np.cos(2 * np.pi * x / 0.05) + 5e4 * np.sin(10 * np.pi * x / 0.05)
-    return problem, simulate_rupture(problem, tau_p, method=Rupture(loading_rate=1e8), every=5)
+    method, save = Rupture(loading_rate=1e8), st.Save(every=5)
+    return problem, simulate_rupture(problem, tau_p, method=method, save=save)
 
 
 def test_units_follow_the_size_of_the_fault(simulated):

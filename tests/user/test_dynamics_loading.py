@@ -1,4 +1,4 @@
-"""Loads that fall, rest or run at extreme rates, and files that are damaged."""
+"""Loads that fall, rest or run at extreme rates."""
 
 import warnings
 
@@ -7,11 +7,9 @@ import pytest
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
-from stiction.dynamics import monitor
+from stiction.dynamics import diagnostics
 from stiction.dynamics.simulate import simulate_rupture
-from stiction.dynamics.stream import open_rupture
-from stiction.elasticity.kernel_cache import KernelCache
-from stiction.files import UNREADABLE, read_arrays
+from stiction.dynamics.state import DIAGNOSTICS
 
 NODES = 128
 PROBLEM = st.Problem(
@@ -21,13 +19,14 @@ PROBLEM = st.Problem(
 )
 X = np.arange(NODES) / NODES
 TAU_P = 1e6 - 2e5 * np.cos(2 * np.pi * X) + 5e4 * np.sin(10 * np.pi * X)
-METHOD = st.Rupture(loading_rate=1e7)
 # First slip at 0.759 MPa, onset at 0.7885 MPa.
 DETOUR = ([0.0, 0.1, 0.2, 0.3], [0.0, 7.75e5, 7.0e5, 9e5])
 
 
-def simulate(**options):
-    return simulate_rupture(PROBLEM, TAU_P, **({"method": METHOD, "variables": ["slip"]} | options))
+def simulate(**method):
+    options = {} if "load" in method else {"loading_rate": 1e7}
+    method = st.Rupture(**(options | method))
+    return simulate_rupture(PROBLEM, TAU_P, method=method, save=st.Save(["slip"]))
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +68,8 @@ def test_kinetic_stress_is_that_of_the_first_global_sliding():
     )
     load = ([0.0, 0.12, 0.1201, 0.1203, 0.121], [0.0, 1.2e6, 1.2e6, 1e5, 1e5])
     # Slides at its residual strength, is unloaded, and stands still at 0.1 MPa.
-    run = simulate_rupture(
-        problem, TAU_P + 3e5, method=METHOD, load=load, stop="time", end_time=0.1206, every=100
-    )
+    method = st.Rupture(load=load, stop="time", end_time=0.1206)
+    run = simulate_rupture(problem, TAU_P + 3e5, method=method, save=st.Save(every=100))
     assert float(run["mean_stress"][-1]) == pytest.approx(1e5)
     # All at the residual strength; a node that sticks for a moment may carry a little less.
     assert float(run["kinetic_stress"]) == pytest.approx(3e5, rel=1e-3)
@@ -81,18 +79,20 @@ def test_kinetic_stress_is_that_of_the_first_global_sliding():
     assert np.isnan(float(simulate(stop="onset")["stress_drop"]))
 
 
-def test_a_first_instability_at_a_negative_mean_stress_is_kept():
+def test_a_first_instability_at_a_negative_mean_stress_is_kept(monkeypatch):
     """Where the initial stress pushes back elsewhere, the mean may be negative."""
-    watch = np.zeros(monitor.FIELDS)
-    watch[[monitor.FIRST_STRESS, monitor.KINETIC]] = -np.inf
-    watch[[monitor.PEAK_STRESS, monitor.LOCAL_STRESS]] = -9.0
-    watch[monitor.EVENT_DROP], watch[monitor.PEAK_WIDTH] = 1.0, 0.1
-    events = [(-8.0, 0.0), (-9.5, 1.6), (-9.4, 0.0), (-6.0, 0.0), (-7.5, 2.0), (-7.4, 0.0)]
-    for step, (mean, radiated) in enumerate(events):
-        monitor.observe(watch, float(step), 0.0, mean, radiated, step)
-    assert watch[monitor.FIRST_STRESS] == -8.0
-    assert watch[monitor.ARRESTED] == 2
-    assert (watch[monitor.PEAK_STRESS], watch[monitor.PEAK_NODE]) == (-6.0, 3)
+    monkeypatch.setattr(diagnostics, "end_event", diagnostics.end_event.py_func)
+    now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
+    now.first_stress = now.kinetic_stress = -np.inf
+    now.peak_stress = now.local_stress = -9.0
+    now.event_drop, now.peak_width = 1.0, 0.1
+    events = [(-8.0, 0.0), (-9.5, 1.6), (-9.4, 0.0), (-6.0, 0.0), (-7.5, 2.0), (-5.9, 0.0)]
+    for i, (mean, radiated) in enumerate(events):
+        step = diagnostics.Step(float(i), 1.0, 0.0, 0.0, radiated, 0.0, 0, radiated, i)
+        diagnostics.observe.py_func(now, 1.5, mean, step)
+    assert now.first_stress == -8.0
+    assert now.arrested == 2
+    assert (now.peak_stress, now.peak_node) == (-5.9, 5)
 
 
 def test_the_place_of_a_slow_onset_is_that_of_equilibrium():
@@ -127,104 +127,3 @@ def test_rates_that_cannot_be_resolved_are_said(exact):
     assert float(fast.critical_stress[0]) == pytest.approx(float(fine.critical_stress[0]), rel=1e-2)
     with pytest.raises(InputError, match="loading_rate: in one explicit step"):
         st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e15))
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"every": True}, "every:"),
-        ({"end_time": "1"}, "end_time:"),
-        ({"interval": float("nan")}, "interval:"),
-        ({"store": 3}, "store: must be a path"),
-        ({"checkpoint": "/"}, "checkpoint: '/' is a folder"),
-        ({"progress": 3}, "progress:"),
-        ({"variables": None}, "variables:"),
-        ({"variables": [1]}, "variables:"),
-        ({"initial_slip": np.zeros(NODES), "initial_load": "a"}, "initial_load:"),
-        ({"initial_slip": np.zeros(NODES), "initial_load": -1.0}, "initial_load: -1 Pa is below"),
-        ({"initial_slip": np.full(NODES, np.inf), "initial_load": 1e5}, "initial_slip:"),
-        ({"initial_slip": ["a"] * NODES, "initial_load": 1e5}, "initial_slip:"),
-        ({"load": lambda t: None, "end_time": 1.0}, "returns no number"),
-    ],
-)
-def test_options_that_make_no_sense(options, text):
-    with pytest.raises(InputError, match=text):
-        simulate(**options)
-
-
-def test_whole_numbers_of_any_kind_do():
-    assert simulate(every=np.int64(50)).attrs["stopped"] == "sliding"
-
-
-def test_damaged_checkpoints_are_refused(tmp_path):
-    path = tmp_path / "state.npz"
-    simulate(stop="onset", checkpoint=path)
-    whole, arrays = path.read_bytes(), read_arrays(path)
-    without = {name: value for name, value in arrays.items() if name != "state_memory"}
-    np.savez(path, **without)
-    with pytest.raises(InputError, match="lacks state_memory"):
-        simulate(restart=path)
-    np.savez(path, **(without | {"state_memory": np.zeros(7)}))
-    with pytest.raises(InputError, match="memory must be float64 of shape"):
-        simulate(restart=path)
-    with path.open("wb") as stream:
-        np.save(stream, np.zeros(3))
-    with pytest.raises(InputError, match="not a readable checkpoint"):
-        simulate(restart=path)
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        damaged = bytearray(whole)
-        for _ in range(3):
-            damaged[rng.integers(len(damaged))] ^= 1 << int(rng.integers(8))
-        path.write_bytes(damaged)
-        try:
-            same = read_arrays(path)
-        except UNREADABLE:
-            continue
-        # A bit that nothing depends on, as of a date.
-        assert all(np.array_equal(same[n], v, equal_nan=True) for n, v in arrays.items())
-
-
-def test_a_cache_file_with_other_content_is_built_again(tmp_path, monkeypatch):
-    monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path))
-    kernel = ("III", 1.0, 1e-3, 1e3)
-    first = KernelCache().kernel_sum(*kernel)
-    (path,) = tmp_path.iterdir()
-    contents = [
-        {"poles": first.poles, "weights": first.weights[1:], "error": 0.0, "t_max": 1.0},
-        {"poles": -first.poles, "weights": first.weights, "error": 0.0, "t_max": 1.0},
-        {"poles": np.array(["a"]), "weights": np.array(["b"]), "error": 0.0, "t_max": 1.0},
-    ]
-    for content in contents:
-        np.savez(path, **content)
-        assert np.array_equal(KernelCache().kernel_sum(*kernel).poles, first.poles)
-    with path.open("wb") as stream:
-        np.save(stream, np.zeros(3))
-    assert np.array_equal(KernelCache().kernel_sum(*kernel).poles, first.poles)
-
-
-def test_a_restart_has_every_step_and_frame_with_an_interval(tmp_path):
-    """Between frames that lie far apart, steps are stored as well."""
-
-    class Cut(Exception):
-        pass
-
-    def cut(progress):
-        if progress.steps >= 160:
-            raise Cut
-
-    options = {"interval": 1e-5, "every": 3}
-    held = simulate(**options)
-    options |= {"store": tmp_path / "run", "checkpoint": tmp_path / "c.npz", "checkpoint_every": 17}
-    with pytest.raises(Cut):
-        simulate(progress=cut, **options)
-    simulate(restart=tmp_path / "c.npz", **options)
-    read = open_rupture(tmp_path / "run")
-    for name in ("time", "slip", "step_time", "step_mean_stress"):
-        assert np.array_equal(read[name].values, held[name].values), name
-
-
-def test_a_checkpoint_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match="checkpoint: cannot write"):
-        simulate(stop="onset", checkpoint=tmp_path / "file" / "c.npz")

@@ -8,8 +8,9 @@ import pytest
 
 import stiction as st
 from stiction import InputError
-from stiction.dynamics.energies import rupture_speed, strain_energy
+from stiction.dynamics.energies import strain_energy
 from stiction.dynamics.simulate import simulate_rupture
+from stiction.dynamics.summary import rupture_speed
 
 NODES, LENGTH = 128, 0.05
 SPACING = LENGTH / NODES
@@ -28,8 +29,8 @@ TAU_P = 1.3e6 - 2e5 * np.cos(ANGLE) + 5e4 * np.sin(5 * ANGLE)
 @pytest.fixture(scope="module")
 def run():
     return simulate_rupture(
-        PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e7), every=1,
-        variables=["slip", "shear_stress", "strength"],
+        PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e7),
+        save=st.Save(["slip", "shear_stress", "strength"], every=1),
     )  # fmt: skip
 
 
@@ -89,19 +90,20 @@ def test_front_speed_is_that_of_a_front_and_not_where_fronts_meet():
     assert known == pytest.approx(3.0)
 
 
-def test_a_checkpoint_of_another_load_is_refused(tmp_path):
-    path = tmp_path / "state.npz"
-    method = st.Rupture(loading_rate=1e7)
-    simulate_rupture(PROBLEM, TAU_P, method=method, stop="onset", checkpoint=path)
-    changes = {
-        "load profile": {"load": dataclasses.replace(PROBLEM.load, profile=1.2)},
-        "initial stress": {"load": dataclasses.replace(PROBLEM.load, initial_stress=5e4)},
-        "residual strength": {
-            "friction": dataclasses.replace(PROBLEM.friction, residual_strength=3e5)
-        },
-        "weakening rate": {"friction": dataclasses.replace(PROBLEM.friction, weakening_rate=2e11)},
-    }
-    for name, change in changes.items():
+def test_a_folder_with_another_run_is_refused(tmp_path):
+    save = st.Save(to=tmp_path / "run")
+    method = st.Rupture(loading_rate=1e7, stop="onset")
+    simulate_rupture(PROBLEM, TAU_P, method=method, save=save)
+    changes = [
+        {"load": dataclasses.replace(PROBLEM.load, profile=1.2)},
+        {"load": dataclasses.replace(PROBLEM.load, initial_stress=5e4)},
+        {"friction": dataclasses.replace(PROBLEM.friction, residual_strength=3e5)},
+        {"friction": dataclasses.replace(PROBLEM.friction, weakening_rate=2e11)},
+    ]
+    for change in changes:
         other = dataclasses.replace(PROBLEM, **change)
-        with pytest.raises(InputError, match=f"other {name}"):
-            simulate_rupture(other, TAU_P, method=method, restart=path)
+        with pytest.raises(InputError, match="holds another run"):
+            simulate_rupture(other, TAU_P, method=method, save=save)
+    for tau_p, rate in ((TAU_P + 1.0, 1e7), (TAU_P, 2e7)):
+        with pytest.raises(InputError, match="holds another run"):
+            simulate_rupture(PROBLEM, tau_p, method=st.Rupture(loading_rate=rate), save=save)

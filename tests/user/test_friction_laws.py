@@ -159,11 +159,11 @@ def test_residual_ratio_and_fracture_energy_are_taken(problem, tau_p):
 
 
 def test_checkpoint_of_another_law_is_refused(tmp_path, with_law, tau_p):
-    options = {"method": RUPTURE, "variables": (), "steps": False}
-    file = tmp_path / "state"
-    st.simulate_rupture(with_law(DUAL), tau_p, stop="onset", checkpoint=file, **options)
-    with pytest.raises(st.InputError, match="other friction law"):
-        st.simulate_rupture(with_law(STEEPENING), tau_p, restart=file, **options)
+    method = dataclasses.replace(RUPTURE, stop="onset")
+    options = {"method": method, "save": st.Save([], to=tmp_path / "run")}
+    st.simulate_rupture(with_law(DUAL), tau_p, **options)
+    with pytest.raises(st.InputError, match="another run"):
+        st.simulate_rupture(with_law(STEEPENING), tau_p, **options)
 
 
 class OwnParameters(NamedTuple):

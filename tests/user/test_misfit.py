@@ -1,6 +1,4 @@
-"""The misfit of a simulated rupture: arithmetic on made-up runs, and a sweep that finds d_c."""
-
-import dataclasses
+"""The misfit of a simulated rupture: arithmetic on made-up runs, and records of stations."""
 
 import numpy as np
 import pytest
@@ -110,7 +108,7 @@ BAD = {
     "zero": (lambda: misfit(RUN, record(scale=0.0)), ["zero throughout"]),
     "unsorted": (lambda: misfit(RUN, record()[::-1]), ["rising"]),
     "a table": (lambda: misfit(RUN, [1, 2, 3]), ["measured", "DataArray"]),
-    "no run": (lambda: misfit(record(), record()), ["run", "Dataset"]),
+    "no run": (lambda: misfit(record().rename(x="place"), record()), ["run", "Dataset"]),
 }
 
 
@@ -138,35 +136,23 @@ def test_files_that_are_not_taken(name, tmp_path):
         read_record(write(tmp_path / "gauges.csv", text))
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_a_sweep_in_a_study_file_finds_the_critical_slip(tmp_path):
-    """The record is of a run with d_c = 2 um: in the sweep that one fits best."""
-    problem = st.paper.problem(nodes=512)
-    rates = st.LinearWeakening(critical_slip=2e-6)
-    problem = dataclasses.replace(problem, friction=rates)
-    strength = st.paper.strength(st.paper.problem(nodes=512), correlation_ratio=2.0)
-    tau_p = strength.sample(problem.interface, seed=3)[0]
-    run = st.simulate_rupture(
-        problem, tau_p, method=st.Rupture(loading_rate=2e7), every=5, progress=False
-    )
-    onset = run.onset_time.item()
-    part = run.slip.sel(time=slice(onset - 5e-5, onset + 1.5e-4)).isel(x=[150, 300])
-    lines = ["time [us], slip at 29.296875 mm [um], slip at 58.59375 mm [um]"]
-    lines += [
-        f"{1e6 * (t - onset) + 50.0:.4f},{1e6 * a:.5f},{1e6 * b:.5f}"
-        for t, (a, b) in zip(part.time.values, part.values, strict=True)
-    ]
-    write(tmp_path / "gauges.csv", "\n".join(lines) + "\n")
-    study = st.Study(
-        problem=problem,
-        random=strength,
-        method=st.RuptureMisfit(loading_rate=2e7, record=tmp_path / "gauges.csv"),
-        ensemble=st.Ensemble(samples=1, seed=3),
-        sweep=[{"problem.friction.critical_slip": [1.6e-6, 2e-6, 2.4e-6]}],
-    )
-    study.to_toml(tmp_path / "study.toml")
-    found = st.Study.from_toml(tmp_path / "study.toml").run(progress=False)
-    assert found.misfit.isel(sample=0).argmin().item() == 1
-    # Frames and digits of the file.
-    assert found.misfit.isel(sample=0, critical_slip=1).item() < 0.01
+def test_records_of_stations_are_compared_where_gauges_have_them():
+    """Every step, and not frames that are too far apart to show the front."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
+    friction = st.LinearWeakening(weakening_rate=0.2e12)
+    problem = st.Problem(solid, st.Interface(length=0.05, nodes=128), friction)
+    tau_p = 1e6 - 2e5 * np.cos(2 * np.pi * np.arange(128) / 128)
+    save = st.Save(["slip_rate"], every=100, stations={"a": 0.01, "b": 0.0302})
+    method = st.Rupture(loading_rate=1e8)
+    run = st.simulate_rupture(problem, tau_p, method=method, save=save, progress=False)
+    measured = xr.DataArray(
+        run.station_slip_rate.values[-400:] * 1.0,
+        coords={"time": run.step_time.values[-400:], "x": [0.01, 0.0302]},
+        dims=("time", "x"), name="slip_rate",
+    )  # fmt: skip
+    assert misfit(run, measured, align=False).misfit == 0.0
+    found = misfit(run, measured.assign_coords(time=measured.time - 3e-6))
+    assert found.misfit < 1e-3
+    assert found.time_shift == pytest.approx(3e-6, rel=1e-3)
+    frames = run.drop_vars(["station_slip_rate"])
+    assert misfit(frames, measured, align=False).misfit > 0.01

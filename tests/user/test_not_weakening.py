@@ -37,7 +37,7 @@ def test_implicit_steps_pass_first_slip_below_the_residual_strength(half_weak):
     """The first node slips before the load provides any stress drop to measure tolerances in."""
     problem, strength = half_weak
     found = st.simulate_rupture(
-        problem, strength, method=st.Rupture(loading_rate=2e9), stop="onset", progress=False
+        problem, strength, method=st.Rupture(loading_rate=2e9, stop="onset"), progress=False
     )
     assert found.attrs["stopped"] == "onset"
 

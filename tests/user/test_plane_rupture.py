@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import stiction as st
 from stiction.cli.app import app
+from stiction.dynamics.save import open_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
@@ -76,11 +77,11 @@ def problem_and_strength(path):
 
 def test_frames_streamed_to_disk_are_those_in_memory(path, tmp_path):
     problem, strength = problem_and_strength(path)
-    options = {"method": st.Rupture(loading_rate=1e8), "every": 30, "progress": False}
-    whole = st.simulate_rupture(problem, strength, **options)
-    told = st.simulate_rupture(problem, strength, store=tmp_path / "frames", chunk=5, **options)
-    assert "slip" not in told
-    frames = st.open_rupture(tmp_path / "frames")
+    options = {"method": st.Rupture(loading_rate=1e8), "progress": False}
+    whole = st.simulate_rupture(problem, strength, save=st.Save(every=30), **options)
+    save = st.Save(every=30, to=tmp_path / "frames")
+    assert "slip" not in st.simulate_rupture(problem, strength, save=save, **options)
+    frames = open_rupture(tmp_path / "frames")
     for name in ("slip", "slip_rate", "shear_stress", "load", "step_time"):
         assert np.array_equal(frames[name].values, whole[name].values)
     assert frames.slip.dims == ("time", "x", "y")

@@ -135,7 +135,8 @@ def test_path_and_rupture(system):
     assert len(st.plot.equilibrium_path(path).lines) == 2  # it slides at the last
     with pytest.raises(st.InputError, match="slides at every load"):
         st.plot.equilibrium_path(path.isel(load=[2]))
-    run = st.simulate_rupture(problem, tau_p[0], method=st.Rupture(loading_rate=1e8), every=20)
+    method = st.Rupture(loading_rate=1e8)
+    run = st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(every=20))
     for axes in (st.plot.rupture(run), st.plot.rupture(run, whole=True)):
         onset = axes.lines[0].get_xydata()[0]
         assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])

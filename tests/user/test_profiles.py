@@ -129,7 +129,7 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     with pytest.raises(st.InputError, match="profile: load_profile is in Pa"):
         st.Problem(system.solid, interface, friction, load)
     run = st.simulate_rupture(
-        system, labelled(strength[::-1], x[::-1]), method=st.Rupture(loading_rate=1e9), stop="onset"
+        system, labelled(strength[::-1], x[::-1]), method=st.Rupture(loading_rate=1e9, stop="onset")
     )
     np.testing.assert_array_equal(run["peak_strength"], strength)
 
@@ -426,7 +426,7 @@ def test_an_onset_in_a_gap_is_called_that(system, strength):
         labelled(holes, system.interface.x), interface=system.interface, gaps="fill"
     )
     run = st.simulate_rupture(
-        system, profile, method=st.Rupture(loading_rate=1e8), stop="onset", variables=()
+        system, profile, method=st.Rupture(loading_rate=1e8, stop="onset"), save=st.Save([])
     )
     assert bool(run["in_gap"])
 

@@ -81,7 +81,7 @@ def onset(
     from stiction.methods import onset as find
     from stiction.study.study import read_setup
 
-    problem, own = read_setup(study)
+    problem, own, _ = read_setup(study)
     methods = _methods(own, method, loading_rate)
     names = {"unit": unit, "x_unit": x_unit, "value": value, "x": x}
     profile = _profile(strength, problem, interpolate=interpolate, gaps=gaps, **names)
@@ -193,16 +193,17 @@ def rupture(
     writable_folder(out)
     profiles: Any
     if strength is None:
-        point = Study.from_toml(study).experiments[0]
+        loaded = Study.from_toml(study)
+        point, save = loaded.experiments[0], loaded.save
         problem, method = point.problem, point.method
         profiles = point.profiles(point.draws(point.seed, sample, 1))
     else:
-        problem, method = read_setup(study)
+        problem, method, save = read_setup(study)
         names = {"unit": unit, "x_unit": x_unit, "value": value, "x": x}
         profiles = _profile(strength, problem, interpolate=interpolate, gaps=gaps, **names)
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
-    result = simulate_rupture(problem, profiles, method=method)
+    result = simulate_rupture(problem, profiles, method=method, save=save)
     write_result(result, out / "rupture.nc")
     echo(_summary(result, problem))
     with Meter("drawing the figures"):
@@ -231,10 +232,12 @@ def _summary(result: Any, problem: Any) -> str:
         lines.append(f"onset at {place} mm after {value('onset_time')} s")
     if np.isfinite(result.median_rupture_speed).any():
         lines.append(
-            f"median front speed {value('median_rupture_speed')} m/s (c_R"
+            f"apparent front speed, median over h_n/2: {value('median_rupture_speed')} m/s (c_R"
             f" {problem.solid.rayleigh_wave_speed:.0f}, c_s {problem.solid.shear_wave_speed:.0f},"
             f" c_d {problem.solid.dilatational_wave_speed:.0f})"
         )
+        if np.nanmax(result.median_rupture_speed) > problem.solid.dilatational_wave_speed:
+            lines[-1] += ": above c_d where patches ahead slip before the front comes"
     energy, unit = float(result.radiated_energy[-1]), result.radiated_energy.attrs["units"]
     lines.append(f"radiated energy {energy:.4g} {unit}; ended by: {result.attrs['stopped']}")
     return "\n".join(lines)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics import monitor
-from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_at
+from stiction.dynamics.state import NOT_FINITE, State
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import FEWEST_NODES, Problem, Sample
 
@@ -17,36 +17,29 @@ _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the str
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn where the nucleation length is not resolved, with the error to expect."""
-    unit = problem.nucleation_lengths(rows.steepest_rate)[0] / problem.effective_modulus
-    moduli = (problem.effective_modulus, problem.solid.shear_modulus)  # mode II, across it III
-    spacings = problem.interface.spacings
-    resolution = min(unit * g / h for g, h in zip(moduli, spacings, strict=False))
-    if resolution < 15.0:
-        # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
-        # at 8, 16 and 32 nodes.
-        percent = 3.0 * (16.0 / resolution) ** 2.4
-        expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-        warn_accuracy(
-            f"the nucleation length{_where_steepest(rows)} spans {resolution:.1f} nodes: expect "
-            f"{expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32; the "
-            "critical load is far less sensitive)"
-        )
-
-
-def _where_steepest(rows: Sample) -> str:
-    """Which of several nucleation lengths is meant, for messages."""
-    if rows.uniform_weakening:
-        return ""
-    return f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
+    lengths, spacings = problem.nucleation_lengths(rows.steepest_rate), problem.interface.spacings
+    resolution = min(length / h for length, h in zip(lengths, spacings, strict=True))
+    if resolution >= 15.0:
+        return
+    # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
+    # at 8, 16 and 32 nodes.
+    percent = 3.0 * (16.0 / resolution) ** 2.4
+    expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
+    where = ""
+    if not rows.uniform_weakening:
+        where = f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
+    warn_accuracy(
+        f"the nucleation length{where} spans {resolution:.1f} nodes: expect {expected} error in "
+        "slip just after onset (3 % at 16 nodes, 0.6 % at 32; the critical load is far less "
+        "sensitive)"
+    )
 
 
 def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
     """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
     rates, interface = run.setting.nodes.weakening, problem.interface
-    modulus = problem.solid.shear_modulus if interface.is_plane else problem.effective_modulus
-    shortest = problem.nucleation_lengths(1.0)[0] * modulus / problem.effective_modulus
-    longest = shortest / (FEWEST_NODES * interface.spacing)
-    steep = np.flatnonzero((state.slip > 0.0) & (rates > longest))
+    steepest = problem.nucleation_lengths(1.0)[-1] / (FEWEST_NODES * interface.spacing)
+    steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
     if steep.size:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
@@ -56,26 +49,63 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
         )
 
 
-def warn_if_reversed_before(run: Run, time: float) -> None:
-    """Warn if the load went below minus the strength before anything slipped."""
+def check_start(run: Run, time: float) -> None:
+    """Refuse or warn of loading that a run from a time (s) cannot follow.
+
+    Raises
+    ------
+    InputError
+    """
+    if time > SLOWEST:
+        raise InputError(
+            f"loading_rate: the first slip would come after {time:.3g} s, more than {SLOWEST:g} s;"
+            " load faster (the onset no longer depends on the rate)"
+        )
+    step = run.medium.step
+    if not resolves_steps(run, time):
+        warn_accuracy(
+            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
+            f"steps of {step:.2g} s apart: rupture speeds are nan, times rounded; loads "
+            "and energies are not affected"
+        )
+    scale = run.scale_at(float(load_at(*run.history, time)))
+    if not scale > 0.0:
+        raise InputError(
+            "initial_stress: is so far from the strength that no scale of stress is left between"
+            " them; check the units of both"
+        )
+    rise = run.slope(time) * step / scale
+    if rise > _COARSE:
+        text = (
+            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
+            f"the stress scale, {scale:.3g} Pa; use time_step={step * _COARSE / rise:.2g} or less,"
+            " or load more slowly"
+        )
+        if rise > _COARSEST:
+            raise InputError(text)
+        warn_accuracy(f"{text} (the onset is sampled coarsely)")
     times, values = run.history
     lowest, nodes = float(values[times <= time].min()), run.setting.nodes
     _warn_of_reverse(run, lowest * nodes.profile + nodes.initial < -nodes.strength, time, lowest)
 
 
+def resolves_steps(run: Run, time: float) -> bool:
+    """Return whether the time since zero load, as a float, tells explicit steps apart."""
+    return float(np.spacing(time)) <= 0.01 * run.medium.step
+
+
 def warn_if_reversed(run: Run, state: State) -> bool:
-    """Warn if the stress is below minus the strength now; returns whether it is.
+    """Warn if the stress is below minus the strength now; return whether it is.
 
     Where a rupture overshot, what has slipped may be left with a negative stress at a positive
     load: that is not counted.
     """
     if state.stress.min() >= 0.0:
         return False
-    strength = run.strength_after(state.slip)
-    below = state.stress < -strength - 1e-6 * state.watch[monitor.SCALE]
-    return _warn_of_reverse(
-        run, below & ((state.slip == 0.0) | (state.load < 0.0)), state.time, state.load
-    )
+    now, strength = state.now, run.strength_after(state.slip)
+    below = state.stress < -strength - 1e-6 * now["scale"]
+    below &= (state.slip == 0.0) | (now["load"] < 0.0)
+    return _warn_of_reverse(run, below, now["time"], now["load"])
 
 
 def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: float) -> bool:
@@ -90,60 +120,13 @@ def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: floa
     return bool(nodes.size)
 
 
-def resolves_steps(run: Run, time: float) -> bool:
-    """Whether the time since zero load, as a float, tells explicit steps apart."""
-    return float(np.spacing(time)) <= 0.01 * run.medium.step
-
-
-def check_pace(run: Run, time: float) -> None:
-    """Refuse or warn of loading that explicit steps or floating-point times cannot follow.
-
-    Parameters
-    ----------
-    run : Run
-    time : float
-        When it starts, s.
-
-    Raises
-    ------
-    InputError
-    """
-    if time > SLOWEST:
-        raise InputError(
-            f"loading_rate: the first slip would come after {time:.3g} s, more than {SLOWEST:g} s;"
-            " load faster (the onset no longer depends on the rate)"
-        )
-    if not resolves_steps(run, time):
-        warn_accuracy(
-            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
-            f"steps of {run.medium.step:.2g} s apart: rupture speeds are nan, times rounded; loads "
-            "and energies are not affected"
-        )
-    scale = run.scale_at(float(load_at(*run.history, time)))
-    if not scale > 0.0:
-        raise InputError(
-            "initial_stress: is so far from the strength that no scale of stress is left between"
-            " them; check the units of both"
-        )
-    rise = run.slope(time) * run.medium.step / scale
-    if rise > _COARSE:
-        step = run.medium.step
-        text = (
-            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa; use time_step={step * _COARSE / rise:.2g} or less,"
-            " or load more slowly"
-        )
-        if rise > _COARSEST:
-            raise InputError(text)
-        warn_accuracy(f"{text} (the onset is sampled coarsely)")
-
-
 def check_finite(run: Run, state: State, reason: int) -> None:
-    """Raise `FloatingPointError` that says when and where a run became non-finite."""
-    if reason == monitor.NOT_FINITE:
-        node = int(state.watch[monitor.BAD_NODE])
+    """Raise a `FloatingPointError` that says when and where a run became non-finite."""
+    if reason == NOT_FINITE:
+        now = state.now
+        node = int(now["bad_node"])
         raise FloatingPointError(
-            f"the slip rate became non-finite at t = {state.time:.9g} s, "
+            f"the slip rate became non-finite at t = {now['time']:.9g} s, "
             f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "
-            f"{state.load:.6g} Pa, after {state.steps} steps; the last finite state is kept"
+            f"{now['load']:.6g} Pa, after {state.steps} steps; the last finite state is kept"
         )

@@ -12,16 +12,21 @@ from __future__ import annotations
 from typing import Any
 
 from stiction.arrays import Array
-from stiction.dynamics.arrays import ImplicitTables, Setting
+from stiction.dynamics.state import ImplicitTables, Setting
 from stiction.elasticity.operator import Transform, convolve
 from stiction.friction.kernels import line_at, strength_at
-from stiction.jit import jit
+from stiction.jit import jit_inside
 
 
-@jit
+@jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
     """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
-    u, state, falling, driving = tables.increment, tables.state, tables.falling, tables.driving
+    u, slipping, falling, driving = (
+        tables.increment,
+        tables.slipping,
+        tables.falling,
+        tables.driving,
+    )
     product, residual, z = tables.product, tables.residual, tables.other
     direction, work = tables.direction, tables.work
     n = u.size
@@ -29,7 +34,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
     worst = 0.0
     for i in range(n):
         residual[i] = direction[i] = 0.0
-        if state[i] > 0:
+        if slipping[i] > 0:
             residual[i] = driving[i] - product[i] + falling[i] * u[i]
             worst = max(worst, abs(residual[i]))
     if not worst > accuracy:
@@ -39,15 +44,15 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         convolve(transform, tables.inverse, residual, work, z)
         gain = 0.0
         for i in range(n):
-            if state[i] > 0:
+            if slipping[i] > 0:
                 gain += z[i] * residual[i]
         beta = gain / gain_before if iteration > 0 else 0.0
         for i in range(n):
-            direction[i] = z[i] + beta * direction[i] if state[i] > 0 else 0.0
+            direction[i] = z[i] + beta * direction[i] if slipping[i] > 0 else 0.0
         convolve(transform, tables.symbol, direction, work, product)
         curvature, stiff = 0.0, 0.0
         for i in range(n):
-            if state[i] > 0:
+            if slipping[i] > 0:
                 stiff += direction[i] * product[i]
                 product[i] -= falling[i] * direction[i]
                 curvature += direction[i] * product[i]
@@ -56,7 +61,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         alpha = gain / curvature
         worst = 0.0
         for i in range(n):
-            if state[i] > 0:
+            if slipping[i] > 0:
                 u[i] += alpha * direction[i]
                 residual[i] -= alpha * product[i]
                 worst = max(worst, abs(residual[i]))
@@ -66,7 +71,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
     return False
 
 
-@jit
+@jit_inside
 def solve_increment(
     transform: Transform,
     setting: Setting,
@@ -84,7 +89,7 @@ def solve_increment(
         Slip before the step, m.
     tables : ImplicitTables
         `symbol`, `inverse` and `pushed`, the stress after the step if nothing slipped in it, are
-        read; `increment` and `state` hold the first guess, and then what is found.
+        read; `increment` and `slipping` hold the first guess, and then what is found.
     accuracy : float
         Pa.
     near : float
@@ -92,14 +97,14 @@ def solve_increment(
     """
     law, nodes = setting.law, setting.nodes
     strength, floor, weakening = nodes.strength, nodes.residual, nodes.weakening
-    u, state, pushed = tables.increment, tables.state, tables.pushed
+    u, slipping, pushed = tables.increment, tables.slipping, tables.pushed
     driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size
     for i in range(n):
         limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
-        if state[i] == 0 and pushed[i] > limit:
-            state[i] = 1
-        if state[i] == 0:
+        if slipping[i] == 0 and pushed[i] > limit:
+            slipping[i] = 1
+        if slipping[i] == 0:
             u[i] = 0.0
         start, falling[i] = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
         driving[i] = pushed[i] - start
@@ -109,19 +114,19 @@ def solve_increment(
         convolve(transform, tables.symbol, u, tables.work, product)
         changed = 0
         for i in range(n):
-            if state[i] == 0:
+            if slipping[i] == 0:
                 limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
                 if pushed[i] - product[i] > limit + 10.0 * accuracy:
-                    state[i] = 1
+                    slipping[i] = 1
                     changed += 1
             elif u[i] < 0.0:
-                state[i] = 0
+                slipping[i] = 0
                 u[i] = 0.0
                 changed += 1
             start, slope = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
             old = driving[i] + falling[i] * u[i]
             driving[i] = pushed[i] - start
-            if state[i] > 0 and abs(driving[i] + slope * u[i] - old) > near:
+            if slipping[i] > 0 and abs(driving[i] + slope * u[i] - old) > near:
                 changed += 1
             falling[i] = slope
         if changed == 0:

@@ -1,21 +1,16 @@
-"""What a run amounts to: energies, seismic moment, rupture speed."""
+"""Energies of a rupture: spent on breaking, stored in the solids, carried away by waves."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics import monitor
-from stiction.dynamics.arrays import Fields, Grid, Nodes
-from stiction.friction import FrictionLaw
-
-Floats = NDArray[np.float64]
+from stiction.dynamics.state import Floats, Grid, Nodes, State
+from stiction.friction.laws import FrictionLaw
 
 
 def fracture_energy(friction: FrictionLaw, slip: Floats, nodes: Nodes) -> Floats:
-    """Energy dissipated above the residual strength at each node, J/m2.
+    """Return the energy dissipated above the residual strength at each node, J/m2.
 
     Parameters
     ----------
@@ -29,7 +24,7 @@ def fracture_energy(friction: FrictionLaw, slip: Floats, nodes: Nodes) -> Floats
 
 
 def strain_energy(slip_hat: NDArray[np.complex128], grid: Grid) -> float:
-    """Static strain energy of a slip, J/m (on a plane J): sum over modes of K(k)|delta_k|^2/2.
+    """Return the static strain energy of a slip: sum over modes of K(k)|delta_k|^2/2; J/m or J.
 
     Parameters
     ----------
@@ -46,48 +41,12 @@ def strain_energy(slip_hat: NDArray[np.complex128], grid: Grid) -> float:
     return float(0.5 * energy * grid.cell / nodes)
 
 
-def radiated_energy(friction: FrictionLaw, nodes: Nodes, grid: Grid, fields: Fields) -> float:
-    """Energy carried away by waves, J/m: work of the load, less friction, less strain energy.
+def radiated_energy(friction: FrictionLaw, nodes: Nodes, grid: Grid, state: State) -> float:
+    """Return the energy carried away by waves, J/m: work less friction less strain energy.
 
     The stress equals the strength wherever there is slip rate, so that the work of friction follows
     from the slip alone. On a plane J.
     """
-    slip, work = fields.slip, float(fields.watch[monitor.WORK])
+    slip, work = state.slip, float(state.now["work"])
     spent = fracture_energy(friction, slip, nodes) + nodes.residual * slip
-    return work - float(spent.sum()) * grid.cell - strain_energy(fields.slip_hat, grid)
-
-
-def rupture_speed(arrival: Floats, spacings: Sequence[float], windows: Sequence[float]) -> Floats:
-    """Apparent speed of the rupture front at each node, m/s; nan where no front passed.
-
-    Parameters
-    ----------
-    arrival : (nodes,) or (nx, ny) array
-        When the front arrived (periodic in the nodes), s; nan where it never did.
-    spacings, windows : sequences of float
-        Along each direction: distance of nodes, and length over which the speed is taken, m.
-
-    Returns
-    -------
-    array of the same shape
-        1/|gradient of arrival|, each component as a difference over its window around the node,
-        where arrival is strictly monotone over the window in some direction, so that the birth of
-        patches and the meeting of fronts do not count as motion. Patches that grow ahead of the
-        front still raise the apparent speed.
-    """
-    slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
-    for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):
-        half = max(1, round(0.5 * window / spacing))
-        n = arrival.shape[axis]
-        if 2 * half >= n:
-            return np.full(arrival.shape, np.nan)
-        along = np.moveaxis(arrival, axis, -1)
-        wrapped = np.concatenate([along[..., -half:], along, along[..., :half]], axis=-1)
-        difference = np.diff(wrapped, axis=-1)
-        steps = np.lib.stride_tricks.sliding_window_view(difference, 2 * half, axis=-1)
-        monotone = np.all(steps > 0.0, axis=-1) | np.all(steps < 0.0, axis=-1)
-        change = np.abs(wrapped[..., 2 * half :] - wrapped[..., : -2 * half])
-        slowness += np.moveaxis((change / (2 * half * spacing)) ** 2, -1, axis)
-        moves |= np.moveaxis(monotone, -1, axis)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(moves, 1.0 / np.sqrt(slowness), np.nan)
+    return work - float(spent.sum()) * grid.cell - strain_energy(state.slip_hat, grid)

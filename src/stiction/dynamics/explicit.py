@@ -7,17 +7,28 @@ from typing import Any
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.dynamics import monitor
-from stiction.dynamics.arrays import ExplicitTables, Fields, Grid, Setting
-from stiction.dynamics.finish import Taken, arrived, finish_step
+from stiction.dynamics.diagnostics import Step, arrived, end_event, finish_step
 from stiction.dynamics.loading import load_at
-from stiction.dynamics.memory_layout import advance_memory, pack
+from stiction.dynamics.memory import advance_memory, pack
+from stiction.dynamics.state import (
+    ALL_SLID,
+    AT_REST,
+    DONE,
+    DROPPED,
+    NOT_FINITE,
+    TO_IMPLICIT,
+    ExplicitTables,
+    Grid,
+    Setting,
+    State,
+    Thresholds,
+)
 from stiction.elasticity.operator import backward, forward
 from stiction.friction.kernels import strength_at
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 
 
-@jit
+@jit_inside
 def _transfer(grid: Grid, slip_hat: Array, carried: Array, tables: ExplicitTables) -> None:
     """Stress `tables.moved` along the interface if the rate, in `rate_hat`, acts for a step."""
     rate_hat, fresh, shared = tables.rate_hat, tables.fresh, tables.shared
@@ -34,13 +45,13 @@ def _transfer(grid: Grid, slip_hat: Array, carried: Array, tables: ExplicitTable
     backward(grid.transform, shared, tables.moved)
 
 
-@jit
+@jit_inside
 def _predict(
-    fields: Fields, setting: Setting, tables: ExplicitTables, load: float, impedance: float
+    state: State, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
     """Slip rate `tables.guess` at the end of the step if the present one acted all along."""
     nodes, law = setting.nodes, setting.law
-    slip, rate, moved, guess = fields.slip, fields.rate, tables.moved, tables.guess
+    slip, rate, moved, guess = state.slip, state.rate, tables.moved, tables.guess
     strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
     profile, initial, step = nodes.profile, nodes.initial, tables.step
     for i in range(slip.size):
@@ -49,18 +60,18 @@ def _predict(
         guess[i] = max(moved[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
 
 
-@jit
+@jit_inside
 def _correct(
-    fields: Fields, setting: Setting, tables: ExplicitTables, load: float, impedance: float
+    state: State, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
     """Slip and stress after the step, the rate in `tables.guess`; return (work, sum of V, slid)."""
     nodes, law, step = setting.nodes, setting.law, tables.step
-    slip, rate, stress = fields.slip, fields.rate, fields.stress
+    slip, rate, stress = state.slip, state.rate, state.stress
     moved, guess = tables.moved, tables.guess
     strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
     critical, profile, initial = nodes.critical, nodes.profile, nodes.initial
     work, total, slid = 0.0, 0.0, 0
-    mean_load = 0.5 * (load + fields.watch[monitor.LOAD])
+    mean_load = 0.5 * (load + state.diagnostics[0].load)
     for i in range(slip.size):
         increment = 0.5 * step * (rate[i] + guess[i])
         fresh_slip = slip[i] + increment
@@ -77,12 +88,10 @@ def _correct(
     return work, total, slid
 
 
-@jit
-def _arrive(
-    fields: Fields, critical: Array, half: float, tables: ExplicitTables, time: float
-) -> Any:
+@jit_inside
+def _arrive(state: State, critical: Array, half: float, tables: ExplicitTables, time: float) -> Any:
     """Take over the new rate; return (largest rate, its node, sum of the slip)."""
-    slip, rate, arrival = fields.slip, fields.rate, fields.arrival
+    slip, rate, arrival = state.slip, state.rate, state.arrival
     guess, step = tables.guess, tables.step
     top, node, slip_sum = -1.0, 0, 0.0
     for i in range(slip.size):
@@ -97,30 +106,29 @@ def _arrive(
     return top, node, slip_sum
 
 
-@jit
-def _calm(watch: Array, setting: Setting, step: Taken, impedance: float, rise: float) -> Any:
-    """Count calm steps; whether there were enough of them in a row.
+@jit_inside
+def _calm(now: Any, thresholds: Thresholds, step: Step, impedance: float, rise: float) -> Any:
+    """Count calm steps; return whether there were enough of them in a row.
 
     Waves make slip rates come and go; creep is slow, or as fast as it was.
     """
-    control, scale = setting.control, watch[monitor.SCALE]
+    scale = now.scale
     quiet = step.top < (
-        control[monitor.CALM_STRESS] * scale / impedance
-        + control[monitor.CALM_SLIP] * rise / step.size
+        thresholds.calm_stress * scale / impedance + thresholds.calm_slip * rise / step.size
     )
-    before = watch[monitor.CALM_TOP]
+    before = now.calm_rate
     steady = 0.5 * before <= step.top <= 2.0 * before
-    if quiet or (steady and step.top < control[monitor.STEADY_STRESS] * scale / impedance):
-        watch[monitor.CALM_STEPS] += 1.0
+    if quiet or (steady and step.top < thresholds.steady_stress * scale / impedance):
+        now.calm_steps += 1
     else:
-        watch[monitor.CALM_STEPS], watch[monitor.CALM_TOP] = 0.0, step.top
-    return watch[monitor.CALM_STEPS] >= control[monitor.CALM_COUNT]
+        now.calm_steps, now.calm_rate = 0, step.top
+    return now.calm_steps >= thresholds.calm_count
 
 
 @jit
 def explicit_steps(
     count: int,
-    fields: Fields,
+    state: State,
     grid: Grid,
     setting: Setting,
     tables: ExplicitTables,
@@ -130,56 +138,56 @@ def explicit_steps(
 
     Parameters
     ----------
-    fields : Fields
+    state : State
         Updated; `memory` holds psi/B.
     grid, setting
     tables : ExplicitTables
-        Their room to work is overwritten.
+        The arrays to work in are overwritten.
     record : (>= count, columns) array, or with no rows to keep nothing. Three more columns for
         each station: slip, slip rate and stress.
     """
-    n, impedance, step = fields.slip.size, grid.impedance, tables.step
-    watch, control, rate_hat = fields.watch, setting.control, tables.rate_hat
-    slip_hat = fields.slip_hat
-    half = control[monitor.ARRIVAL]
+    n, impedance, step = state.slip.size, grid.impedance, tables.step
+    now, thresholds = state.diagnostics[0], setting.thresholds
+    rate_hat, slip_hat = tables.rate_hat, state.slip_hat
+    half = thresholds.arrival
     for taken in range(count):
-        time = watch[monitor.TIME] + step
+        time = now.time + step
         load = load_at(setting.load_times, setting.load_values, time)
-        forward(grid.transform, fields.rate, rate_hat)
-        _transfer(grid, slip_hat, fields.carried, tables)
-        _predict(fields, setting, tables, load, impedance)
+        forward(grid.transform, state.rate, rate_hat)
+        _transfer(grid, slip_hat, state.carried, tables)
+        _predict(state, setting, tables, load, impedance)
         forward(grid.transform, tables.guess, tables.shared)
         for q in range(rate_hat.size):
             rate_hat[q] = 0.5 * (rate_hat[q] + tables.shared[q])
-        _transfer(grid, slip_hat, fields.carried, tables)
-        work, total, slid = _correct(fields, setting, tables, load, impedance)
+        _transfer(grid, slip_hat, state.carried, tables)
+        work, total, slid = _correct(state, setting, tables, load, impedance)
         if not np.isfinite(total):
             for i in range(n):
                 if not np.isfinite(tables.guess[i]):
-                    watch[monitor.BAD_NODE] = i
+                    now.bad_node = i
                     break
-            watch[monitor.TIME] = time
-            return taken, monitor.NOT_FINITE
-        top, node, slip_sum = _arrive(fields, setting.nodes.critical, half, tables, time)
+            now.time = time
+            return taken, NOT_FINITE
+        top, node, slip_sum = _arrive(state, setting.nodes.critical, half, tables, time)
         for q in range(rate_hat.size):
             slip_hat[q] += step * rate_hat[q]
         pack(grid.place, rate_hat, tables.packed)
         advance_memory(
-            fields.memory, tables.table, tables.packed, fields.carried, grid.poles.size, grid.copies
+            state.memory, tables.table, tables.packed, state.carried, grid.poles.size, grid.copies
         )
-        rise = abs(load - watch[monitor.LOAD])
-        watch[monitor.EXPLICIT_STEPS] += 1.0
+        rise = abs(load - now.load)
+        now.explicit_steps += 1
         radiated = impedance * total / n
-        done = Taken(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
-        fall = finish_step(fields, setting, record, taken, done)
-        if slid >= control[monitor.SLID_STOP]:
-            return taken + 1, monitor.ALL_SLID
-        if control[monitor.EVENT_STOP] > 0.0 and fall > watch[monitor.EVENT_DROP]:
-            return taken + 1, monitor.DROPPED
-        if _calm(watch, setting, done, impedance, rise):
-            monitor.settle(watch, control, watch[monitor.MEAN_STRESS], radiated)
-            if control[monitor.REST_STOP] > 0.0 and watch[monitor.FIRST_STRESS] > -np.inf:
-                return taken + 1, monitor.AT_REST
-            if not control[monitor.EXPLICIT_ONLY] > 0.0:
-                return taken + 1, monitor.TO_IMPLICIT
-    return count, monitor.DONE
+        done = Step(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
+        fall = finish_step(state, setting, record, taken, done)
+        if slid >= thresholds.slid_stop:
+            return taken + 1, ALL_SLID
+        if thresholds.event_stop and fall > now.event_drop:
+            return taken + 1, DROPPED
+        if _calm(now, thresholds, done, impedance, rise):
+            end_event(now, thresholds.unstable_rate, now.mean_stress, radiated)
+            if thresholds.rest_stop and now.first_stress > -np.inf:
+                return taken + 1, AT_REST
+            if not thresholds.explicit_only:
+                return taken + 1, TO_IMPLICIT
+    return count, DONE

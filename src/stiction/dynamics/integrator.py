@@ -1,4 +1,4 @@
-"""One run: explicit steps and implicit steps, and the switch between them."""
+"""One run: explicit steps and implicit steps, the switch between them, and when it ends."""
 
 from __future__ import annotations
 
@@ -8,96 +8,44 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics import monitor
-from stiction.dynamics.arrays import ExplicitTables, Fields, ImplicitTables, Setting
-from stiction.dynamics.discretization import Medium
 from stiction.dynamics.energies import fracture_energy
 from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import implicit_steps
-from stiction.dynamics.implicit_tables import make_tables
-from stiction.dynamics.loading import History, load_at
-from stiction.dynamics.memory_layout import (
+from stiction.dynamics.loading import first_reach, load_at
+from stiction.dynamics.medium import Medium
+from stiction.dynamics.memory import (
     carry_memory,
     empty_memory,
     explicit_tables,
+    implicit_tables,
     scale_memory,
 )
-from stiction.dynamics.scale import follow_scale
-from stiction.friction import FrictionLaw
+from stiction.dynamics.state import (
+    ALL_SLID,
+    AT_REST,
+    DIAGNOSTICS,
+    DONE,
+    DROPPED,
+    NOT_FINITE,
+    RECORD,
+    TO_EXPLICIT,
+    TO_IMPLICIT,
+    ExplicitTables,
+    Floats,
+    History,
+    ImplicitTables,
+    Setting,
+    State,
+    Thresholds,
+)
 from stiction.friction.kernels import strengths
-
-Floats = NDArray[np.float64]
+from stiction.friction.laws import FrictionLaw
 
 _OVERSTRESSED = 1e-6  # of the stress scale: above the strength by so much, slip begins with waves
+_MARGIN = 1.5  # on the length from which on nothing stops a rupture: the same as equilibrium's
+_RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
 
-NOTHING = np.empty((0, monitor.COLUMNS))
-
-
-@dataclasses.dataclass(eq=False)
-class State:
-    """Everything that changes in a run; two runs from equal states are the same run, bit by bit.
-
-    Attributes
-    ----------
-    slip, rate, stress : (nodes,) arrays
-        m, m/s, Pa; flat, also on a plane.
-    slip_hat : (modes,) complex array
-        Real transform of the slip.
-    past : (nodes,) array
-        Mean slip rate in the last implicit step, m/s.
-    memory : flat array
-        Memory variables as in `memory_layout`: psi/B while explicit, psi while implicit.
-    carried : flat array
-        The memory's part of the next explicit step.
-    arrival : (nodes,) array
-        When half of the strength was lost, s; nan before.
-    watch : (monitor.FIELDS,) array
-        Time, load, work of the load, peaks, events, counts.
-    explicit : bool
-        Which kind of step comes next.
-    step : float
-        Size that the next implicit step tries, s.
-    """
-
-    slip: Floats
-    rate: Floats
-    stress: Floats
-    slip_hat: NDArray[np.complex128]
-    past: Floats
-    memory: Floats
-    carried: Floats
-    arrival: Floats
-    watch: Floats
-    explicit: bool
-    step: float
-
-    @property
-    def fields(self) -> Fields:
-        """The arrays, as compiled steps take them."""
-        return Fields(
-            self.slip, self.rate, self.stress, self.slip_hat, self.past, self.memory, self.carried,
-            self.arrival, self.watch,
-        )  # fmt: skip
-
-    @property
-    def time(self) -> float:
-        """s."""
-        return float(self.watch[monitor.TIME])
-
-    @property
-    def load(self) -> float:
-        """tau_0, Pa."""
-        return float(self.watch[monitor.LOAD])
-
-    @property
-    def mean_stress(self) -> float:
-        """Mean shear stress on the interface, Pa."""
-        return float(self.watch[monitor.MEAN_STRESS])
-
-    @property
-    def steps(self) -> int:
-        """Steps taken so far, of both kinds."""
-        return int(self.watch[monitor.EXPLICIT_STEPS] + self.watch[monitor.IMPLICIT_STEPS])
+NOTHING = np.empty((0, len(RECORD)))
 
 
 @dataclasses.dataclass(eq=False)
@@ -109,6 +57,8 @@ class Run:
     medium : Medium
     friction : FrictionLaw
     setting : Setting
+    stop : str
+        Where it ends, as `Rupture.stop`.
     steepest_rate : float
         Largest rate, Pa/m, at which a node that may break weakens at any slip.
     least_load : float
@@ -122,14 +72,15 @@ class Run:
     medium: Medium
     friction: FrictionLaw
     setting: Setting
+    stop: str
     steepest_rate: float
     least_load: float
     tables: ExplicitTables | ImplicitTables | None = None
 
     @property
-    def control(self) -> Floats:
-        """Thresholds, see `monitor`."""
-        return self.setting.control
+    def thresholds(self) -> Thresholds:
+        """When steps change or end."""
+        return self.setting.thresholds
 
     @property
     def history(self) -> History:
@@ -137,33 +88,23 @@ class Run:
         return self.setting.load_times, self.setting.load_values
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
-        """Static stress of a slip at a load, Pa: what an interface at rest carries."""
+        """Return the static stress of a slip at a load, Pa: what an interface at rest carries."""
         grid, nodes = self.medium.grid, self.setting.nodes
         interface = self.medium.interface
         stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
         shared: Floats = interface.inverse_transform(stress_hat).ravel()
         return shared + load * nodes.profile + nodes.initial
 
-    @functools.cached_property
-    def toughest(self) -> float:
-        """Largest fracture energy, J/m²: infinite if there are barriers that never break."""
-        nodes = self.setting.nodes
-        if not np.all(np.isfinite(nodes.strength)):
-            return np.inf
-        return float(fracture_energy(self.friction, nodes.critical, nodes).max())
+    def strength_after(self, slip: Floats) -> Floats:
+        """Return the strength after a slip (m), Pa."""
+        nodes, law = self.setting.nodes, self.setting.law
+        found: Floats = strengths(law, nodes.strength, nodes.residual, nodes.weakening, slip)
+        return found
 
     def scale_at(self, load: float) -> float:
-        """Stress scale of a load, at least of the earliest at which anything may run away, Pa."""
+        """Return the stress scale of a load, at least of the least that may run away, Pa."""
         setting = self.setting
         return float(load_at(setting.scale_loads, setting.scales, max(load, self.least_load)))
-
-    def strength_after(self, slip: Floats) -> Floats:
-        """Strength after a slip (m), Pa."""
-        nodes = self.setting.nodes
-        found: Floats = strengths(
-            self.setting.law, nodes.strength, nodes.residual, nodes.weakening, slip
-        )
-        return found
 
     @property
     def first_load(self) -> float:
@@ -171,96 +112,182 @@ class Run:
         nodes = self.setting.nodes
         return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
 
-    def start(self, time: float, slip: Floats | None = None) -> State:
-        """State of rest (or of an equilibrium with this slip) at a time, with an empty memory.
-
-        Where the stress is above the strength by more than round-off, explicit steps come first.
-        """
-        interface, nodes, setting = self.medium.interface, self.setting.nodes, self.setting
-        delta = np.zeros(interface.size)
-        if slip is not None:
-            delta = np.array(slip, dtype=np.float64).ravel()
-        memory, carried = empty_memory(self.medium.grid)
-        watch = np.zeros(monitor.FIELDS)
-        load = float(load_at(*self.history, time))
-        slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
-        stress = self.elastic_stress(slip_hat, load)
-        limit = self.strength_after(delta)
-        rate = np.maximum(stress - limit, 0.0) / self.medium.impedance
-        # A node that has just reached its strength has not begun to slip: drop round-off.
-        rate[rate * self.medium.impedance < 1e-12 * nodes.strength] = 0.0
-        stress = stress - self.medium.impedance * rate
-        watch[monitor.TIME], watch[monitor.LOAD] = time, load
-        watch[monitor.START_LOAD] = load
-        watch[monitor.MEAN_STRESS] = watch[monitor.PEAK_STRESS] = stress.mean()
-        watch[monitor.LOCAL_STRESS] = stress.mean()
-        watch[monitor.LOCAL_RADIATED] = self.medium.impedance * rate.mean()
-        watch[monitor.PEAK_TIME], watch[monitor.PEAK_LOAD] = time, load
-        watch[monitor.PEAK_NODE] = int(np.argmax(stress - limit))
-        watch[monitor.FIRST_STRESS] = watch[monitor.KINETIC] = -np.inf  # not yet
-        watch[monitor.BAD_NODE] = -1.0
-        least = max(load, self.least_load)
-        scale = follow_scale(watch, setting.control, setting.scale_loads, setting.scales, least)
-        watch[monitor.TOP_RATE] = rate.max()
-        watch[monitor.SLID] = np.count_nonzero(delta >= nodes.critical)
-        half = self.control[monitor.ARRIVAL] * nodes.critical
-        arrival = np.where((delta > 0.0) & (delta >= half), time, np.nan)
-        size = self.control[monitor.SMALLEST_STEP]
-        slope = self.slope(time)
-        first = 0.1 * self.control[monitor.LOAD_STEP] * scale / slope if slope > 0.0 else size
-        return State(
-            slip=delta,
-            rate=rate,
-            stress=stress,
-            slip_hat=slip_hat,
-            past=rate.copy(),
-            memory=memory,
-            carried=carried,
-            arrival=arrival,
-            watch=watch,
-            explicit=bool(
-                self.control[monitor.EXPLICIT_ONLY] > 0.0
-                or self.medium.impedance * rate.max() > _OVERSTRESSED * scale
-            ),
-            step=min(max(size, first), self.control[monitor.LARGEST_STEP]),
-        )
+    def first_slip(self) -> float:
+        """Return when the first node reaches its strength, s."""
+        return first_reach(self.history, self.first_load)
 
     def slope(self, time: float) -> float:
-        """Size of the loading rate just after a time, Pa/s."""
+        """Return the size of the loading rate just after a time, Pa/s."""
         times, values = self.history
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
-    def ended(self, state: State) -> bool:
-        """Whether the end time is reached, up to the rounding of a sum of many steps."""
-        return bool(self.control[monitor.END_TIME] - state.time <= 1e-6 * self.medium.step)
+    def start(self, time: float, slip: Floats | None = None) -> State:
+        """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
 
-    def resting(self, state: State) -> bool:
-        """Whether nothing slips and the load, beyond its last piece, never rises again."""
+        Where the stress is above the strength by more than round-off, explicit steps come first.
+        """
+        interface, nodes, thresholds = self.medium.interface, self.setting.nodes, self.thresholds
+        impedance = self.medium.impedance
+        delta = np.zeros(interface.size)
+        if slip is not None:
+            delta = np.array(slip, dtype=np.float64).ravel()
+        memory, carried = empty_memory(self.medium.grid)
+        load = float(load_at(*self.history, time))
+        slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
+        stress = self.elastic_stress(slip_hat, load)
+        limit = self.strength_after(delta)
+        rate = np.maximum(stress - limit, 0.0) / impedance
+        # A node that has just reached its strength has not begun to slip: drop round-off.
+        rate[rate * impedance < 1e-12 * nodes.strength] = 0.0
+        stress = stress - impedance * rate
+        diagnostics = np.zeros(1, DIAGNOSTICS)
+        now = diagnostics[0]
+        now["time"] = now["peak_time"] = time
+        now["load"] = now["peak_load"] = now["start_load"] = load
+        now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
+        now["local_radiated"] = impedance * rate.mean()
+        now["peak_node"] = int(np.argmax(stress - limit))
+        now["first_stress"] = now["kinetic_stress"] = -np.inf  # not yet
+        now["bad_node"] = -1
+        now["top_rate"] = rate.max()
+        now["slid"] = np.count_nonzero(delta >= nodes.critical)
+        scale = max(0.0, self.scale_at(load))
+        now["scale"] = scale
+        now["event_drop"], now["peak_width"] = (
+            thresholds.event_drop * scale,
+            thresholds.peak_width * scale,
+        )
+        front = thresholds.arrival * nodes.critical
+        arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
+        size, slope = thresholds.smallest_step, self.slope(time)
+        first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
+        explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESSED * scale
+        phase = np.array([float(explicit), min(max(size, first), thresholds.largest_step)])
+        return State(
+            delta, rate, stress, slip_hat, rate.copy(), memory, carried, arrival, diagnostics, phase
+        )
+
+    def ended(self, state: State) -> bool:
+        """Return whether the end time is reached, up to the rounding of a sum of many steps."""
+        return bool(self.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step)
+
+    def ending(self, state: State, reason: int) -> str | None:
+        """Return why a run ends here, in a word; None if it goes on."""
+        if reason in (ALL_SLID, DROPPED, AT_REST):
+            return {ALL_SLID: "sliding", DROPPED: "onset", AT_REST: "rest"}[reason]
+        if self.stop == "runaway" and self._runs_away(state):
+            return "runaway"
+        if self.ended(state):
+            return "time"
+        if self.stop != "time" and self._resting(state):
+            return "rest"
+        return None
+
+    def _resting(self, state: State) -> bool:
+        """Return whether nothing slips and the load, beyond its last piece, never rises again."""
         times, values = self.history
         return bool(
             not state.explicit
-            and state.time >= times[-1]
+            and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
             and self.medium.impedance * state.rate.max()
-            <= self.control[monitor.RESIDUAL] * state.watch[monitor.SCALE]
+            <= self.thresholds.residual * state.now["scale"]
         )
+
+    @functools.cached_property
+    def _largest_fracture_energy(self) -> float:
+        """J/m²; infinite if there are barriers that never break."""
+        nodes = self.setting.nodes
+        if not np.all(np.isfinite(nodes.strength)):
+            return np.inf
+        return float(fracture_energy(self.friction, nodes.critical, nodes).max())
+
+    def _runs_away(self, state: State) -> bool:
+        """Return whether so many nodes in a row are at their residual that the rest must follow.
+
+        A crack of half-length a with the stress drop D releases pi a D²/(2 G*) at each tip
+        (Griffith), and more as it grows or the load rises; the largest fracture energy of the
+        interface is what it has to pay. Barriers that never break pay any price.
+        """
+        nodes, medium, now = self.setting.nodes, self.medium, state.now
+        if not (now["slid"] > 0 and now["in_event"]):
+            return False
+        drop = float((now["load"] * nodes.profile + nodes.initial - nodes.residual).min())
+        if drop <= 0.0:
+            return False
+        length = 4.0 * medium.effective_modulus * self._largest_fracture_energy
+        needed = _MARGIN * (length / (np.pi * drop**2)) / medium.grid.cell
+        return bool(now["slid"] >= needed and longest_row(state.slip >= nodes.critical) >= needed)
+
+    def follow(self, state: State, most: int) -> tuple[str | None, int]:
+        """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
+
+        The word is None if it has not ended: the code is then NOT_FINITE, or DONE after the steps.
+        """
+        portion = _RUNAWAY_STEPS if self.stop == "runaway" else _STEPS
+        reason = DONE
+        while state.steps < most:
+            _, reason = self.advance(state, min(portion, most - state.steps))
+            if reason == NOT_FINITE:
+                return None, reason
+            if word := self.ending(state, reason):
+                return word, reason
+        return None, reason
+
+    def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
+        """Take up to `count` steps in place; return (steps taken, why it returned).
+
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
+        or NOT_FINITE. Rows of `record` are filled, one a step.
+        """
+        taken = 0
+        while taken < count:
+            part = record[taken:] if record.shape[0] else NOTHING
+            steps = self._explicit if state.explicit else self._implicit
+            more, reason = steps(state, count - taken, part)
+            taken += more
+            if reason == TO_EXPLICIT:
+                self._to_explicit(state)
+            elif reason == TO_IMPLICIT:
+                self._to_implicit(state)
+            elif reason != DONE or taken >= count:
+                return taken, reason
+            elif self.ended(state):
+                return taken, DONE
+        return taken, DONE
+
+    def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        medium = self.medium
+        left = self.thresholds.end_time - state.now["time"]
+        if left < count * medium.step:
+            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
+        taken, reason = explicit_steps(
+            count, state, medium.grid, self.setting, self._explicit_tables(), record
+        )
+        return int(taken), int(reason)
+
+    def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        tables = self._implicit_tables()
+        taken, size, reason = implicit_steps(
+            count, float(state.phase[1]), state, self.medium.grid, self.setting, tables, record
+        )
+        state.phase[1] = size
+        return int(taken), int(reason)
 
     def _to_explicit(self, state: State) -> None:
         grid, tables = self.medium.grid, self._explicit_tables()
         scale_memory(grid, state.memory, tables.step, divide=True)
         carry_memory(state.memory, tables.table, state.carried, grid.poles.size, grid.copies)
-        state.explicit = True
-        state.watch[monitor.CALM_STEPS] = 0.0
-        state.watch[monitor.CALM_TOP] = state.rate.max()
+        state.phase[0] = 1.0
+        state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
 
     def _to_implicit(self, state: State) -> None:
         scale_memory(self.medium.grid, state.memory, self.medium.step, divide=False)
-        state.explicit = False
-        state.past = state.rate.copy()
-        state.watch[monitor.PAST_STEP] = 0.0  # the first implicit step is one of first order
-        state.watch[monitor.RADIATED] = self.medium.impedance * state.rate.mean()
-        state.step = 2.0 * float(self.control[monitor.SMALLEST_STEP])
+        state.past[:] = state.rate
+        state.phase[:] = 0.0, 2.0 * self.thresholds.smallest_step
+        state.now["past_step"] = 0.0  # the first implicit step is one of first order
+        state.now["radiated"] = self.medium.impedance * state.rate.mean()
 
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):
@@ -272,47 +299,13 @@ class Run:
     def _implicit_tables(self) -> ImplicitTables:
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None
-            self.tables = make_tables(self.medium.grid)
+            self.tables = implicit_tables(self.medium.grid)
         return self.tables
 
-    def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
-        """Take up to `count` steps in place; return (steps taken, why it returned).
 
-        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
-        or NOT_FINITE of `monitor`. Rows of `record` are filled, one a step.
-        """
-        taken = 0
-        while taken < count:
-            part = record[taken:] if record.shape[0] else NOTHING
-            if state.explicit:
-                fresh, reason = self._explicit(state, count - taken, part)
-            else:
-                fresh, reason = self._implicit(state, count - taken, part)
-            taken += fresh
-            if reason == monitor.TO_EXPLICIT:
-                self._to_explicit(state)
-            elif reason == monitor.TO_IMPLICIT:
-                self._to_implicit(state)
-            elif reason != monitor.DONE or taken >= count:
-                return taken, reason
-            elif self.ended(state):
-                return taken, monitor.DONE
-        return taken, monitor.DONE
-
-    def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
-        medium = self.medium
-        left = self.control[monitor.END_TIME] - state.time
-        if left < count * medium.step:
-            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
-        taken, reason = explicit_steps(
-            count, state.fields, medium.grid, self.setting, self._explicit_tables(), record
-        )
-        return int(taken), int(reason)
-
-    def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
-        taken, size, reason = implicit_steps(
-            count, state.step, state.fields, self.medium.grid, self.setting,
-            self._implicit_tables(), record,
-        )  # fmt: skip
-        state.step = float(size)
-        return int(taken), int(reason)
+def longest_row(marked: NDArray[np.bool_]) -> int:
+    """Return the length of the longest row of marked nodes on a circle, (nodes,) bool."""
+    others = np.flatnonzero(~marked)
+    if others.size == 0:
+        return int(marked.size)
+    return int(np.diff(others, append=others[0] + marked.size).max()) - 1

@@ -6,15 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.arrays import Array
+from stiction.dynamics.state import Floats, History
 from stiction.errors import InputError
 from stiction.jit import jit
 from stiction.model import describe
-
-Floats = NDArray[np.float64]
-History = tuple[Floats, Floats]
 
 _SMOOTHNESS = 1e-7  # of the range of the load: how far straight pieces may miss a callable
 _MOST_PIECES = 200_000
@@ -35,16 +32,11 @@ def load_at(times: Array, values: Array, t: float) -> Any:
 
 
 def turns(history: History) -> Floats:
-    """Times at which the load begins to fall or to rise again, s."""
+    """Return the times at which the load begins to fall or to rise again, s."""
     times, values = history
     rising = np.sign(np.diff(values))
     turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
     return turned
-
-
-def uniform_rate(rate: float) -> History:
-    """tau_0 = rate t, without end."""
-    return np.array([0.0, 1.0]), np.array([0.0, rate])
 
 
 def _sampled(function: Callable[[float], float], end: float) -> History:
@@ -82,7 +74,7 @@ def _sampled(function: Callable[[float], float], end: float) -> History:
 
 
 def load_history(load: Any, end_time: float | None) -> History:
-    """Times (s) and values (Pa) of tau_0 from a callable, or from samples.
+    """Return times (s) and values (Pa) of tau_0 from a callable, or from samples.
 
     Parameters
     ----------
@@ -125,7 +117,7 @@ def load_history(load: Any, end_time: float | None) -> History:
 
 
 def first_reach(history: History, target: float, what: str = "first slip") -> float:
-    """First time at which tau_0 reaches `target`, s; `what` says in messages why it must.
+    """Return when tau_0 first reaches `target`, s; `what` says in messages why it must.
 
     Raises
     ------

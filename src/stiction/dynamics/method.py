@@ -6,38 +6,35 @@ from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pydantic
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
-from stiction.dynamics import monitor
-from stiction.dynamics.arrays import Nodes, Setting
 from stiction.dynamics.checks import (
     SLOWEST,
     check_finite,
-    check_pace,
+    check_start,
     warn_if_coarse,
-    warn_if_reversed_before,
     warn_if_unresolved,
 )
-from stiction.dynamics.discretization import Medium, prepare_medium, refused_laws
-from stiction.dynamics.integrator import Run, State
-from stiction.dynamics.loading import History, first_reach, turns, uniform_rate
-from stiction.dynamics.runaway import refused_stop, runs_away
-from stiction.dynamics.scale import stress_scale
+from stiction.dynamics.diagnostics import stress_scale
+from stiction.dynamics.integrator import Run
+from stiction.dynamics.loading import load_history, turns
+from stiction.dynamics.medium import Medium, prepare_medium, refused_laws
 from stiction.dynamics.slow_start import slow_start, static_setting
+from stiction.dynamics.state import Nodes, Setting, State, Thresholds
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
-from stiction.friction import FrictionLaw
+from stiction.friction.laws import FrictionLaw
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.model import Count, Positive, _number, model
 from stiction.problem import Problem, Sample, steepest_rate
 from stiction.results import Variable, onset_variables
 
-Floats = NDArray[np.float64]
 Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
 
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
-_CALM_STEPS = 300.0
+_CALM_STEPS = 300
 _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
 _STEADY_STRESS = 1e-2  # Z V of creep, likewise
 # Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
@@ -46,15 +43,27 @@ _UNSTABLE_STRESS = 0.075
 _SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
 _GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
-_PORTION = 32  # steps between two looks at whether a rupture can still be stopped
-
 Start = Literal["equilibrium", "rest"]
-Stop = Literal["sliding", "onset", "rest", "runaway"]
+Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
 # Not known yet when a run stops at its onset; the events are once it runs away.
 _LATER = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
     "arrested_events", "rupture_speed", "median_rupture_speed",
 )  # fmt: skip
+
+
+def _history(value: Any, info: pydantic.ValidationInfo) -> Any:
+    """Times and values of a load, or None."""
+    return None if value is None else load_history(value, info.data.get("end_time"))
+
+
+LoadHistory = Annotated[
+    Any,
+    BeforeValidator(_history),
+    PlainSerializer(lambda value: None if value is None else [one.tolist() for one in value]),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
+]
+"""tau_0(t): (times, values), or a function that is sampled up to the end time."""
 
 
 @model(kw_only=True)
@@ -69,8 +78,8 @@ class Rupture:
 
     Parameters
     ----------
-    loading_rate : float
-        d tau_0/dt, Pa/s, positive.
+    loading_rate : float, optional
+        d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
     kernel_tolerance : float
         Error allowed in the memory kernel C(T) by its sum of exponentials (1). The sum is fitted
         once a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
@@ -95,7 +104,16 @@ class Rupture:
         the first slip and `start_error` is 0: at a loading rate too fast for it, on planes, with
         laws without straight pieces, barriers or stress above the strength, where a node loses
         half of its strength before, and on grids too fine for `Equilibrium`.
-    stop : {"sliding", "onset", "rest", "runaway"}
+    end_time : float, optional
+        s; a run never goes beyond it, except for a part of the last explicit step.
+    load : (times, values) or function, optional
+        tau_0(t), Pa, for t >= 0 in s, instead of a constant rate; samples are joined by straight
+        lines, and the last slope goes on. A function needs `end_time`, up to which it is sampled.
+        It must not fall before the first slip, and runs begin there.
+    arrival : float
+        Share of its way to the residual that the strength of a node has lost when the front has
+        arrived there, in (0, 1]: 0.5 is the middle of the cohesive zone, 1e-3 its tip.
+    stop : {"sliding", "onset", "rest", "runaway", "time"}
         "sliding": when every node that can break is at its residual strength. "onset": when the
         first instability has begun; critical values are those of that maximum of the mean stress,
         even if the instability would be arrested later, and what comes after it is nan (kinetic
@@ -105,7 +123,8 @@ class Rupture:
         it slides, and the rest is that of the arrested event. "runaway": when the rupture has
         grown so long that no fracture energy of the interface can stop it (Griffith), or slides:
         all loads and `arrested_events` are known then, what "onset" leaves nan is nan but for
-        those. Lines only.
+        those. Lines only. "time": at `end_time`. Unless it waits for that, a run also ends where
+        nothing slips and the load has stopped rising for good.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -119,10 +138,11 @@ class Rupture:
     Notes
     -----
     `critical_stress` is the largest mean shear stress on the interface, `critical_load` the load
-    factor that carries it statically, `applied_load` the one applied at that moment, somewhat
-    higher; the difference is radiated. An instability begins when the mean stress has fallen by
-    `event_drop` below its last maximum, not counting what the load itself goes down.
-    `arrested_events` counts those in which a node slips so fast that Z V, Z = G/(2 c_s), exceeds
+    factor that carries it statically (nan where nothing became unstable, or where an overstressed
+    patch slipped at the start and the mean stress was never as high again), `applied_load` the one
+    applied at that moment, somewhat higher; the difference is radiated. An instability begins when
+    the mean stress has fallen by `event_drop` below its last maximum, not counting what the load
+    itself goes down. `arrested_events` counts those in which a node slips so fast that Z V exceeds
     7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all is calm:
     the waves after an event, and the creep that they modulate, stay slower at any loading rate.
     `Equilibrium` also counts jumps too small to reach that slip rate.
@@ -136,7 +156,9 @@ class Rupture:
     Boundary integral in Fourier space: Breitenfeld and Geubelle (1998).
     """
 
-    loading_rate: Positive
+    loading_rate: Positive | None = None
+    end_time: Positive | None = None
+    load: LoadHistory = None
     kernel_tolerance: Positive = 1e-6
     memory_range: Positive = 1e5
     courant: Fraction = 0.9
@@ -145,12 +167,24 @@ class Rupture:
     load_step: Fraction = 1e-3
     event_drop: Fraction = 1e-4
     implicit: bool = True
+    arrival: Fraction = 0.5
     start: Start = "equilibrium"
     stop: Stop = "sliding"
     max_steps: Count = 5_000_000
     type: Literal["rupture"] = "rupture"
-    # What else `Problem.rows` may let through.
+    # What else `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
+
+    @pydantic.model_validator(mode="after")
+    def _consistent(self) -> Rupture:
+        problems = []
+        if (self.loading_rate is None) == (self.load is None):
+            problems.append("loading_rate: give it or `load`, and not both")
+        if self.stop == "time" and self.end_time is None:
+            problems.append("end_time: needed with stop='time', got None")
+        if problems:
+            raise InputError(problems)
+        return self
 
     @property
     def chunk_size(self) -> int:
@@ -173,14 +207,19 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        return refused_laws(problem) + refused_stop(problem, self.stop)
+        refused = refused_laws(problem)
+        if self.stop == "runaway" and problem.interface.is_plane:
+            refused.append(
+                "stop: 'runaway' is known of lines only; on a plane stop at 'sliding' or 'onset'"
+            )
+        return refused
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """What the solver returns for each sample."""
+        """Return what the solver returns for each sample."""
         return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
-        """Kernel and tables for a problem."""
+        """Return kernel and tables for a problem."""
         return prepare_medium(
             problem,
             tolerance=self.kernel_tolerance,
@@ -190,42 +229,41 @@ class Rupture:
         )
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """A solver for rows of this problem; the kernel is fitted here, once."""
+        """Return a solver of samples of this problem; the kernel is fitted here, once."""
         medium = self.medium(problem)
-        history = uniform_rate(self.loading_rate)
-        wanted = self.start == "equilibrium" and self.implicit
-        static = static_setting(problem) if wanted else None
+        static = None
+        if self.start == "equilibrium" and self.implicit and self.loading_rate is not None:
+            static = static_setting(problem)
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             warn_if_coarse(problem, rows)
             found = []
             for i in range(rows.samples):
-                run = make_run(self, problem.friction, medium, rows, i, history)
-                begun = None
-                if static is not None:
-                    begun = slow_start(static, run, rows, i, self.loading_rate)
-                found.append(self._one(problem, run, begun))
+                run = make_run(self, problem.friction, medium, rows, i)
+                state = None
+                if static is not None and self.loading_rate is not None:
+                    state = slow_start(static, run, rows, i, self.loading_rate)
+                found.append(self._one(problem, run, state))
             return {
                 name: np.array([one[name] for one in found]) for name in self.variables(problem)
             }
 
         return solve
 
-    def _one(self, problem: Problem, run: Run, begun: State | None) -> dict[str, Any]:
-        time = first_slip(run)
-        check_pace(run, time)
-        warn_if_reversed_before(run, time)
-        state = run.start(time) if begun is None else begun
-        reason = self._advance(run, state)
+    def _one(self, problem: Problem, run: Run, state: State | None) -> dict[str, Any]:
+        time = run.first_slip()
+        check_start(run, time)
+        state = run.start(time) if state is None else state
+        ended, reason = run.follow(state, self.max_steps)
         check_finite(run, state, reason)
-        if reason == monitor.DONE:
-            slid, breakable = state.watch[monitor.SLID], run.control[monitor.BREAKABLE]
+        if ended is None:
+            now = state.now
             raise InputError(
                 f"max_steps: {self.max_steps} steps were taken before the run came to stop="
-                f"{self.stop!r} (at t = {state.time:.6g} s, tau_0 = {state.load:.6g} Pa, with "
-                f"{slid:.0f} of {breakable:.0f} nodes at their residual strength); raise max_steps "
-                "or the loading rate, stop at 'onset', 'rest' or 'runaway', or give barriers that "
-                "never break an infinite strength"
+                f"{self.stop!r} (at t = {now['time']:.6g} s, tau_0 = {now['load']:.6g} Pa, with "
+                f"{now['slid']} of {run.thresholds.breakable} nodes at their residual strength);"
+                " raise max_steps or the loading rate, stop at 'onset', 'rest' or 'runaway', or "
+                "give barriers that never break an infinite strength"
             )
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
@@ -234,17 +272,6 @@ class Rupture:
             found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
         return found
 
-    def _advance(self, run: Run, state: State) -> int:
-        """Go on until the run is to stop; returns why."""
-        if self.stop != "runaway":
-            return run.advance(state, self.max_steps)[1]
-        reason = monitor.DONE
-        while reason == monitor.DONE and state.steps < self.max_steps:
-            _, reason = run.advance(state, min(_PORTION, self.max_steps - state.steps))
-            if reason == monitor.DONE and runs_away(run, state):
-                return monitor.RUNAWAY
-        return reason
-
 
 def make_run(
     method: Rupture,
@@ -252,51 +279,35 @@ def make_run(
     medium: Medium,
     rows: Sample,
     sample: int,
-    history: History,
+    stations: NDArray[np.int64] | None = None,
 ) -> Run:
-    """The run of one sample."""
+    """Return the run of one sample, which records what happens at some nodes."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     finite = np.isfinite(strength)
-    critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
+    with np.errstate(over="ignore"):
+        critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
+    if not np.all(np.isfinite(critical[finite])):
+        raise InputError(
+            f"friction: a weakening rate of {weakening.min():.3g} Pa/m takes infinitely much slip;"
+            " check its unit"
+        )
     every = (strength, residual, weakening, critical, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in every))
-    scale = stress_scale(nodes)
-    control = np.zeros(monitor.CONTROLS)
-    control[monitor.BREAKABLE] = np.count_nonzero(finite)
-    set_stop(control, method.stop)
-    # Calm: for as long as shear waves need to cross the interface, nothing slips faster than a
-    # crack of half its length does when the load alone drives it, or nothing faster than before.
-    control[monitor.CALM_STRESS], control[monitor.STEADY_STRESS] = _CALM_STRESS, _STEADY_STRESS
-    interface, pace = medium.interface, medium.grid.pace
-    control[monitor.CALM_SLIP] = max(interface.lengths) / medium.effective_modulus
-    crossing = 2.0 * np.pi / pace[pace > 0.0].min() / medium.step
-    control[monitor.CALM_COUNT] = max(_CALM_STEPS, np.ceil(crossing))
-    control[monitor.SLIP_STEP] = method.slip_step
-    control[monitor.SMALL_DROP] = _SMALL_DROP
-    control[monitor.LOAD_STEP] = method.load_step
-    control[monitor.SMALLEST_STEP] = _SWITCH * medium.step
-    control[monitor.RESIDUAL] = 1e-9
-    control[monitor.LARGEST_STEP], control[monitor.END_TIME] = SLOWEST, np.inf
-    control[monitor.EVENT_DROP_SIZE] = method.event_drop
-    typical = np.median((nodes.strength - nodes.residual)[finite.ravel()])
-    control[monitor.UNSTABLE_RATE] = _UNSTABLE_STRESS * typical / medium.impedance
-    control[monitor.PEAK_WIDTH_SIZE] = 1e-5
-    control[monitor.NOTICED] = 1e-7
-    control[monitor.GROWTH] = _GROWTH
-    control[monitor.NEGLIGIBLE] = 5e-7
-    control[monitor.ARRIVAL] = friction.slip_at(0.5) / friction.reach
-    control[monitor.CURVED] = 0.0 if friction.linear else 1.0
-    control[monitor.EXPLICIT_ONLY] = 0.0 if method.implicit else 1.0
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
     # Half a nucleation length: of a line, or on a plane along x times along y.
+    interface = medium.interface
     moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
     half = np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli])
     weakens = finite & (critical > 0.0)
     loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
     weakest = round(min(max(half / interface.cell, 1.0), loads.size))
     least = float(np.partition(loads, weakest - 1)[:weakest].mean())
+    history = method.load
+    if history is None:
+        history = np.array([0.0, 1.0]), np.array([0.0, method.loading_rate])
+    scale = stress_scale(nodes)
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
@@ -307,19 +318,47 @@ def make_run(
         turns=turns(history),
         scale_loads=scale[0],
         scales=scale[1],
-        control=control,
-        stations=np.empty(0, dtype=np.int64),
+        thresholds=_thresholds(method, friction, medium, nodes),
+        stations=np.empty(0, dtype=np.int64) if stations is None else stations,
     )
-    return Run(medium, friction, setting, steepest, least)
+    return Run(medium, friction, setting, method.stop, steepest, least)
 
 
-def set_stop(control: Floats, stop: str) -> None:
-    """Where a run returns: at one of `Stop`, or, for "time", only at its end time."""
-    control[monitor.SLID_STOP] = np.inf if stop == "time" else control[monitor.BREAKABLE]
-    control[monitor.EVENT_STOP] = stop == "onset"
-    control[monitor.REST_STOP] = stop == "rest"
+def _thresholds(method: Rupture, friction: FrictionLaw, medium: Medium, nodes: Nodes) -> Thresholds:
+    """When steps change or end.
 
-
-def first_slip(run: Run) -> float:
-    """When the first node reaches its strength, s."""
-    return first_reach(run.history, run.first_load)
+    Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack
+    of half its length does when the load alone drives it, or nothing faster than before.
+    """
+    finite = np.isfinite(nodes.strength)
+    breakable = int(np.count_nonzero(finite))
+    frequency = medium.grid.frequency
+    crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
+    typical = float(np.median((nodes.strength - nodes.residual)[finite]))
+    arrival = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
+    return Thresholds(
+        slid_stop=np.inf if method.stop == "time" else float(breakable),
+        event_stop=method.stop == "onset",
+        rest_stop=method.stop == "rest",
+        end_time=np.inf if method.end_time is None else method.end_time,
+        breakable=breakable,
+        calm_stress=_CALM_STRESS,
+        calm_slip=max(medium.interface.lengths) / medium.effective_modulus,
+        steady_stress=_STEADY_STRESS,
+        calm_count=max(_CALM_STEPS, int(np.ceil(crossing))),
+        slip_step=method.slip_step,
+        small_drop=_SMALL_DROP,
+        load_step=method.load_step,
+        smallest_step=_SWITCH * medium.step,
+        largest_step=SLOWEST,
+        residual=1e-9,
+        event_drop=method.event_drop,
+        unstable_rate=_UNSTABLE_STRESS * typical / medium.impedance,
+        noticed=1e-7,
+        growth=_GROWTH,
+        peak_width=1e-5,
+        negligible=5e-7,
+        arrival=float(arrival),
+        curved=not friction.linear,
+        explicit_only=not method.implicit,
+    )

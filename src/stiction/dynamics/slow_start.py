@@ -14,19 +14,16 @@ what is wrong with the state and, as a stress, by how much the onset can be misp
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction.dynamics import monitor
 from stiction.dynamics.energies import radiated_energy
-from stiction.dynamics.implicit_tables import remember_growth
-from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.integrator import Run
+from stiction.dynamics.memory import grown_memory
+from stiction.dynamics.state import State
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.sample import Sample as StaticSample
 from stiction.equilibrium.sample import exceeds, refused
 from stiction.errors import InputError
 from stiction.problem import Problem, Sample
-
-Floats = NDArray[np.float64]
 
 _TOLERANCE = 2e-5  # of the stress scale: a fifth of the fall that counts as an event
 _CROSSINGS = 10.0  # of h_n by shear waves: how long before the onset the first trial begins
@@ -82,10 +79,10 @@ def slow_start(
         found = _at(setting, run, static, onset.load, distance, rate)
         if found is None:
             distance *= 4.0
-        elif found.watch[monitor.START_ERROR] <= asked:
+        elif found.now["start_error"] <= asked:
             return found
         else:  # V falls as distance^(-1/2), its second derivative as distance^(-5/2)
-            distance *= 1.2 * (found.watch[monitor.START_ERROR] / asked) ** 0.4
+            distance *= 1.2 * (found.now["start_error"] / asked) ** 0.4
     return None
 
 
@@ -105,7 +102,7 @@ def _at(
     if exceeds(static, here.slip):
         return None
     weakens = nodes.critical > 0.0
-    half = run.control[monitor.ARRIVAL] * nodes.critical
+    half = run.thresholds.arrival * nodes.critical
     if np.any(here.slip[weakens] >= half[weakens]) or np.any(here.slip[~weakens] > 0.0):
         return None
     interval, growth = back / rate, 0.5 * rate / distance
@@ -115,20 +112,18 @@ def _at(
     applied = load + radiated / run.setting.mean_profile
     state = run.start(applied / rate, here.slip)
     rate_hat = run.medium.interface.transform(slip_rate)
-    memory = remember_growth(grid, state.memory, rate_hat, growth)
+    memory = grown_memory(grid, state.memory, rate_hat, growth)
     pushed = run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
     stress = run.elastic_stress(state.slip_hat, applied) + pushed
     stress -= run.medium.impedance * slip_rate
     missed = np.abs(stress - run.strength_after(here.slip))[here.slip > 0.0]
     state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
-    state.explicit = False
-    watch = state.watch
-    watch[monitor.PAST_STEP], watch[monitor.TOP_RATE] = interval, slip_rate.max()
-    for field in (monitor.MEAN_STRESS, monitor.PEAK_STRESS, monitor.LOCAL_STRESS):
-        watch[field] = stress.mean()
-    for field in (monitor.LOCAL_RADIATED, monitor.RADIATED):
-        watch[field] = radiated
+    state.phase[0] = 0.0
+    now = state.now
+    now["past_step"], now["top_rate"] = interval, slip_rate.max()
+    now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
+    now["local_radiated"] = now["radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
-    watch[monitor.WORK] -= radiated_energy(run.friction, nodes, grid, state.fields)
-    watch[monitor.START_ERROR] = missed.max(initial=0.0)
+    now["work"] -= radiated_energy(run.friction, nodes, grid, state)
+    now["start_error"] = missed.max(initial=0.0)
     return state

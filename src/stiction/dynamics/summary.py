@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction.dynamics import monitor
 from stiction.dynamics.checks import resolves_steps
-from stiction.dynamics.energies import fracture_energy, radiated_energy, rupture_speed
-from stiction.dynamics.integrator import Run, State
+from stiction.dynamics.energies import fracture_energy, radiated_energy
+from stiction.dynamics.integrator import Run
+from stiction.dynamics.state import Floats, State
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.results import Variable, position
-
-Floats = NDArray[np.float64]
 
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
@@ -56,25 +53,19 @@ def scalars(interface: Interface) -> dict[str, Variable]:
 
 
 def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
-    """Lengths, m, over which speeds are taken along x and y, in units of the shortest h_n there."""
+    """Return the lengths, m, of which speeds are means, in units of the shortest h_n there."""
     interface = problem.interface
-    moduli = (
-        problem.effective_modulus,
-        problem.solid.shear_modulus,
-    )  # mode II along x, III along y
-    unit = problem.nucleation_lengths(run.steepest_rate)[0] / problem.effective_modulus
-    return [
-        min(max(lengths * unit * modulus, 8.0 * spacing), 0.25 * length)
-        for modulus, spacing, length in zip(
-            moduli, interface.spacings, interface.lengths, strict=False
-        )
-    ]
+    windows = zip(
+        problem.nucleation_lengths(run.steepest_rate), interface.spacings, interface.lengths,
+        strict=True,
+    )  # fmt: skip
+    return [min(max(lengths * one, 8.0 * spacing), 0.25 * end) for one, spacing, end in windows]
 
 
 def front_speed(problem: Problem, run: Run, state: State) -> Floats:
     """Apparent speed of the front, m/s, over half of the shortest h_n, of the interface's shape."""
     interface = problem.interface
-    if not resolves_steps(run, state.time):
+    if not resolves_steps(run, float(state.now["time"])):
         return np.full(interface.shape, np.nan)
     arrival = state.arrival.reshape(interface.shape)
     return rupture_speed(arrival, interface.spacings, _windows(problem, run, 0.5))
@@ -83,10 +74,10 @@ def front_speed(problem: Problem, run: Run, state: State) -> Floats:
 def _axis_speeds(problem: Problem, run: Run, state: State, lengths: float) -> list[Floats]:
     """Apparent speeds of the front along each axis, on the lines through where it began."""
     interface = problem.interface
-    if not resolves_steps(run, state.time):
+    if not resolves_steps(run, float(state.now["time"])):
         return [np.full(n, np.nan) for n in interface.shape]
     arrival = state.arrival.reshape(interface.shape)
-    began = np.unravel_index(int(state.watch[monitor.PEAK_NODE]), interface.shape)
+    began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
     windows = _windows(problem, run, lengths)
     found = []
     for axis, (spacing, window) in enumerate(zip(interface.spacings, windows, strict=True)):
@@ -106,35 +97,78 @@ def _per_direction(values: list[float]) -> Any:
 
 
 def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
-    """The scalars of a finished run."""
-    medium, watch, setting = run.medium, state.watch, run.setting
-    peak = float(watch[monitor.PEAK_STRESS])
-    first = float(watch[monitor.FIRST_STRESS])
-    far, near = (_axis_speeds(problem, run, state, lengths) for lengths in (2.0, 0.5))
-    kinetic = float(watch[monitor.KINETIC])
+    """Return the scalars of a finished run.
+
+    The critical load is nan where nothing became unstable, or where the largest mean stress is that
+    of an overstressed start: no load carries it.
+    """
+    medium, now, setting = run.medium, state.now, run.setting
+    peak, first = float(now["peak_stress"]), float(now["first_stress"])
+    kinetic = float(now["kinetic_stress"])
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
+    far, near = (_axis_speeds(problem, run, state, lengths) for lengths in (2.0, 0.5))
     dissipated = fracture_energy(run.friction, state.slip, setting.nodes)
     interface, cell = medium.interface, medium.interface.cell
-    node = np.unravel_index(int(watch[monitor.PEAK_NODE]), interface.shape)
+    node = np.unravel_index(int(now["peak_node"]), interface.shape)
+    load = (peak - setting.mean_initial) / setting.mean_profile
+    # Creep radiates next to nothing where a run starts; an overstressed patch, far more.
+    carried = load >= now["start_load"] - 1e-4 * now["scale"]
+    unstable = np.isfinite(first) or np.isfinite(kinetic)
     return {
-        "critical_load": (peak - setting.mean_initial) / setting.mean_profile,
+        "critical_load": load if carried and unstable else np.nan,
         "critical_stress": peak,
         "first_instability": first if np.isfinite(first) else peak,
         "critical_position": _per_direction(
             [i * spacing for i, spacing in zip(node, interface.spacings, strict=True)]
         ),
-        "applied_load": float(watch[monitor.PEAK_LOAD]),
-        "onset_time": float(watch[monitor.PEAK_TIME]),
+        "applied_load": float(now["peak_load"]),
+        "onset_time": float(now["peak_time"]),
         "kinetic_stress": kinetic,
         "stress_drop": peak - kinetic,
         "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
-        "radiated_energy": radiated_energy(run.friction, setting.nodes, medium.grid, state.fields),
+        "radiated_energy": radiated_energy(run.friction, setting.nodes, medium.grid, state),
         "fracture_energy": float(dissipated.sum()) * cell,
-        "arrested_events": int(watch[monitor.ARRESTED]),
+        "arrested_events": int(now["arrested"]),
         "rupture_speed": _per_direction([_of_finite(np.max, speeds) for speeds in far]),
         "median_rupture_speed": _per_direction([_of_finite(np.median, speeds) for speeds in near]),
-        "start_load": float(watch[monitor.START_LOAD]),
-        "start_error": float(watch[monitor.START_ERROR]),
-        "implicit_steps": int(watch[monitor.IMPLICIT_STEPS]),
-        "explicit_steps": int(watch[monitor.EXPLICIT_STEPS]),
+        "start_load": float(now["start_load"]),
+        "start_error": float(now["start_error"]),
+        "implicit_steps": int(now["implicit_steps"]),
+        "explicit_steps": int(now["explicit_steps"]),
     }
+
+
+def rupture_speed(arrival: Floats, spacings: Sequence[float], windows: Sequence[float]) -> Floats:
+    """Return the apparent speed of the front at each node, m/s; nan where no front passed.
+
+    Parameters
+    ----------
+    arrival : (nodes,) or (nx, ny) array
+        When the front arrived (periodic in the nodes), s; nan where it never did.
+    spacings, windows : sequences of float
+        Along each direction: distance of nodes, and length over which the speed is taken, m.
+
+    Returns
+    -------
+    array of the same shape
+        1/|gradient of arrival|, each component as a difference over its window around the node,
+        where arrival is strictly monotone over the window in some direction, so that the birth of
+        patches and the meeting of fronts do not count as motion. Patches that grow ahead of the
+        front still raise the apparent speed.
+    """
+    slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
+    for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):
+        half = max(1, round(0.5 * window / spacing))
+        n = arrival.shape[axis]
+        if 2 * half >= n:
+            return np.full(arrival.shape, np.nan)
+        along = np.moveaxis(arrival, axis, -1)
+        wrapped = np.concatenate([along[..., -half:], along, along[..., :half]], axis=-1)
+        difference = np.diff(wrapped, axis=-1)
+        steps = np.lib.stride_tricks.sliding_window_view(difference, 2 * half, axis=-1)
+        monotone = np.all(steps > 0.0, axis=-1) | np.all(steps < 0.0, axis=-1)
+        change = np.abs(wrapped[..., 2 * half :] - wrapped[..., : -2 * half])
+        slowness += np.moveaxis((change / (2 * half * spacing)) ** 2, -1, axis)
+        moves |= np.moveaxis(monotone, -1, axis)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(moves, 1.0 / np.sqrt(slowness), np.nan)

@@ -15,6 +15,7 @@ import tomli_w
 import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
+from stiction.dynamics.save import Save
 from stiction.ensemble.batches import AnyExecutor
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import part_with_values
@@ -78,6 +79,8 @@ class Study:
         Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
         of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
         the sweep has the same samples.
+    save : Save, optional
+        What `stiction rupture` keeps of one rupture, and where its stations are.
     title : str
         For people.
 
@@ -109,6 +112,7 @@ class Study:
     method: AnyMethod
     ensemble: Ensemble
     sweep: Sweep = ()
+    save: Save | None = None
     title: str = ""
 
     @model_validator(mode="after")
@@ -356,8 +360,8 @@ def study_schema() -> dict[str, Any]:
     return pydantic.TypeAdapter(Study).json_schema()
 
 
-def read_setup(path: Path) -> tuple[Problem, Any]:
-    """Return the problem of a study file and its method or None, for what draws no samples.
+def read_setup(path: Path) -> tuple[Problem, Any, Save | None]:
+    """Return problem, method and `save` of a study file, or None, for what draws no samples.
 
     Of a sweep, the first values.
     """
@@ -372,7 +376,7 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
     if "problem" not in given:
         problems.append("problem: missing")
     found: dict[str, Any] = {}
-    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod}
+    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod, "save": Save}
     for name, kind in kinds.items():
         if name not in given:
             continue
@@ -384,7 +388,7 @@ def read_setup(path: Path) -> tuple[Problem, Any]:
             problems += explain(error, Study, prefix=(name,))
     if problems:
         raise InputError(problems)
-    return found["problem"], found.get("method")
+    return found["problem"], found.get("method"), found.get("save")
 
 
 def open_run(path: Any) -> StoredRun:

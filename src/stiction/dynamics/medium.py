@@ -6,13 +6,12 @@ import dataclasses
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction.dynamics.arrays import Grid
-from stiction.dynamics.courant_limit import courant_limit, plane_limit
-from stiction.dynamics.memory_layout import places, step_table
+from stiction.dynamics.memory import phi, places, step_table
+from stiction.dynamics.state import Floats, Grid
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.memory_kernels import static_stiffness
 from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError
 from stiction.friction.kernels import registered
@@ -20,11 +19,10 @@ from stiction.interface import Interface
 from stiction.model import check_memory
 from stiction.problem import Problem
 
-Floats = NDArray[np.float64]
-
 LARGEST_RATIO = 7.15  # of c_d to c_s: nu = 0.49 in plane strain
 SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
 STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
+_GROWTH = 1e-5  # of a wave in a step; a rupture takes thousands
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,7 +55,7 @@ class Medium:
         return self.grid.impedance
 
     def step_table(self) -> tuple[Floats, Floats]:
-        """Tables of the explicit step; runs share those of a line, a plane's are too large to keep.
+        """Return tables of the explicit step, kept for a line; those of a plane are too large.
 
         (Beside them a run on a plane would have no room for those of its implicit steps.)
         """
@@ -90,7 +88,7 @@ def prepare_medium(
     courant: float,
     time_step: float | None,
 ) -> Medium:
-    """Tables for a problem; raises `InputError` if the step is above the stability limit."""
+    """Return tables for a problem; refuse a time step above the stability limit."""
     if refused := refused_laws(problem):
         raise InputError(refused)
     solid, interface, mode = problem.solid, problem.interface, problem.mode
@@ -112,11 +110,7 @@ def prepare_medium(
         bytes_needed(interface, sum(kernel.poles.size for kernel in kernels)),
         "take fewer nodes, or a larger kernel_tolerance",
     )
-    if interface.is_plane:
-        dx, dy = interface.spacings
-        limit = plane_limit(eta, tolerance, memory_range, (dx, dy)) / speed
-    else:
-        limit = courant_limit(mode, eta, kernels[0]) * interface.spacing / speed
+    limit = largest_step(modes, eta, tolerance, memory_range, interface.spacings) / speed
     if limit == 0.0:
         error = max(kernel.error for kernel in kernels)
         raise InputError(
@@ -148,24 +142,24 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """
     solid, interface = problem.solid, problem.interface
     k = interface.wavenumbers
-    slot, place, copies = places(k.shape)
+    entry, place, copies = places(k.shape)
     share = interface.in_plane_share
     if share is None:
-        modulus, pace, own = problem.effective_modulus * k, k[1:], np.ones(k.size - 1)
+        modulus, wavenumbers, own = problem.effective_modulus * k, k[1:], np.ones(k.size - 1)
     else:
         modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
         quarter = slice(0, interface.shape[0] // 2 + 1)  # kx >= 0
-        pace, own = k[quarter].ravel(), share[quarter].ravel()
+        wavenumbers, own = k[quarter].ravel(), share[quarter].ravel()
     return Grid(
         transform=make_transform(interface.shape),
         impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
         cell=interface.cell,
         stiffness=0.5 * np.stack([modulus.ravel(), solid.shear_modulus * k.ravel()]),
-        slot=slot,
+        entry=entry,
         place=place,
         copies=copies,
-        pace=pace * solid.shear_wave_speed,
-        share=own,
+        frequency=wavenumbers * solid.shear_wave_speed,
+        mode_two=own,
         poles=np.concatenate([kernel.poles for kernel in kernels]),
         weights=np.concatenate([kernel.weights for kernel in kernels]),
         split=kernels[0].poles.size,
@@ -181,3 +175,88 @@ def bytes_needed(interface: Interface, pairs: int) -> float:
     modes = interface.wavenumbers.size
     tables = 6 * modes / 2 if interface.is_plane else 10 * modes
     return 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
+
+
+@functools.lru_cache(maxsize=64)
+def largest_step(
+    modes: tuple[str, ...],
+    eta: float,
+    tolerance: float,
+    memory_range: float,
+    spacings: tuple[float, ...],
+) -> float:
+    """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
+
+    The criterion is the shortest waves of the grid on an interface that slides freely, which
+    carries undamped Rayleigh waves: no eigenvalue of a step may grow. On a plane they lie on the
+    rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of
+    mode II: the limit is that of the two axes and of the corner, shortened until waves in between
+    do not grow either. It is 0 where the error of the kernel makes waves grow whatever the step.
+    """
+    kernels = [kernel_sum(mode, eta, tolerance, memory_range) for mode in modes]
+    static = static_stiffness(modes[0], eta)
+    if len(modes) == 1:
+        return _largest(kernels[0], static) / np.pi * spacings[0]
+
+    def wave(a: float, b: float) -> tuple[float, ExponentialSum, float]:
+        kx, ky = a * np.pi / spacings[0], b * np.pi / spacings[1]
+        share = float(kx**2 / (kx**2 + ky**2))
+        kernel = _mixed(kernels[0], kernels[1], share)
+        return float(np.hypot(kx, ky)), kernel, share * static + 1.0 - share
+
+    corners = [wave(1.0, 0.0), wave(1.0, 1.0), wave(0.0, 1.0)]
+    limit = min(_largest(kernel, stiffness) / k for k, kernel, stiffness in corners)
+    sides = ((1.0, 0.25), (1.0, 0.5), (1.0, 0.75), (0.75, 1.0), (0.5, 1.0), (0.25, 1.0))
+    between = [wave(a, b) for a, b in sides]
+    while limit > 0.0 and not all(
+        _stable(k * limit, kernel, stiffness) for k, kernel, stiffness in between
+    ):
+        limit *= 0.99
+    return limit
+
+
+def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Floats:
+    """Return the matrix of an explicit step of a frictionless mode, kappa = |k| c_s dt."""
+    pairs = kernel.poles.size
+    z = kernel.poles * kappa
+    decay, gain = np.exp(z), kappa * phi(z)
+    fresh = float(np.sum(kernel.weights * gain).real)
+    state = np.eye(2 + 2 * pairs)
+    rate, slip = state[0], state[1]
+    memory = state[2 : 2 + pairs] + 1j * state[2 + pairs :]
+    carried = ((kernel.weights * decay) @ memory).real
+    guess = -stiffness * (slip + kappa * rate) + carried + fresh * rate
+    mean = 0.5 * (rate + guess)
+    moved = slip + kappa * mean
+    memory = decay[:, None] * memory + gain[:, None] * mean
+    rate = -stiffness * moved + carried + fresh * mean
+    return np.vstack([rate, moved, memory.real, memory.imag])
+
+
+def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
+    matrix = amplification(kappa, kernel, stiffness)
+    growth = np.abs(np.linalg.eigvals(matrix)).max() - 1.0
+    return bool(growth < _GROWTH)
+
+
+def _largest(kernel: ExponentialSum, stiffness: float) -> float:
+    """Largest |k| c_s dt up to which no wave grows."""
+    low, high = 0.0, 0.1
+    while high < 6.0 and _stable(high, kernel, stiffness):
+        low, high = high, high + 0.1
+    if low == 0.0:  # long waves grow: that is the kernel, which no smaller step mends
+        return 0.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _stable(middle, kernel, stiffness) else (low, middle)
+    return low
+
+
+def _mixed(in_plane: ExponentialSum, anti_plane: ExponentialSum, share: float) -> ExponentialSum:
+    """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
+    return ExponentialSum(
+        np.concatenate([in_plane.poles, anti_plane.poles]),
+        np.concatenate([share * in_plane.weights, (1.0 - share) * anti_plane.weights]),
+        max(in_plane.error, anti_plane.error),
+        min(in_plane.t_max, anti_plane.t_max),
+    )

@@ -1,0 +1,448 @@
+"""What is kept of a rupture: frames, the record of every step, and a folder on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import pydantic
+from numpy.typing import NDArray
+from pydantic import BeforeValidator
+
+from stiction.dynamics.energies import fracture_energy, strain_energy
+from stiction.dynamics.integrator import Run
+from stiction.dynamics.state import RECORD, Floats, State
+from stiction.dynamics.summary import per_area
+from stiction.errors import InputError, unknown_name
+from stiction.files import UNREADABLE, read_arrays, write_arrays, write_atomically
+from stiction.interface import Interface
+from stiction.model import (
+    Count,
+    FilePath,
+    Names,
+    Positive,
+    checked,
+    describe,
+    model,
+    real_array,
+)
+from stiction.results import Variable, along, coordinate, to_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FRAMES = 64
+"""Frames in a file of a folder."""
+_MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
+_NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
+_CHECKPOINT, _SUMMARY = "checkpoint.npz", "summary.nc"
+
+FIELDS: dict[str, Variable] = {
+    "slip": Variable("m", "slip", ("time",)),
+    "slip_rate": Variable("m/s", "slip rate", ("time",)),
+    "shear_stress": Variable("Pa", "shear stress on the interface", ("time",)),
+    "strength": Variable("Pa", "current strength", ("time",)),
+}
+SCALARS: dict[str, Variable] = {
+    "load": Variable("Pa", "load factor tau_0", ("time",)),
+    "mean_stress": Variable("Pa", "mean shear stress on the interface", ("time",)),
+    "mean_slip": Variable("m", "mean slip", ("time",)),
+    "top_slip_rate": Variable("m/s", "largest slip rate", ("time",)),
+    "weakened_fraction": Variable("1", "share of nodes at the residual strength", ("time",)),
+    "seismic_moment": Variable("N", "seismic moment per length", ("time",)),
+    "work": Variable("J/m", "work of the load on the slip", ("time",)),
+    "strain_energy": Variable("J/m", "static strain energy of the slip", ("time",)),
+    "fracture_energy": Variable("J/m", "energy dissipated above the residual", ("time",)),
+    "radiated_energy": Variable("J/m", "work less friction less strain energy", ("time",)),
+    "time_step": Variable("s", "size of the last step", ("time",)),
+    "step_number": Variable("1", "steps taken so far", ("time",)),
+}
+STEPS: dict[str, Variable] = {  # in the order of RECORD
+    "step_time": Variable("s", "time after each step", ("step",)),
+    "step_load": Variable("Pa", "load factor tau_0 after each step", ("step",)),
+    "step_mean_stress": Variable("Pa", "mean shear stress after each step", ("step",)),
+    "step_mean_slip": Variable("m", "mean slip after each step", ("step",)),
+    "step_top_slip_rate": Variable("m/s", "largest slip rate after each step", ("step",)),
+    "step_size": Variable("s", "size of each step", ("step",)),
+    "step_work": Variable("J/m", "work of the load up to each step", ("step",)),
+}
+_AT_STATION = ("step", "station")
+STATIONS: dict[str, Variable] = {  # in the order of a station's columns
+    "station_slip": Variable("m", "slip at a station after each step", _AT_STATION),
+    "station_slip_rate": Variable("m/s", "slip rate at a station after each step", _AT_STATION),
+    "station_shear_stress": Variable(
+        "Pa", "shear stress (traction) at a station after each step", _AT_STATION
+    ),
+}
+TIME = Variable("s", "time from zero load", ("time",))
+
+
+def _stations(given: Any) -> dict[str, tuple[float, ...]]:
+    """Names and places, a number or a pair each."""
+    if not isinstance(given, Mapping):
+        raise InputError(
+            "must be names and places in m, such as {'centre': 0.05}, on a plane {'centre': "
+            f"(0.05, 0.02)}}, got {describe(given)}"
+        )
+    found, problems = {}, []
+    for name, place in given.items():
+        try:
+            values = real_array(place)
+        except TypeError:
+            values = np.array([np.nan])
+        if not isinstance(name, str) or not name:
+            problems.append(f"a name must be a text, got {describe(name)}")
+        elif values.size not in (1, 2) or not np.all(np.isfinite(values)):
+            problems.append(f"{name}: must be a place x or (x, y) in m, got {describe(place)}")
+        else:
+            found[name] = tuple(values.ravel().tolist())
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+Stations = Annotated[dict[str, tuple[float, ...]], BeforeValidator(_stations)]
+
+
+@model
+class Save:
+    """What `simulate_rupture` keeps, and where.
+
+    Parameters
+    ----------
+    fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
+        Fields to keep in frames.
+    every : int
+        Explicit steps between frames; while the interface creeps, a tenth as many implicit steps
+        (at least one). Since steps shorten as it accelerates, frames are dense in time around the
+        onset anyhow.
+    interval : float, optional
+        s; at most one frame in each interval of this length, counted from zero load.
+    near_onset : int, optional
+        Explicit steps between frames until the mean stress has fallen by 2 % of the stress scale.
+    stations : mapping of str to float or (float, float)
+        Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
+        (traction) are recorded after every step. The node nearest to a place is taken.
+    to : path, optional
+        Folder to write to while the run goes on; memory then stays bounded, the result holds no
+        fields, and `stiction.dynamics.save.open_rupture` reads them. If the folder holds the same
+        run, cut short, it goes on from where that was last written: every number is then the same
+        as without the interruption, to the bit.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Save(["slip"], every=50, stations={"centre": 0.05}).stations
+    {'centre': (0.05,)}
+    """
+
+    fields: Names = ("slip", "slip_rate", "shear_stress")
+    every: Annotated[Count, pydantic.Field(le=10**6)] = 10
+    interval: Positive | None = None
+    near_onset: Annotated[Count, pydantic.Field(le=10**6)] | None = None
+    stations: Stations = pydantic.Field(default_factory=dict)
+    to: FilePath | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _known(self) -> Save:
+        problems = [
+            unknown_name("fields", name, FIELDS) for name in self.fields if name not in FIELDS
+        ]
+        if problems:
+            raise InputError(problems)
+        return self
+
+    def nodes(self, interface: Interface) -> NDArray[np.int64]:
+        """Return the numbers of the stations' nodes, flat.
+
+        Raises
+        ------
+        InputError
+            Naming every station that is not on the interface.
+        """
+        problems, numbers = [], []
+        for name, place in self.stations.items():
+            if len(place) != len(interface.shape):
+                wanted = "a pair (x, y)" if interface.is_plane else "a number x"
+                problems.append(f"stations[{name!r}]: must be {wanted} in m, got {place}")
+                continue
+            if not all(0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)):
+                reach = " x ".join(f"{length:g}" for length in interface.lengths)
+                problems.append(
+                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; places "
+                    "are in m, from the first node"
+                )
+                continue
+            cells = zip(place, interface.spacings, interface.shape, strict=True)
+            index = tuple(round(x / spacing) % n for x, spacing, n in cells)
+            numbers.append(int(np.ravel_multi_index(index, interface.shape)))
+        if problems:
+            raise InputError(problems)
+        return np.array(numbers, dtype=np.int64)
+
+    def steps(self, state: State) -> int:
+        """Return the number of steps to the next frame."""
+        if not state.explicit:
+            return max(1, self.every // 10)
+        falling = state.now["local_stress"] - state.now["mean_stress"]
+        if self.near_onset is not None and falling < _NEAR_ONSET * state.now["scale"]:
+            return self.near_onset
+        return self.every
+
+
+class Recorder:
+    """Frames and step records gathered so far, and their folder if there is one.
+
+    Parameters
+    ----------
+    run : Run
+    save : Save
+    attributes : mapping
+        Of the datasets.
+    """
+
+    def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
+        self.run, self.save, self.attributes = run, save, attributes
+        interface = run.medium.interface
+        self._columns = len(RECORD) + len(STATIONS) * len(save.stations)
+        most = max(save.every, save.near_onset or 1)
+        self._record = np.empty((most, self._columns))
+        self._frames: list[dict[str, Any]] = []
+        self._steps: list[Floats] = []
+        self.variables = (
+            {name: along(interface, variable) for name, variable in FIELDS.items()}
+            | STATIONS
+            | {name: per_area(interface, what) for name, what in (SCALARS | STEPS).items()}
+        )
+
+    def advance(self, state: State, count: int) -> tuple[int, int]:
+        """Take up to `count` steps and record them; return (steps taken, why it returned)."""
+        taken, reason = self.run.advance(state, count, self._record[:count])
+        self._steps.append(self._record[:taken].copy())
+        return taken, reason
+
+    def add(self, state: State) -> None:
+        """Keep a frame of the state as it is now."""
+        run, nodes, now = self.run, self.run.setting.nodes, state.now
+        medium, cell = run.medium, run.medium.interface.cell
+        fracture = float(fracture_energy(run.friction, state.slip, nodes).sum()) * cell
+        with np.errstate(over="ignore"):  # just before a run becomes non-finite
+            strain = strain_energy(state.slip_hat, medium.grid)
+        friction = fracture + float((nodes.residual * state.slip).sum()) * cell
+        work = float(now["work"])
+        frame: dict[str, Any] = {
+            "time": float(now["time"]),
+            "load": float(now["load"]),
+            "mean_stress": float(now["mean_stress"]),
+            "mean_slip": float(state.slip.mean()),
+            "top_slip_rate": float(state.rate.max()),
+            "weakened_fraction": float(now["slid"]) / state.slip.size,
+            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
+            "work": work,
+            "strain_energy": strain,
+            "fracture_energy": fracture,
+            "radiated_energy": work - friction - strain,
+            "time_step": float(now["step"]),
+            "step_number": state.steps,
+        }
+        fields = {
+            "slip": state.slip,
+            "slip_rate": state.rate,
+            "shear_stress": state.stress,
+            "strength": run.strength_after(state.slip),
+        }
+        shape = medium.interface.shape
+        frame |= {name: fields[name].reshape(shape).copy() for name in self.save.fields}
+        self._frames.append(frame)
+
+    def take(self) -> xr.Dataset:
+        """Return all that was gathered since the last time, labelled."""
+        interface, save = self.run.medium.interface, self.save
+        data = {
+            name: np.array([frame[name] for frame in self._frames])
+            for name in ("time", *SCALARS, *save.fields)
+        }
+        if not self._frames:
+            data |= {name: np.empty((0, *interface.shape)) for name in save.fields}
+        record = np.concatenate([np.empty((0, self._columns)), *self._steps])
+        data |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
+        self._frames, self._steps = [], []
+        coordinates = {"time": (data.pop("time"), TIME)}
+        coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
+        if save.stations:
+            own = record[:, len(RECORD) :].reshape(-1, len(save.stations), len(STATIONS))
+            data |= {name: own[..., i].copy() for i, name in enumerate(STATIONS)}
+            names = Variable("", "name of a station", ("station",))
+            coordinates["station"] = (np.array(list(save.stations), dtype=str), names)
+            index = np.unravel_index(self.run.setting.stations, interface.shape)
+            for dim, i, spacing in zip(interface.dims, index, interface.spacings, strict=True):
+                place = Variable("m", f"{dim} of a station's node", ("station",))
+                coordinates[f"station_{dim}"] = (i * spacing, place)
+        return to_dataset(data, self.variables, coordinates, self.attributes)
+
+    def begin(self, state: State) -> None:
+        """Open the folder; if it holds this run, let the state be where that was last written.
+
+        Raises
+        ------
+        InputError
+            If the folder holds anything else.
+        """
+        folder = self.save.to
+        if folder is None:
+            return
+        checkpoint = folder / _CHECKPOINT
+        if checkpoint.exists():
+            read_checkpoint(checkpoint, self.run, state, self._others)
+            for path in _chunks(folder):
+                if int(path.stem.removeprefix("frames-")) > state.steps:
+                    path.unlink()
+            return
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(
+                f"to: {str(folder)!r} exists, is not empty and holds no rupture; give a new folder"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        write_checkpoint(checkpoint, self.run, state, self._others)
+
+    @property
+    def _others(self) -> str:
+        """What a folder depends on besides the run."""
+        return repr([self.save.fields, self.save.stations])
+
+    def flush(self, state: State, *, force: bool = False, interrupted: bool = False) -> None:
+        """Write what was gathered, if there is enough or by force, and then the state.
+
+        Not that of an interrupted run, which steps may have left in the middle of anything.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written (disk full); the files before it stay readable.
+        """
+        folder = self.save.to
+        steps = sum(record.size for record in self._steps) // len(RECORD)
+        full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
+        if folder is None or not (full or (force and (self._frames or steps))):
+            return
+        path = folder / f"frames-{state.steps:012d}.nc"
+        part = self.take()
+        try:
+            write_atomically(path, lambda aside: part.to_netcdf(aside, engine="netcdf4"))
+            if not interrupted:
+                write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
+        except (OSError, RuntimeError) as error:  # the NetCDF library reports a full disk so
+            raise OSError(
+                f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
+                "are complete and can be opened"
+            ) from error
+
+    def finish(self, dataset: xr.Dataset) -> None:
+        """Write what belongs to the run as a whole beside its frames."""
+        if self.save.to is not None:
+            whole = dataset.drop_dims(["time", "step"], errors="ignore")
+            write_atomically(
+                self.save.to / _SUMMARY, lambda aside: whole.to_netcdf(aside, engine="netcdf4")
+            )
+
+
+def _digest(run: Run, others: str) -> str:
+    """SHA-256 of all that a run depends on besides its state, but when to stop."""
+    medium, setting = run.medium, run.setting
+    grid = medium.grid
+    thresholds = setting.thresholds._replace(
+        slid_stop=0.0, event_stop=False, rest_stop=False, end_time=0.0
+    )
+    slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
+    law = np.concatenate([run.friction.fraction(slips), *map(np.ravel, setting.law)])
+    digest = hashlib.sha256(repr([medium.interface, float(medium.step), others]).encode())
+    for values in (
+        *setting.nodes, law, setting.load_times, setting.load_values, np.array(thresholds, float),
+        grid.impedance, grid.stiffness, grid.poles, grid.weights,
+    ):  # fmt: skip
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> None:
+    """Save the state of a run, with a digest of all that it depends on; whole or not at all."""
+    digest = np.frombuffer(_digest(run, others).encode(), np.uint8)
+    write_arrays(path, {"digest": digest} | state._asdict())
+
+
+def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> State:
+    """Fill a state of this very run with what a checkpoint holds, and return it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or belongs to another problem, strength, load or method.
+    """
+    try:
+        arrays = read_arrays(path)
+        digest = arrays.pop("digest").tobytes().decode()
+    except UNREADABLE as error:
+        raise InputError(f"to: {str(path)!r} is not a readable checkpoint: {error}") from None
+    if digest != _digest(run, others):
+        raise InputError(
+            f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
+            "the method, or what is kept differs; give a new folder"
+        )
+    for name, values in state._asdict().items():
+        saved = arrays.get(name)
+        if saved is None or saved.dtype != values.dtype or saved.shape != values.shape:
+            raise InputError(f"to: {str(path)!r} is damaged: {name} is not what it must be")
+        values[...] = saved  # the arrays stay where steps want them
+    return state
+
+
+def _chunks(folder: Path) -> list[Path]:
+    return sorted(folder.glob("frames-*.nc"))
+
+
+@checked
+def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset:
+    """Read a run that `Save.to` names, also one that is still going on or was cut short.
+
+    Parameters
+    ----------
+    folder : path
+    fields : sequence of str, optional
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were kept if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        As from `simulate_rupture`; what belongs to the run as a whole once it has ended.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no rupture.
+    """
+    import xarray as xr
+
+    parts = []
+    for path in _chunks(folder):
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            unwanted = [f for f in FIELDS if f in data and fields is not None and f not in fields]
+            parts.append(data.drop_vars(unwanted).load())
+    if not parts:
+        raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
+    framed = xr.concat(
+        [part.drop_dims("step") for part in parts], dim="time",
+        data_vars="minimal", coords="minimal", compat="override", join="override",
+    )  # fmt: skip
+    names = [name for name in parts[0] if "step" in parts[0][name].dims]
+    places = [*parts[0]["x"].dims, *(["y"] if "y" in parts[0].dims else []), "time"]
+    steps = [part[names].drop_vars(places, errors="ignore") for part in parts]
+    framed = framed.merge(xr.concat(steps, dim="step", join="override"))
+    framed.attrs = parts[-1].attrs
+    if (folder / _SUMMARY).exists():
+        with xr.open_dataset(folder / _SUMMARY, engine="netcdf4") as whole:
+            framed = framed.merge(whole.load(), compat="override")
+            framed.attrs = dict(whole.attrs)
+    return framed
