@@ -24,27 +24,26 @@ ZERO: Any = np.int64(0)
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
-class _FirstCompilation(event.Listener):
-    """Says once that kernels are being compiled, so that a first run does not look hung."""
+class _Compilation(event.Listener):
+    """Says once for each part of the package that its kernels are being compiled."""
 
     def __init__(self) -> None:
-        self.said = False
+        self.parts: set[str] = set()
 
     def on_start(self, event: event.Event) -> None:
-        dispatcher = (event.data or {}).get("dispatcher")
-        function = getattr(dispatcher, "py_func", None)
+        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
         # A function made by exec has no module, its __module__ is None.
-        ours = str(getattr(function, "__module__", "")).startswith("stiction.")
-        if ours and not self.said:
-            self.said = True
-            logger.warning("compiling kernels on first use (up to 20 s, then cached)")
+        package, _, rest = str(getattr(function, "__module__", "")).partition(".")
+        part = rest.partition(".")[0]
+        if package == "stiction" and part not in self.parts:
+            self.parts.add(part)
+            logger.warning("compiling kernels: %s (on first use only, then cached)", part)
 
     def on_end(self, event: event.Event) -> None:
         pass
 
 
-event.register("numba:compile", _FirstCompilation())
-
+event.register("numba:compile", _Compilation())
 
 _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
@@ -64,7 +63,7 @@ def _kernel_sources() -> dict[str, bytes]:
     return {
         name.removesuffix(".__init__"): text
         for name, text in texts.items()
-        if b"stiction.jit import" in text or b"InputError" not in text
+        if name == "stiction.jit" or b"stiction.jit import" in text or b"InputError" not in text
     }
 
 
@@ -102,9 +101,8 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
     """Compile on first call, cached on disk where that is possible."""
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(
-        _folder(function.__module__)
-    )  # read by numba when it decorates, and only then
+    # Read by numba when it decorates, and only then.
+    numba.config.CACHE_DIR = str(_folder(function.__module__))
     try:
         compiled: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # numba finds no folder in which it may write

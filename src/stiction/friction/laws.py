@@ -44,7 +44,7 @@ NEARLY_RESIDUAL = 0.01
 
 def _known(value: Any) -> Array:
     """The numbers to check now; a profile that is not placed yet is checked once it is."""
-    return np.empty(0) if is_unplaced(value) else np.asarray(value)
+    return np.empty(0) if value is None or is_unplaced(value) else np.asarray(value)
 
 
 @model
@@ -84,8 +84,8 @@ class FrictionLaw(ABC):
 
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
-        problems = []
         given = [name for name in SCALES if getattr(self, name) is not None]
+        problems = []
         if len(given) != 1:
             found = " and ".join(given) if given else "none"
             problems.append(
@@ -97,20 +97,19 @@ class FrictionLaw(ABC):
                 problems.append(
                     f"{name} must be positive everywhere, smallest given is {value.min():g}"
                 )
-        residual = _known(self.residual_strength)
+        residual, ratio = _known(self.residual_strength), _known(self.residual_ratio)
         if not np.all(residual >= 0.0):
             problems.append(
                 f"residual_strength must not be negative, smallest given is {residual.min():g}"
             )
-        if self.residual_ratio is not None:
-            ratio = _known(self.residual_ratio)
-            if not np.all((ratio >= 0.0) & (ratio < 1.0)):
-                problems.append(
-                    "residual_ratio must lie in [0, 1), given are values from"
-                    f" {ratio.min():g} to {ratio.max():g}"
-                )
-            if is_unplaced(self.residual_strength) or np.any(residual != 0.0):
-                problems.append("give either residual_strength or residual_ratio, got both")
+        if not np.all((ratio >= 0.0) & (ratio < 1.0)):
+            problems.append(
+                "residual_ratio must lie in [0, 1), given are values from"
+                f" {ratio.min():g} to {ratio.max():g}"
+            )
+        both = is_unplaced(self.residual_strength) or np.any(residual != 0.0)
+        if self.residual_ratio is not None and both:
+            problems.append("give either residual_strength or residual_ratio, got both")
         if problems:
             raise InputError(problems)
         return self
@@ -363,20 +362,21 @@ class PiecewiseWeakening(FrictionLaw):
     @model_validator(mode="after")
     def _falling(self) -> PiecewiseWeakening:
         problems = []
-        if len(self.slip) != len(self.strength) or not self.slip:
+        slip, strength = np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
+        if slip.size != strength.size or slip.size < 2:
             problems.append(
                 "slip and strength: must have one entry for each corner, got"
-                f" {len(self.slip)} and {len(self.strength)}"
+                f" {slip.size - 1} and {strength.size - 1}"
             )
         else:
-            if not (np.diff((0.0, *self.slip)) > 0.0).all() or self.slip[-1] != 1.0:
+            if not (np.diff(slip) > 0.0).all() or slip[-1] != 1.0:
                 problems.append(
                     f"slip: must rise from above 0 to exactly 1 (d = d_c), got {self.slip}"
                 )
-            if not (np.diff((1.0, *self.strength)) < 0.0).all() or self.strength[-1] != 0.0:
+            if not (np.diff(strength) < 0.0).all() or strength[-1] != 0.0:
                 problems.append(
-                    "strength: must fall from below 1 to exactly 0 (the residual strength),"
-                    f" got {self.strength}"
+                    "strength: must fall from below 1 to exactly 0 (the residual strength), got"
+                    f" {self.strength}"
                 )
         if problems:
             raise InputError(problems)
@@ -525,51 +525,46 @@ LAWS = {
 def contradictions(law: FrictionLaw) -> list[str]:
     """Return in what a law of somebody else breaks the promises that every method relies on.
 
-    Strength must begin at tau_p and never rise with slip; slope, integral and inverse must be those
-    of `fraction`, and so must the functions registered for kernels.
+    Strength begins at tau_p and never rises with slip; slope, integral and inverse are those of
+    `fraction`, and so are the functions registered for kernels.
     """
-    name = type(law).__name__
     if type(law) in LAWS.values():
         return []
+    name = type(law).__name__
     u = np.linspace(0.0, law.reach, 4097)
     f = np.asarray(law.fraction(u), dtype=np.float64)
-    problems = []
+    rising = np.diff(f) > 1e-9
     if abs(f[0] - 1.0) > 1e-9:
-        problems.append(f"{name}.fraction(0) must be 1, got {f[0]:g}")
-    first = int(np.argmax(np.diff(f) > 1e-9))
-    if f[first + 1] > f[first] + 1e-9:
+        return [f"{name}.fraction(0) must be 1, got {f[0]:g}"]
+    if rising.any():
+        first = int(np.argmax(rising))
         top = first + int(np.argmax(f[first:]))
-        problems.append(
+        return [
             f"{name}: strength must not rise with slip; fraction rises from {f[first]:.4g} to"
             f" {f[top]:.4g} between u = {u[first]:.4g} and {u[top]:.4g}"
-        )
-    if problems:
-        return problems
+        ]
     step = 1e-6 * law.reach
-    middle = law.slip_at(0.5)
     pairs = {
         "initial_slope": (law.initial_slope, (1.0 - float(law.fraction(step))) / step),
         "area(reach)": (float(law.area(law.reach)), float(np.trapezoid(f, u))),
-        "fraction(slip_at(0.5))": (float(law.fraction(middle)), 0.5),
+        "fraction(slip_at(0.5))": (float(law.fraction(law.slip_at(0.5))), 0.5),
     }
-    functions = FUNCTIONS.get(type(law.parameters))
-    if functions is not None:  # plain Python: nothing is compiled to look at a law
-        strength, slope = (getattr(function, "py_func", function) for function in functions[:2])
-        # With tau_p = 1, tau_r = 0 and d_c = 1 strength is f and slip is u.
-        own = (law.parameters, 1.0, 0.0, law.initial_slope)
-        for share in (0.0, 0.1234, 0.5678):
-            at = share * law.reach
-            pairs[f"the strength of its kernels at u = {at:.3g}"] = (
-                strength(*own, at), float(law.fraction(at)),
-            )  # fmt: skip
-            pairs[f"the slope of its kernels at u = {at:.3g}"] = (
-                slope(*own, at), float(law.fraction(at) - law.fraction(at + step)) / step,
-            )  # fmt: skip
+    # In plain Python, so that nothing is compiled. With tau_p = 1, tau_r = 0 and d_c = 1 strength
+    # is f and slip is u.
+    given = (law.parameters, 1.0, 0.0, law.initial_slope)
+    functions = FUNCTIONS.get(type(law.parameters), ())[:2]
+    plain = [getattr(function, "py_func", function) for function in functions]
+    for at in law.reach * np.array([0.0, 0.1234, 0.5678]) if plain else ():
+        here, ahead = float(law.fraction(at)), float(law.fraction(at + step))
+        for what, function, own in zip(
+            ("strength", "slope"), plain, (here, (here - ahead) / step), strict=True
+        ):
+            pairs[f"the {what} of its kernels at u = {at:.3g}"] = (function(*given, at), own)
     tolerance = 1e-3 * max(1.0, law.steepest_slope)
     return [
-        f"{name}: {what} is {found:.3g}, but {expected:.3g} by its fraction"
-        for what, (found, expected) in pairs.items()
-        if abs(found - expected) > tolerance
+        f"{name}: {what} is {found:.3g}, but {own:.3g} by its fraction"
+        for what, (found, own) in pairs.items()
+        if abs(found - own) > tolerance
     ]
 
 
