@@ -118,24 +118,14 @@ def solve_inside(
 ) -> tuple[int, int]:
     """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
 
-    Parameters
-    ----------
-    operator, spring
-    inside : (nodes,) bool array
-    x : (nodes,) array, changed
-        Guess, then solution; zero outside.
-    residual : (nodes,) array, changed
-        Of the guess on entry, as from `residual_of`; afterwards that of the solution, zero outside.
-    workspace : (3, nodes) array
-        Overwritten; ``workspace[1]`` is the direction of negative curvature, if one is met.
-    tolerance : float
-        Largest residual allowed at a node, Pa.
-    iterations : int
+    x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
+    outside. Of the three fields of the workspace the second is the direction of negative curvature
+    if one is met.
 
     Returns
     -------
     status, iterations : int
-        SOLVED, NEGATIVE (curvature) or EXHAUSTED; and how many iterations it took.
+        SOLVED (no residual above the tolerance, Pa), NEGATIVE (curvature) or EXHAUSTED.
     """
     z, direction, image = workspace[0], workspace[1], workspace[2]
     restrict(residual, inside)
@@ -180,21 +170,8 @@ def lowest_eigenvector(
 ) -> tuple[float, int]:
     """Smallest eigenvalue of A on the nodes `inside`, by single-vector LOBPCG (Knyazev 2001).
 
-    Parameters
-    ----------
-    operator : Operator
-    inside : (nodes,) bool array
-    vector : (nodes,) array, changed
-        Guess, then the eigenvector: unit norm, positive sum, zero outside.
-    tolerance : float
-        Norm of A y - lambda y at which to stop, Pa/m.
-    iterations : int
-
-    Returns
-    -------
-    value : float
-        lambda, Pa/m.
-    iterations : int
+    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. It stops
+    where the norm of A y - lambda y is below the tolerance. Returns lambda (Pa/m) and iterations.
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction

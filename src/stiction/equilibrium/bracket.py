@@ -174,15 +174,7 @@ def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Arr
 def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Array:
     """Narrow a bracket to a relative gap; returns the last unstable direction, unit norm.
 
-    Parameters
-    ----------
-    bracket : Bracket
-        Changed.
-    gap : float
-        As a share of the load.
-    accuracy : float
-        Largest residual stress as a share of the mean strength.
-    steps : int
+    The accuracy is the largest residual stress as a share of the mean strength.
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())

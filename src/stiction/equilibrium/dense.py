@@ -157,16 +157,8 @@ def solve_batch(
 ) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
-    Parameters
-    ----------
-    excess, residual, rate : (samples, n) arrays
-        tau_p - tau_i, tau_r - tau_i (Pa), W (Pa/m).
-    profile : (n,) array
-    line : Line
-    others : Windows
-        For samples with another weakening rate than the usual one anywhere.
-    all_slips : bool
-    first : First, output
+    Arrays of the samples are (samples, n), as of `Sample`; `others` are the windows of samples with
+    another weakening rate than the usual one anywhere.
     """
     samples, n = excess.shape
     workspace = make_workspace(line.stiffness)

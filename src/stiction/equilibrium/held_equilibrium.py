@@ -57,27 +57,10 @@ def equilibrate(
     workspace: Array,
     tolerance: float,
 ) -> tuple[int, int]:
-    """Slip under the drive `right` = tau_0 p - s + spring alpha phi.
+    """Slip under the drive `right` = tau_0 p - s + spring alpha phi; status and iterations.
 
-    Parameters
-    ----------
-    operator, spring
-    right : (nodes,) array
-        Pa.
-    inside : (nodes,) bool array, changed
-        Nodes that slip: a guess, then the answer.
-    slip : (nodes,) array, changed
-        d, m: a guess, then the answer.
-    residual : (nodes,) array, output
-        right - A d - spring phi <phi, d>: not above `tolerance` anywhere if solved.
-    workspace : (3, nodes) array
-        See `solve_inside`.
-    tolerance : float
-        Pa.
-
-    Returns
-    -------
-    status, iterations : int
+    The nodes `inside` that slip, and their slip, are a guess, then the answer. The residual
+    right - A d - spring phi <phi, d> is nowhere above `tolerance` (Pa) if it is solved.
     """
     restrict(slip, inside)
     residual_of(operator, spring, right, slip, residual)

@@ -165,23 +165,9 @@ def jump(
 ) -> int:
     """Follow an instability at a fixed load to the next least equilibrium, or to none.
 
-    Parameters
-    ----------
-    sample : Sample
-    load : float
-        tau_0, Pa.
-    slip, stiff : (n,) arrays, changed
-        d of the state that became unstable, moved along the unstable direction as far as
-        `step_to_corner` goes, and K d. Afterwards a lower bound of the next equilibrium, or it.
-    griffith : float
-        Griffith's critical crack length, in nodes: so many residual nodes in a row count as global
-        sliding.
-    workspace : Workspace
-
-    Returns
-    -------
-    int
-        SLIDING, ARRESTED or UNDECIDED.
+    Slip d and K d are those of the state that became unstable, moved along the unstable direction
+    as far as `step_to_corner` goes; afterwards a lower bound of the next equilibrium, or it. So
+    many residual nodes in a row as Griffith's length count as global sliding.
     """
     tolerance = stress_tolerance(sample, load)
     workspace.diagonal[:] = workspace.stiffness.column[0]

@@ -136,28 +136,11 @@ def solve_program(
     stiff: Array,
     workspace: Workspace,
 ) -> tuple[float, int]:
-    """Critical load with slip and multiplier, from an upper bound and its multiplier.
+    """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
-    Parameters
-    ----------
-    sample : Sample
-        Strength less initial stress s and load profile p count.
-    bound : float
-        An upper bound of the load that belongs to `multiplier`.
-    cap : float
-        Do not look above this load: if it is below the critical one, the result is the least
-        equilibrium at `cap`.
-    multiplier : (n,) array, changed
-        y of the lowest upper bound, <p, y> = 1.
-    slip, stiff : (n,) arrays, output
-        d and K d.
-    workspace : Workspace
-        With the diagonal of A in it.
-
-    Returns
-    -------
-    load, status : float, int
-        SOLVED, STALLED after too many passes, or OVERFULL: more members than the workspace holds.
+    If `cap` is below the critical load, the result is the least equilibrium there. The workspace
+    has the diagonal of A in it. The status is SOLVED, STALLED after too many passes, or OVERFULL:
+    more members than the workspace holds.
     """
     load = min(bound, cap)
     tolerance = stress_tolerance(sample, load)

@@ -104,22 +104,8 @@ def runs_away_alone(
 ) -> bool:
     """Whether the unstable patch slides even if nothing outside its window moves.
 
-    If not, slip is left where the window comes to rest, not above the next equilibrium.
-
-    Parameters
-    ----------
-    sample, stiffness
-    load : float
-        tau_0, Pa.
-    slip : (n,) array, changed
-        A lower bound of the next equilibrium, beyond the state that is unstable in `direction`.
-    griffith : float
-        As for `jump`.
-
-    Returns
-    -------
-    bool
-        False also where the line is not much longer than the window.
+    If not, slip, a lower bound of the next equilibrium, is left where the window comes to rest.
+    False also where the line is not much longer than the window.
     """
     n = slip.shape[0]
     if n < 4 * WINDOW:

@@ -122,22 +122,10 @@ def least_equilibrium(
 ) -> Relaxed:
     """Return the least equilibrium at a load that is not below a given slip.
 
-    Parameters
-    ----------
-    operator : Operator
-        Its rate is not used.
-    sample : Sample
-    load : float
-        tau_0, Pa.
-    slip : (nodes,) array
-        Zero, or an equilibrium at a lower load, or beyond it along an unstable direction, m.
-    accuracy : float
-        Largest residual stress as a share of the mean strength.
-    only_stable : bool
-        Give up, as UNDECIDED, where the path to the equilibrium looks unstable.
+    The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
+    the accuracy is the largest residual stress as a share of the mean strength. With `only_stable`
+    it gives up, as UNDECIDED, where the path to the equilibrium looks unstable.
 
-    Notes
-    -----
     It slides as soon as the load exceeds the strength that is left on average: stiffness adds
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
     `accuracy`; that of planes has small ones.

@@ -118,26 +118,10 @@ def runs_away(
     stiff_direction: Array,
     work: Array,
 ) -> int:
-    """Whether the patch of an instability certainly becomes global sliding.
+    """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
 
-    Parameters
-    ----------
-    sample : Sample
-    runs : Runs
-    load : float
-        tau_0, Pa.
-    slip : (n,) array, changed
-        d of the state that became unstable; afterwards a lower bound of the next equilibrium.
-    stiff : (n,) array
-        K d of that state.
-    direction, stiff_direction : (n,) arrays
-        In which it is unstable, and K times it.
-    work : (6, n) array
-
-    Returns
-    -------
-    int
-        SLIDING or UNDECIDED.
+    Slip d and K d are those of the state that became unstable; afterwards slip is a lower bound of
+    the next equilibrium. K times the unstable direction is given beside it.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)

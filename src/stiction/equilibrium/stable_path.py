@@ -112,25 +112,10 @@ def advance(
     direction: Array,
     workspace: Workspace,
 ) -> tuple[float, int]:
-    """Follow the stable path from one load towards another.
+    """Follow the stable path from a load towards another one; slip d and K d go with it.
 
-    Parameters
-    ----------
-    sample : Sample
-    load : float
-        tau_0 (Pa) at which `slip` is a stable equilibrium.
-    target : float
-        Load at which to stop.
-    slip, stiff : (n,) arrays, changed
-        d and K d.
-    direction : (n,) array, output
-        If the path ends: in which it is unstable, z >= 0 and A z <= 0.
-    workspace : Workspace
-
-    Returns
-    -------
-    load, status : float, int
-        REACHED, UNSTABLE, or CROWDED: more members than the workspace holds.
+    The status is REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or
+    CROWDED: more members than the workspace holds.
     """
     n = slip.shape[0]
     solution, stiff_rate, rate = workspace.vectors[1], workspace.vectors[2], workspace.vectors[3]

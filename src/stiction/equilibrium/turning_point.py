@@ -54,17 +54,10 @@ def _guess(load: float, amplitude: float, slip: Array, slope: Array) -> Held:
 
 
 def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:
-    """Equilibrium with a patch held; None if something else is unstable.
+    """Equilibrium with a patch phi held; None if something else is unstable.
 
-    Parameters
-    ----------
-    bracket : Bracket
-    held : (nodes,) array
-        phi, unit norm.
-    guess : Held
-        Load, amplitude at which the spring is without force, slip and slope to start from.
-    accuracy : float
-        Largest residual stress as a share of the mean strength.
+    The guess says at which amplitude the spring is without force; the accuracy is the largest
+    residual stress as a share of the mean strength.
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     workspace, load, amplitude = bracket.workspace, guess.load, guess.amplitude
@@ -165,28 +158,13 @@ def close(
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
-    If another patch turns out to be unstable, it is held instead.
-
-    Parameters
-    ----------
-    bracket : Bracket
-        Changed.
-    held : (nodes,) array
-        phi >= 0, unit norm: the patch.
-    load, slip : float, (nodes,) array
-        Guess.
-    gap : float
-        As a share of the load.
-    bend : float
-        Curvature a d mu'/da if known, Pa/m, negative.
-    steps : int
-        Held equilibria to solve for, at most.
+    If another patch turns out to be unstable, it is held instead. Load and slip are a guess;
+    `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known.
 
     Returns
     -------
-    closed : bool
-    bend : float
-        The curvature found.
+    closed, bend : bool, float
+        Whether the bounds are within `gap` of the load, and the curvature found.
     """
     if bracket.closed(gap):
         return True, bend

@@ -34,13 +34,7 @@ STRIDES = 16
 
 @functools.lru_cache(maxsize=512)
 def window_mode(nodes: int, width: int) -> tuple[float, Array]:
-    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector.
-
-    Parameters
-    ----------
-    nodes, width : int
-        Nodes of the interface and of the window.
-    """
+    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector."""
     first = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= DENSE:
         values, vectors = scipy.linalg.eigh(scipy.linalg.toeplitz(first), subset_by_index=[0, 0])
@@ -65,11 +59,7 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
 def estimated_width(nodes: int, rate: float) -> int:
     """Width of an unstable window by h_n = 2 lambda_0 G*/W of the continuum.
 
-    Parameters
-    ----------
-    nodes : int
-    rate : float
-        W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
+    The rate is W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
     """
     return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
 
@@ -79,12 +69,6 @@ def smallest_window(nodes: int, rate: float) -> int | None:
 
     None also if the window would be wider than `WIDEST`: the uniform field then starts the
     programme, whose result is the same.
-
-    Parameters
-    ----------
-    nodes : int
-    rate : float
-        W in units of (G*/2)(2 pi/L).
     """
     widest = min(nodes - 1, WIDEST)
     width = estimated_width(nodes, rate)
@@ -144,11 +128,7 @@ def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
 def exact_window(nodes: int, rate: float, unit: float) -> Windows:
     """The narrowest window that is unstable at one weakening rate, if there is any.
 
-    Parameters
-    ----------
-    nodes : int
-    rate, unit : float
-        W and (G*/2)(2 pi/L), Pa/m.
+    Rate and unit are W and (G*/2)(2 pi/L), Pa/m.
     """
     width = smallest_window(nodes, rate / unit)
     return _windows(nodes, () if width is None else (width,), unit)
@@ -214,14 +194,7 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
 
     A weighted mean over a window hardly changes as the window moves by a sixteenth of its width:
     only every such place is looked at, and then the nodes about the best one. Whichever window is
-    found, what it says is a bound.
-
-    Parameters
-    ----------
-    sample : Sample
-    windows : Windows
-    allowed : (n,) array, work space
-    multiplier : (n,) array, output
+    found, what it says is a bound. `allowed` is work space.
     """
     rate = sample.rate
     n = rate.shape[0]
