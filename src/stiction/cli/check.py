@@ -58,8 +58,9 @@ def _description(study: Any) -> Lines:
     problems = [point.problem for point in points]
     lines.append(("effective modulus", _range((p.effective_modulus for p in problems), "Pa")))
     fields = [point.random.strength for point in points]
-    means = _range((field.mean for field in fields), "Pa")
-    deviations = _range((field.standard_deviation for field in fields), "Pa")
+    unit = "Pa" if fields[0].of is None else "(friction coefficient)"
+    means = _range((field.mean for field in fields), unit)
+    deviations = _range((field.standard_deviation for field in fields), unit)
     pairs = zip(fields, problems, strict=True)
     modes = _range((field.modes(p.interface).count for field, p in pairs), "modes")
     lines.append(("strength", f"mean {means}, standard deviation {deviations}, {modes}"))
