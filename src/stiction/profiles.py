@@ -445,8 +445,8 @@ def _points(
     if not known:
         return Points(values, {}, measured)
     if len(along) == 2:  # a grid: each of its points on its own
-        for dim in dims:
-            places.setdefault(dim, np.arange(array.sizes[dim], dtype=float))
+        if len(known) == 1:
+            raise InputError(f"has the coordinate {known[0]!r} only; a map has x and y, or none")
         grid = np.meshgrid(*(places[dim] for dim in dims), indexing="ij")
         places = {dim: at.ravel() for dim, at in zip(dims, grid, strict=True)}
         values = values.reshape(*values.shape[:-2], -1)
