@@ -11,8 +11,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import spsolve
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
@@ -301,6 +299,9 @@ def _fill(values: Array, hole: NDArray[np.bool_], spacings: tuple[float, ...]) -
     The measured nodes around it are its rim: on a line that is the straight line between the ends,
     and nothing in it is higher or lower than its rim.
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import spsolve
+
     number = np.full(hole.shape, -1)
     number[hole] = np.arange(hole.sum())
     places = np.nonzero(hole)

@@ -5,7 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 import stiction as st
+from stiction.results import Variable, onset_variables
 
 METHOD = '''\
 from dataclasses import dataclass
@@ -82,6 +86,49 @@ assert own.margin.attrs["units"] == "Pa" and own.critical_load.equals(found.crit
 again = st.Study.from_result(found)
 assert again == study
 """
+
+
+class Broken:
+    """A method whose solver does not keep what its variables promise."""
+
+    type, label, chunk_size = "broken", "broken", 4
+
+    def __init__(self, change, promise=()):
+        self.change, self.promise = change, promise
+
+    def variables(self, problem):
+        return onset_variables(problem.interface) | dict(self.promise)
+
+    def seconds_per_sample(self, problem):
+        return 1e-6
+
+    def supports(self, problem):
+        return []
+
+    def prepare(self, problem):
+        names = onset_variables(problem.interface)
+        return lambda sample: {name: np.ones(sample.samples) for name in names} | self.change
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (
+            Broken({}, {"margin": Variable("Pa", "margin")}),
+            "solver of broken does not return 'margin'",
+        ),
+        (Broken({"margin": np.ones(3)}), "returns 'margin', which is none of its variables"),
+        (
+            Broken({"critical_load": np.ones(2)}),
+            r"'critical_load' of shape \(2,\), not \(3,\) over \(sample\)",
+        ),
+    ],
+)
+def test_a_solver_that_breaks_its_promise_is_refused(method, words):
+    problem = st.paper.problem(nodes=256)
+    strength = 1e6 + np.arange(256.0) * np.ones((3, 1))
+    with pytest.raises(st.InputError, match=words):
+        st.onset(problem, strength, method=method)
 
 
 def test_a_method_from_another_package(tmp_path):
