@@ -242,6 +242,30 @@ def test_rupture_writes_result_figures_and_film(command, study, tmp_path):
         np.testing.assert_array_equal(result.peak_strength, tau_p[0])
 
 
+@pytest.mark.slow
+def test_rupture_of_an_overstressed_patch_under_a_load_of_its_own(command, study):
+    """Slip begins at once; load, end and stations stand in the study file, and no loading rate."""
+    nodes = 256
+    tau_p = np.full(nodes, 1.2e6)
+    np.save("p.npy", tau_p)
+    away = np.abs(np.arange(nodes) - nodes // 2)
+    np.save("i.npy", np.where(away < 40, 1.3e6, 0.6e6))
+    given = small_study(length=0.05, nodes=nodes)
+    given["problem"]["load"] = {"initial_stress": "i.npy"}
+    given["method"] = {
+        "type": "rupture", "load": [[0.0, 1.0], [0.0, 0.0]], "stop": "time", "end_time": 4e-5,
+    }  # fmt: skip
+    given["save"] = {"every": 5, "stations": {"beside": 0.01}}
+    study.write_text(tomli_w.dumps(given))
+    code, text, _ = command("rupture", study, "--strength", "p.npy", "--out", "rupture")
+    assert code == 0
+    assert "ended by: time" in text
+    with xr.open_dataset("rupture/rupture.nc") as result:
+        assert np.isnan(result.critical_load)
+        assert result.station_slip.sizes["step"] > 50
+        assert float(result.time[-1]) >= 4e-5
+
+
 def test_reliability_writes_the_curve(command, study, tmp_path):
     study.write_text(tomli_w.dumps({k: v for k, v in STUDY.items() if k != "sweep"}))
     code, out, _ = command(
