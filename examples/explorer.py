@@ -64,29 +64,10 @@ MARGINALS: dict[str, Callable[[float, float], Any]] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """What the sliders say, in the units that they show.
+    """What the sliders say: lengths in mm, stresses in MPa, the critical slip in um.
 
-    Attributes
-    ----------
-    correlation_length : float
-        xi_0, mm.
-    marginal : str
-        One of `MARGINALS`.
-    mean, spread : float
-        Mean and standard deviation of the strength, MPa.
-    residual : float
-        Residual strength, MPa.
-    critical_slip : float
-        Critical slip at the mean strength, um; with it and the two strengths goes the weakening
-        rate, which is uniform.
-    pressure : float
-        Normal pressure, MPa.
-    length : float
-        Of the interface, mm.
-    sample : int
-        The one whose profile is shown.
-    load : float
-        Share of its exact onset at which its slip patches are shown.
+    The critical slip is that at the mean strength; with it and the two strengths goes the weakening
+    rate, which is uniform. `load` is the share of the exact onset at which slip is shown.
     """
 
     correlation_length: float = 1.5
@@ -102,13 +83,7 @@ class Setting:
 
     @property
     def weakening_rate(self) -> float:
-        """(mean strength - residual strength)/critical slip, Pa/m.
-
-        Raises
-        ------
-        st.InputError
-            If the strength does not fall.
-        """
+        """(mean strength - residual strength)/critical slip, Pa/m."""
         if self.residual >= self.mean:
             raise st.InputError(
                 f"residual strength: {self.residual:g} MPa is not below the mean strength,"
@@ -128,7 +103,7 @@ class Setting:
         wanted = max(SHOWN_NODES * self.length * 1e-3 / h_n, waves * self.length)
         return int(np.clip(2 ** math.ceil(math.log2(wanted)), FEWEST, MOST))
 
-    def problem(self) -> Problem:
+    def problem(self) -> st.Problem:
         """Everything that is not random."""
         return st.Problem(
             solid=SOLID,
@@ -139,14 +114,14 @@ class Setting:
             load=st.Load(normal_pressure=self.pressure * 1e6),
         )
 
-    def strength(self) -> RandomField:
+    def strength(self) -> st.RandomField:
         """The random strength."""
         return st.RandomField(
             marginal=MARGINALS[self.marginal](self.mean * 1e6, self.spread * 1e6),
             spectrum=st.PowerLawSpectrum(correlation_length=self.correlation_length * 1e-3),
         )
 
-    def study(self) -> Study:
+    def study(self) -> st.Study:
         """The thousand samples as a study."""
         return st.Study(
             problem=self.problem(),
@@ -160,65 +135,9 @@ class Setting:
         """The study as a file for `stiction run`."""
         return tomli_w.dumps(self.study().to_dict())
 
-    def code(self) -> str:
-        """Python that computes what is shown."""
-        problem, field = self.problem(), self.strength()
-        if isinstance(field.marginal, st.Beta):
-            marginal = f"st.{field.marginal!r}"
-            head = "import stiction as st\n"
-        else:
-            parameters = MARGINALS[self.marginal](self.mean * 1e6, self.spread * 1e6)
-            marginal = (
-                f"scipy.stats.lognorm({parameters.args[0]!r}, scale={parameters.kwds['scale']!r})"
-            )
-            head = "import scipy.stats\n\nimport stiction as st\n"
-        solid, friction = problem.solid, problem.friction
-        return f"""{head}
-problem = st.Problem(
-    solid=st.Solid(
-        shear_modulus={solid.shear_modulus!r}, poisson_ratio={solid.poisson_ratio!r},
-        density={solid.density!r}, plane={solid.plane!r},
-    ),
-    interface=st.Interface(length={problem.interface.length!r}, nodes={problem.interface.nodes!r}),
-    friction=st.LinearWeakening(
-        weakening_rate={friction.weakening_rate!r},
-        residual_strength={friction.residual_strength!r},
-    ),
-    load=st.Load(normal_pressure={problem.load.normal_pressure!r}),
-)
-strength = st.RandomField(
-    marginal={marginal},
-    spectrum=st.PowerLawSpectrum(correlation_length={self.correlation_length * 1e-3!r}),
-)
-many = st.monte_carlo(problem, strength, method=st.LocalCriterion(), samples={SAMPLES}, seed=0)
-st.plot.monte_carlo(many)
-
-tau_p = strength.sample(problem.interface, samples={self.sample + 1}, seed=0)[{self.sample}]
-exact = st.onset(problem, tau_p, method=st.Equilibrium())
-st.plot.onset(exact, tau_p)
-path = st.equilibrium_path(problem, tau_p, [{self.load!r} * exact.first_instability.item()])
-st.plot.equilibrium_path(path)
-"""
-
 
 class Answer(NamedTuple):
-    """What is drawn, in the units of the page.
-
-    Attributes
-    ----------
-    x : (nodes,) array
-        mm.
-    strength, average, stress : (nodes,) arrays
-        Strength, nucleation stress, and shear stress at the load shown, MPa.
-    slip : (nodes,) array
-        At the load shown, um.
-    place, onset : float
-        Where (mm) and at which mean stress (MPa) this sample begins to slide, exactly.
-    coefficients : (samples,) array
-        Friction coefficients by the local criterion, in rising order.
-    doubts : tuple of str
-        Warnings.
-    """
+    """What is drawn: positions in mm, stresses in MPa, slip in um, coefficients in rising order."""
 
     x: Array
     strength: Array
@@ -239,13 +158,7 @@ class Cached:
         self._one: tuple[Any, tuple[Any, ...]] | None = None
 
     def answer(self, setting: Setting) -> Answer:
-        """All that is shown.
-
-        Raises
-        ------
-        st.InputError
-            If the numbers do not fit together.
-        """
+        """All that is shown."""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             problem, strength = setting.problem(), setting.strength()
@@ -271,7 +184,13 @@ class Cached:
         if self._many is None or self._many[0] != key:
             method = st.LocalCriterion()
             found = st.monte_carlo(
-                problem, strength, method=method, samples=SAMPLES, seed=0, progress=False
+                problem,
+                strength,
+                method=method,
+                samples=SAMPLES,
+                seed=0,
+                pilot=False,
+                progress=False,
             )
             self._many = key, np.sort(found.friction_coefficient.values)
         return self._many[1]
@@ -302,7 +221,6 @@ _SLIDERS: dict[str, tuple[str, float, float, float]] = {
     "length": ("length of the interface (mm)", 20.0, 200.0, 5.0),
     "load": ("load, as a share of the onset", 0.7, 0.999, 0.001),
 }
-HOST = "127.0.0.1"
 _WIDTH = 300
 _SOON = 30
 """Milliseconds in which further moves of a slider are gathered."""
@@ -327,7 +245,6 @@ class Explorer:
         )
         self.sample = pn.widgets.IntSlider(name="sample shown", start=0, end=99, width=_WIDTH)
         self.words, self.doubts = pn.pane.HTML(""), pn.pane.Alert(visible=False)
-        self.code = pn.pane.Markdown("", sizing_mode="stretch_width")
         self.profile, self.slip, self.density, self.tail = (ColumnDataSource() for _ in range(4))
         self.place = ColumnDataSource({"x": [], "y": []})
         save = pn.widgets.FileDownload(
@@ -343,10 +260,6 @@ class Explorer:
                 self.words,
                 self.doubts,
                 *(pn.pane.Bokeh(one, sizing_mode="stretch_width") for one in self._figures()),
-                pn.Card(
-                    self.code, title="show me the code", collapsed=True,
-                    sizing_mode="stretch_width",
-                ),
                 sizing_mode="stretch_width",
                 styles={"flex": "1 1 340px", "min-width": "0"},
             ),
@@ -380,13 +293,11 @@ class Explorer:
         try:
             setting = self.setting()
             answer = self._cached.answer(setting)
-            code = setting.code()
         except st.InputError as error:
             self._say("danger", error.problems)
             return
         self._draw(setting, answer)
         self._say("warning", answer.doubts)
-        self.code.object = f"```python\n{code}```"
         low, middle, high = np.quantile(answer.coefficients, [0.05, 0.5, 0.95])
         self.words.object = (
             f"<p id='answer'>static friction coefficient <b>{middle:.4f}</b> (median of"
@@ -472,24 +383,6 @@ def page() -> Any:
     return Explorer().view
 
 
-def serve(port: int, *, show: bool, background: bool = False) -> Any:
-    """Serve the page on this machine only, until it is interrupted.
-
-    Parameters
-    ----------
-    port : int
-    show : bool
-        Open a browser.
-    background : bool
-        Return the server, that runs in a thread and has a method `stop`.
-    """
-    pn.extension(design="native")
-    return pn.serve(
-        page, port=port, address=HOST, show=show, title="stiction explorer",
-        threaded=background, verbose=not background,
-        websocket_origin=[f"{HOST}:{port}", f"localhost:{port}"],  # no other page may talk to it
-    )  # fmt: skip
-
-
 if __name__ == "__main__":
-    serve(5006, show=True)
+    pn.extension(design="native")
+    pn.serve(page, port=5006, address="127.0.0.1", show=True, title="stiction explorer")
