@@ -139,7 +139,7 @@ BAD = {
         lambda: infer(PEAKS / 2e6, unit="1"),
         ["coefficients of friction", "normal_pressure"],
     ),
-    "load cell": (lambda: infer(load_cell_error=-1.0), ["load_cell_error", ">= 0"]),
+    "load cell": (lambda: infer(load_cell_error=-1.0), ["load_cell_error", "equal to 0"]),
     "load cell in another unit": (
         lambda: infer(PEAKS / 1e6, unit="MPa", load_cell_error=5e3),
         ["load_cell_error", "unit of the peaks"],

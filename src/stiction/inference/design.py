@@ -4,26 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from pydantic import BeforeValidator
 
 from stiction.arrays import Array
-from stiction.errors import InputError
+from stiction.errors import InputError, unknown_name
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, Model, make_model
 from stiction.inference.posterior import predicted
 from stiction.inference.prior import Prior, make_prior
-from stiction.methods import Method, check_method
-from stiction.model import Progress, at_least, check, describe, is_finite, is_whole
+from stiction.load import NotNegative
+from stiction.methods import MethodObject
+from stiction.model import Count, Positive, Progress, at_least, checked, model
 from stiction.problem import Problem
-from stiction.progress import SILENT, Meter, Show
+from stiction.progress import SILENT, Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, to_dataset
 
-OPTIONS = ("tests", "known", "load_cell_error")
 POINTS = 8_000
 """Of the grid of each posterior."""
 UNIFORM = 12.0**-0.5
@@ -35,26 +36,36 @@ VARIABLES = {
 }
 
 
-class Design(NamedTuple):
-    """One way to spend the tests: their number by length (m), what is known, and the error, Pa."""
-
-    tests: Mapping[float | None, int]
-    known: tuple[str, ...]
-    error: float
+def _by_length(tests: Any) -> Any:
+    return tests if isinstance(tests, Mapping) else {None: tests}
 
 
+def _listed(names: Any) -> Any:
+    return (names,) if isinstance(names, str) else names
+
+
+@model(kw_only=True)
+class Design:
+    """One way to spend the tests: their number, by length (m), what is known, and the error, Pa."""
+
+    tests: Annotated[dict[Positive | None, Count], BeforeValidator(_by_length)]
+    known: Annotated[tuple[str, ...], BeforeValidator(_listed)] = ()
+    load_cell_error: NotNegative = 0.0
+
+
+@checked
 def design_of_tests(
     problem: Problem,
     random: RandomInterface | RandomField,
     *,
-    prior: Mapping[str, Any],
-    designs: Mapping[str, Any],
-    method: Method,
-    load_cell_error: float = 0.0,
-    repetitions: int = 60,
-    samples: int | None = None,
-    seed: int = 0,
-    progress: Show = True,
+    prior: Any,
+    designs: dict[str, Any],
+    method: MethodObject,
+    load_cell_error: NotNegative = 0.0,
+    repetitions: at_least(10) = 60,  # type: ignore[valid-type]
+    samples: at_least(100) | None = None,  # type: ignore[valid-type]
+    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    progress: Progress = True,
 ) -> xr.Dataset:
     """Estimate how much each design of tests will tell of each parameter.
 
@@ -107,23 +118,19 @@ def design_of_tests(
     >>> bool(information.sel(design="many") > information.sel(design="few"))
     True
     """
-    check("progress", progress, Progress)
-    check_method(method)
     parameters = make_prior(problem, random, prior)
-    repetitions = check("repetitions", repetitions, at_least(10))
-    seed = check("seed", seed, at_least(0))
     found = _designs(designs, parameters, load_cell_error)
     lengths = list(dict.fromkeys(length for design in found.values() for length in design.tests))
     with Meter("design of tests", show=progress) as meter:
-        model = make_model(
+        simulated = make_model(
             parameters, method=method, lengths=lengths, error=0.0, samples=samples, seed=seed,
             variable="critical_stress", meter=meter,
         )  # fmt: skip
         meter.stage("simulated campaigns", repetitions * len(found))
         rows = []
         for design in found.values():
-            specimens = tuple(model.specimens[lengths.index(one)] for one in design.tests)
-            own = replace(model, error=design.error, specimens=specimens)
+            specimens = tuple(simulated.specimens[lengths.index(one)] for one in design.tests)
+            own = replace(simulated, error=design.load_cell_error, specimens=specimens)
             rows.append(_expected(own, design, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
@@ -135,48 +142,26 @@ def design_of_tests(
     return to_dataset(values, variables, coordinates, {"repetitions": repetitions})
 
 
-def _designs(given: Any, prior: Prior, error: Any) -> dict[str, Design]:
-    if not isinstance(given, Mapping) or not given:
-        raise InputError(
-            "designs: must map names to designs, such as {'25 tests': 25, 'two lengths':"
-            f" {{0.1: 15, 0.05: 15}}}}, got {describe(given)}"
-        )
-    problems: list[str] = []
+def _designs(given: dict[str, Any], prior: Prior, error: float) -> dict[str, Design]:
+    """The designs by name, or everything that is wrong with them."""
+    problems = [] if given else ["designs: are none"]
     found = {}
-    for name, value in given.items():
+    for name, one in given.items():
+        table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
         try:
-            found[str(name)] = _design(value, prior, error)
+            design = Design(**({"load_cell_error": error} | dict(table)))
         except InputError as mistake:
-            problems += [f"designs: {name}: {text}" for text in mistake.problems]
+            texts = (text.removeprefix("Design.") for text in mistake.problems)
+            problems += [f"designs: {name}: {text}" for text in texts]
+            continue
+        found[name] = design
+        unknown = [key for key in design.known if key not in prior.names]
+        problems += [unknown_name(f"designs: {name}: known", key, prior.names) for key in unknown]
+        if set(design.known) >= set(prior.names):
+            problems.append(f"designs: {name}: known: every parameter would be known")
     if problems:
         raise InputError(problems)
     return found
-
-
-def _design(given: Any, prior: Prior, error: Any) -> Design:
-    table = given if isinstance(given, Mapping) and "tests" in given else {"tests": given}
-    tests, known = table["tests"], table.get("known", ())
-    tests = dict(tests) if isinstance(tests, Mapping) else {None: tests}
-    known = (known,) if isinstance(known, str) else tuple(known)
-    error = table.get("load_cell_error", error)
-    problems = [f"unknown {key!r} (valid: {', '.join(OPTIONS)})" for key in table
-                if key not in OPTIONS]  # fmt: skip
-    for length, count in tests.items():
-        if not is_whole(count, 1):
-            problems.append(f"tests: must be whole numbers >= 1, got {describe(count)}")
-        if length is not None and not (is_finite(length) and length > 0.0):
-            problems.append(f"tests: lengths must be positive, in m, got {describe(length)}")
-    for name in known:
-        if name not in prior.names:
-            names = ", ".join(prior.names)
-            problems.append(f"known: {name!r} is no parameter of the prior ({names})")
-    if set(known) == set(prior.names):
-        problems.append("known: every parameter would be known")
-    if not (is_finite(error) and error >= 0.0):
-        problems.append(f"load_cell_error: must be a number >= 0 in Pa, got {describe(error)}")
-    if problems:
-        raise InputError(problems)
-    return Design({length: int(count) for length, count in tests.items()}, known, float(error))
 
 
 def _expected(model: Model, design: Design, repetitions: int, seed: int, meter: Meter) -> Array:

@@ -22,10 +22,11 @@ from stiction.inference.plausibility import (
 )
 from stiction.inference.posterior import Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
-from stiction.methods import Method, check_method
-from stiction.model import Progress, at_least, check, describe, is_finite
+from stiction.load import NotNegative
+from stiction.methods import MethodObject
+from stiction.model import Progress, at_least, checked
 from stiction.problem import Problem
-from stiction.progress import Meter, Show
+from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.units import factor_to
@@ -41,18 +42,19 @@ NEAR, HELD = 0.05, 1e-3
 """Share of the box at either end, and mass of the posterior there above which the box grows."""
 
 
+@checked
 def infer(
     problem: Problem,
     random: RandomInterface | RandomField,
     peaks: Any,
     *,
-    prior: Mapping[str, Any],
-    method: Method,
-    load_cell_error: float = 0.0,
+    prior: Any,
+    method: MethodObject,
+    load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
-    samples: int | None = None,
-    seed: int = 0,
-    progress: Show = True,
+    samples: at_least(100) | None = None,  # type: ignore[valid-type]
+    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    progress: Progress = True,
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
 
@@ -130,11 +132,6 @@ def infer(
     >>> 0.5e6 < low < high < 0.75e6
     True
     """
-    check("progress", progress, Progress)
-    check_method(method)
-    seed = check("seed", seed, at_least(0))
-    if samples is not None:
-        samples = check("samples", samples, at_least(100))
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
     check_pressure(parameters, measured)
@@ -152,14 +149,10 @@ def infer(
         return _posterior(likelihood, grid, measured, seed, meter)
 
 
-def _load_cell(given: Any, unit: str, peaks: Peaks, si: bool) -> float:
+def _load_cell(given: float, unit: str, peaks: Peaks, si: bool) -> float:
     """The load-cell error in the unit of the checked peaks."""
-    if not (is_finite(given) and given >= 0.0):
-        raise InputError(
-            f"load_cell_error: must be a standard deviation >= 0 in {unit}, got {describe(given)}"
-        )
     factor = 1.0 if si else factor_to("1" if peaks.coefficients else "Pa", unit)
-    error = float(given) * factor
+    error = given * factor
     if error > np.concatenate(peaks.values).max():
         raise InputError(
             f"load_cell_error: {given:g} {unit} is more than the largest peak; it is a standard"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,22 +11,24 @@ from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import full_key, with_parameters
-from stiction.methods import Method, check_method
-from stiction.model import Names, Numbers, at_least, check, describe, is_finite
+from stiction.load import NotNegative
+from stiction.methods import MethodObject
+from stiction.model import Names, Numbers, at_least, check, checked, describe
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 
 
+@checked
 def simulator(
     problem: Problem,
     random: RandomInterface | RandomField,
-    parameters: Sequence[str],
+    parameters: Names,
     *,
-    method: Method,
-    samples: int,
-    seed: int = 0,
-    load_cell_error: float = 0.0,
+    method: MethodObject,
+    samples: at_least(1),  # type: ignore[valid-type]
+    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    load_cell_error: NotNegative = 0.0,
 ) -> Callable[..., Array]:
     """Return a function from parameters to the peaks of repeated tests, for dynesty, sbi, others.
 
@@ -71,14 +73,7 @@ def simulator(
     >>> simulate([2e-3, 0.66e6]).shape
     (25,)
     """
-    check("problem", problem, Problem)
-    check_method(method)
-    names = check("parameters", parameters, Names)
-    samples, seed = check("samples", samples, at_least(1)), check("seed", seed, at_least(0))
-    if not (is_finite(load_cell_error) and load_cell_error >= 0.0):
-        raise InputError(
-            f"load_cell_error: must be a number >= 0 in Pa, got {describe(load_cell_error)}"
-        )
+    names = parameters
     if not names or len({full_key(name) for name in names}) < len(names):
         raise InputError(f"parameters: must be different names, got {describe(list(names))}")
     interface = as_random_interface(random)
