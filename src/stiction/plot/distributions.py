@@ -150,7 +150,7 @@ def quantiles(
         )
     along = along or dims[0]
     within = next((dim for dim in dims if dim != along), None)
-    curves = [(None, variable)]
+    curves: list[tuple[str | None, xr.DataArray]] = [(None, variable)]
     if within is not None:
         steps = _chosen(variable.sizes[within])
         curves = [

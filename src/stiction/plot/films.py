@@ -16,7 +16,15 @@ from stiction.errors import InputError
 from stiction.model import FilePath, at_least, check
 from stiction.plot import maps
 from stiction.plot.axes import need, problem_of, unit_for
-from stiction.plot.ruptures import COLORS, DECADES, KEEP, finite_strength, rate_scale, since_onset
+from stiction.plot.ruptures import (
+    COLORS,
+    DECADES,
+    KEEP,
+    finite_strength,
+    masked,
+    rate_scale,
+    since_onset,
+)
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
 
 Frames = tuple[Figure, Callable[[int], None]]
@@ -124,9 +132,7 @@ def _plane_film(run: xr.Dataset) -> Frames:
     low, high = np.quantile(stress, [0.001, 0.999])
     figure = new_figure(PAGE * 1.15, 3.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    slip = maps.image(
-        left, interface, np.ma.masked_less(rate[0], norm.vmin), norm=norm, cmap=COLORS
-    )
+    slip = maps.image(left, interface, masked(rate[0], norm), norm=norm, cmap=COLORS)
     load = maps.image(right, interface, stress[0], vmin=low, vmax=high, cmap="cividis")
     for axes, image, text in (
         (left, slip, "slip rate (m/s)"),
@@ -138,7 +144,7 @@ def _plane_film(run: xr.Dataset) -> Frames:
     tick = _clock(left, run)
 
     def show(i: int) -> None:
-        slip.set_data(np.ma.masked_less(rate[i], norm.vmin).T)
+        slip.set_data(masked(rate[i], norm).T)
         load.set_data(stress[i].T)
         tick(i)
 

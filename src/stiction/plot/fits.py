@@ -117,8 +117,9 @@ def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Arr
 
     def correlation(power: Array) -> Array:
         covariance = fft.irfftn(power, one.window.shape)
-        along: Array = covariance.reshape(covariance.shape[0], -1)[:count, 0]
-        return along / along[0]
+        along = covariance.reshape(covariance.shape[0], -1)[:count, 0]
+        scaled: Array = along / along[0]
+        return scaled
 
     _band(axes, lag, np.array([correlation(power) for power in simulated]))
     measured = correlation(one.average)
@@ -141,11 +142,11 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
 
     k, expected = averaged(model.expectation(one))
     measured = averaged(one.average)[1]
-    _band(axes, k, factor * np.array([averaged(power)[1] for power in simulated]))
+    _band(axes, k, factor * np.array([averaged(power)[1] for power in simulated], dtype=np.float64))
     axes.plot(k, factor * expected, color=color(1), label="fitted, through the window")
     axes.plot(k, factor * measured, ".", color=INK, markersize=4, label="measured, averaged")
     if model.noise**2 > 1e-6 * expected.max():
-        style = {"color": ACCENT, "linewidth": 0.8, "linestyle": "--"}
+        style: dict[str, Any] = {"color": ACCENT, "linewidth": 0.8, "linestyle": "--"}
         axes.axhline(factor * model.noise**2, label="noise", **style)
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -188,7 +189,8 @@ def posterior(found: Posterior) -> Figure:
         labels.append(with_unit(name, unit))
     with paper_style():
         figure = new_figure(size + 3.2, size)
-        left, right = figure.subfigures(1, 2, width_ratios=[size, 3.2])
+        parts: Any = figure.subfigures(1, 2, width_ratios=[size, 3.2])
+        left, right = parts
         panels = left.subplots(count, count, squeeze=False)
         for i, j in np.ndindex(count, count):
             axes = panels[i, j]
@@ -233,7 +235,7 @@ def _is_wide(values: Array) -> bool:
 
 def _draw_marginal(axes: Axes, before: Array, after: Array) -> None:
     low, high = np.quantile(before, [0.002, 0.998])
-    bins = (np.geomspace if _is_wide(before) else np.linspace)(low, high, 46)
+    bins: Any = (np.geomspace if _is_wide(before) else np.linspace)(low, high, 46)
     styles: tuple[dict[str, Any], ...] = (
         {"color": PALE, "histtype": "stepfilled", "label": "prior"},
         {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2},

@@ -109,7 +109,7 @@ def front(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = 
             lines = {"x": speed[:, j], "y": speed[i, :]}
             for number, (dim, values) in enumerate(lines.items()):
                 place = interface.coordinates[dim] * factor
-                style = {"markersize": 2.5, "color": (INK, ACCENT)[number]}
+                style: dict[str, Any] = {"markersize": 2.5, "color": (INK, ACCENT)[number]}
                 axes.plot(place, values, ".", label=f"along ${dim}$", **style)
             axes.legend()
         else:
@@ -171,13 +171,18 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem, whole: bool)
     middle = 0.5 * (since[1:] + since[:-1])
     edges = np.concatenate([since[:1], middle, since[-1:]])
     mesh = axes.pcolormesh(
-        along * length, edges * factor, np.ma.masked_less(rate, norm.vmin), norm=norm,
+        along * length, edges * factor, masked(rate, norm), norm=norm,
         cmap=COLORS, rasterized=True,
     )  # fmt: skip
     place = float(run["critical_position"]) * length
     if np.isfinite(float(run["onset_time"])):
         axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
     return mesh, with_unit(name, unit)
+
+
+def masked(rate: Array, norm: LogNorm) -> Any:
+    """Return slip rates with what is below the scale left out: it stays white."""
+    return np.ma.masked_less(rate, norm.vmin or 0.0)
 
 
 def finite_strength(run: xr.Dataset) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from stiction.files import write_whole
 
@@ -74,7 +74,7 @@ def paper_style() -> Iterator[None]:
         yield
 
 
-def save_figure(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure | SubFigure, path: Path) -> None:
     """Write a figure, whole or not at all.
 
     Raises
@@ -83,7 +83,8 @@ def save_figure(figure: Figure, path: Path) -> None:
         If it cannot be written.
     """
     data = io.BytesIO()
-    figure.savefig(data, format=path.suffix[1:])
+    root: Any = figure.figure  # of a part of a figure the whole
+    root.savefig(data, format=path.suffix[1:])
     write_whole(path, data.getvalue())
 
 
