@@ -148,7 +148,9 @@ def _shape(value: Any, handler: Any) -> Any:
 
 
 def _written(value: Any, handler: Any) -> Any:
-    return dataclasses.asdict(value) if isinstance(value, LoadShape) else handler(value)
+    if not isinstance(value, LoadShape):
+        return handler(value)
+    return dataclasses.asdict(value)  # type: ignore[call-overload]  # shapes are models
 
 
 _SHAPE_SCHEMA = {

@@ -499,7 +499,7 @@ def _instances(annotation: Any) -> Any:
         return _instance_of((annotation,))
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
         members = typing.get_args(annotation)
-        classes = tuple(one for one in members if dataclasses.is_dataclass(one))
+        classes: Any = tuple(one for one in members if dataclasses.is_dataclass(one))
         rest = tuple(one for one in members if one not in classes)
         if classes:
             return typing.Union[(_instance_of(classes), *rest)]

@@ -315,14 +315,6 @@ SILENT = Meter("", show=False)
 """For work that nobody watches and nothing limits."""
 
 
-def check_time_limit(value: Any, name: str = "time_limit") -> list[str]:
-    """Why a value is no time limit."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if value is None or (number and 0.0 < value < math.inf):
-        return []
-    return [f"{name}: must be a positive number of seconds, got {value!r}"]
-
-
 class Portions:
     """Cuts rows into portions of about a quarter of a second, by what the last ones took."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from numbers import Real as Number
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from stiction.errors import InputError, UnitWarning, warn_user
-from stiction.model import Mode, Positive, Real, model
+from stiction.model import Mode, Positive, Real, is_finite, model
 
 SLOWEST, FASTEST = 0.3, 2e4
 """m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
@@ -77,12 +76,13 @@ class Solid:
             return given
         if "shear_modulus" in named or (isinstance(given, ArgsKwargs) and given.args):
             raise InputError("give shear_modulus or youngs_modulus, by name, and not both")
-        modulus, ratio = named["youngs_modulus"], named.get("poisson_ratio")
+        modulus: Any = named["youngs_modulus"]
+        ratio: Any = named.get("poisson_ratio")
         named = {name: value for name, value in named.items() if name != "youngs_modulus"}
-        if not (isinstance(modulus, Number) and modulus > 0.0):
+        if not (is_finite(modulus) and modulus > 0.0):
             raise InputError(f"youngs_modulus: must be a positive number, got {modulus!r}")
         # Without a usable ratio any modulus will do: the ratio is what is complained of.
-        usable = isinstance(ratio, Number) and ratio > -1.0
+        usable = is_finite(ratio) and ratio > -1.0
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
         return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
 
