@@ -97,8 +97,9 @@ def test_a_slow_method_goes_with_plain_sampling_only(system):
     for algorithm in ("subset", "two_level"):
         with pytest.raises(st.InputError, match="plain"):
             failure_probability(*system, 0.69e6, method=rupture, algorithm=algorithm)
-    with pytest.raises(st.InputError, match="monte_carlo"):
-        design_stress(*system, probability=1e-3, method=rupture)
+    for method in (rupture, st.Rupture(loading_rate=1e9)):
+        with pytest.raises(st.InputError, match="monte_carlo"):
+            design_stress(*system, probability=1e-3, method=method)
     result = failure_probability(*system, 0.72e6, method=rupture, target_cv=0.2)
     assert result.algorithm == "plain"
     assert "rupture" in result.reason
@@ -273,6 +274,19 @@ class Piled(Standing):
         return solver
 
 
+class Misled(Standing):
+    """What the local criterion holds for weak is stronger by a twentieth."""
+
+    def prepare(self, problem):
+        def solver(rows):
+            values = dict(LOCAL.prepare(problem)(rows))
+            stress = values["critical_stress"]
+            values["critical_stress"] = np.where(stress < 0.5e6, stress + 0.05e6, stress)
+            return values
+
+        return solver
+
+
 @pytest.mark.parametrize("algorithm", ["auto", "subset", "two_level"])
 def test_onsets_that_pile_up_on_the_bound(system, algorithm):
     with pytest.warns(st.AccuracyWarning, match="is the bound itself"):
@@ -315,6 +329,55 @@ def test_without_a_bound_nothing_is_said_of_one(unbounded):
     assert "bound" not in str(answer)
 
 
+@pytest.mark.parametrize("stress", [0.16, 12.8])
+def test_a_stress_in_another_unit_is_doubted_before_anything_is_sampled(system, stress):
+    """A coefficient, or MPa: 37,000 evaluations said P = 0 without a word."""
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.12), system[1].spectrum)
+    with pytest.warns(st.UnitWarning, match=r"mean strength.*friction_coefficient="):
+        found = failure_probability(system[0], field, stress, method=LOCAL)
+    assert (found.probability, found.evaluations, found.algorithm) == (0.0, 0, "exact")
+
+
+@pytest.fixture(scope="module")
+def joint():
+    """Residual strength is reached within the critical patch, so that onsets come later."""
+    problem = st.Problem(
+        st.Solid(1e9, 0.33, 1170.0),
+        st.Interface(0.0144, 96),
+        st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.5),
+    )
+    spectrum = st.PowerLawSpectrum(0.3 * problem.nucleation_length)
+    return problem, st.RandomField(st.Lognormal(mean=1e6, cv=0.25), spectrum, True)
+
+
+def test_the_local_criterion_is_checked_by_equilibrium(joint):
+    """Both probabilities are given where they differ; counting tells that they do."""
+    with pytest.warns(st.AccuracyWarning, match=r"fail by the local criterion and .* by equil"):
+        found = failure_probability(*joint, 0.66e6, method=LOCAL, algorithm="subset", target_cv=0.2)
+    samples = joint[1].sample(joint[0].interface, samples=2000, seed=3)
+    local, exact = (
+        np.mean(st.onset(joint[0], samples, method=m, progress=False).critical_stress < 0.66e6)
+        for m in (LOCAL, Equilibrium())
+    )
+    assert exact < 0.7 * local
+    assert 0.4 < found.probability / local < 2.5
+    with pytest.warns(st.AccuracyWarning, match="by equilibrium the probability"):
+        answer = design_stress(*joint, probability=1e-3, method=LOCAL, target_cv=0.3)
+    assert any("by equilibrium" in text for text in answer.warnings)
+
+
+def test_no_word_of_equilibrium_where_it_agrees(system):
+    found = failure_probability(*system, 0.67e6, method=LOCAL, target_cv=0.3)
+    assert not any("by equilibrium" in text for text in found.warnings)
+
+
+def test_auto_leaves_a_guide_whose_samples_do_not_fail(joint):
+    """Among plain samples it picks the weakest; in the tail hardly one of its samples fails."""
+    found = failure_probability(*joint, 0.44e6, method=Misled("equilibrium"), target_cv=0.4)
+    assert found.algorithm == "subset"
+    assert "a poor guide" in found.reason
+
+
 @pytest.fixture(scope="module")
 def app():
     command = typer.Typer()
@@ -322,7 +385,7 @@ def app():
     return command
 
 
-def test_command_writes_table_data_and_figures(app, system, tmp_path):
+def test_command_writes_table_data_and_figure(app, system, tmp_path):
     study = st.Study(
         problem=system[0],
         random=system[1],
@@ -332,42 +395,17 @@ def test_command_writes_table_data_and_figures(app, system, tmp_path):
     study.to_toml(tmp_path / "study.toml")
     out = tmp_path / "out"
     arguments = [str(tmp_path / "study.toml"), "--out", str(out), "--smallest", "1e-4"]
-    arguments += ["--plain-samples", "1000", "--stress", "0.68e6", "--probability", "1e-3"]
+    arguments += ["--stress", "0.68e6", "--probability", "1e-3"]
     done = CliRunner().invoke(app, arguments, catch_exceptions=False)
     assert done.exit_code == 0
-    names = {path.name for path in out.iterdir()}
-    for stem in ("failure_curve", "weak_spots"):
-        assert {f"{stem}.png", f"{stem}.pdf"} <= names
-    table = (out / "failure_curve.csv").read_text().splitlines()
-    assert table[0].startswith("stress (Pa),above the bound (Pa),P,")
+    assert {"failure_curve.png", "failure_curve.pdf"} <= {path.name for path in out.iterdir()}
     with xr.open_dataset(out / "failure_curve.nc") as curve:
-        assert curve.sizes["point"] == len(table) - 1
         assert curve["stress"].attrs["units"] == "Pa"
         assert curve.attrs["lower_bound"] == 0.66e6
-        again = failure_curve(*system, method=LOCAL, smallest=1e-4, plain_samples=1000, seed=3)
+        again = failure_curve(*system, method=LOCAL, smallest=1e-4, seed=3)
         np.testing.assert_array_equal(curve["probability"], again["probability"])
     assert "0.68 MPa" in done.output
     assert "at P = 0.001" in done.output
-
-
-def test_command_says_both_events_where_they_differ(app, unbounded, tmp_path):
-    study = st.Study(
-        problem=unbounded[0],
-        random=unbounded[1],
-        method=Equilibrium(),
-        ensemble=st.Ensemble(samples=10),
-    )
-    study.to_toml(tmp_path / "study.toml")
-    arguments = [str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")]
-    arguments += ["--smallest", "1e-2", "--plain-samples", "0", "--stress", "0.6e6"]
-    done = CliRunner().invoke(
-        app, [*arguments, "--event", "first_instability"], catch_exceptions=False
-    )
-    assert done.exit_code == 0
-    for words in ("as a whole:        P = ", "first instability: P = ", "conservative"):
-        assert words in done.output
-    assert "evaluations; equilibrium, first_instability" in done.output
-    assert "bound" not in done.output
 
 
 def test_command_refuses_a_sweep(app, system, tmp_path):
@@ -379,7 +417,7 @@ def test_command_refuses_a_sweep(app, system, tmp_path):
         sweep=[{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}],
     )
     study.to_toml(tmp_path / "study.toml")
-    with pytest.raises(st.InputError, match="correlation_length over 2 points"):
+    with pytest.raises(st.InputError, match="takes one interface"):
         CliRunner().invoke(
             app,
             [str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")],
@@ -391,14 +429,7 @@ def test_command_refuses_a_sweep(app, system, tmp_path):
 def test_command_names_mistakes(app, tmp_path):
     with pytest.raises(st.InputError, match="cannot be read"):
         CliRunner().invoke(app, [str(tmp_path / "none.toml")], catch_exceptions=False)
-    (tmp_path / "file").write_text("")
-    late = ["examples/reliability.toml", "--out", str(tmp_path / "out"), "--stress", "nan"]
-    with pytest.raises(st.InputError) as caught:
-        CliRunner().invoke(app, [*late, "--probability", "2"], catch_exceptions=False)
-    assert all(name in str(caught.value) for name in ("--stress", "--probability"))
+    arguments = ["examples/reliability.toml", "--out", str(tmp_path / "out")]
+    with pytest.raises(st.InputError, match="--probability"):
+        CliRunner().invoke(app, [*arguments, "--probability", "2"], catch_exceptions=False)
     assert not (tmp_path / "out").exists()
-    example = "examples/reliability.toml"
-    with pytest.raises(st.InputError, match="--out"):
-        CliRunner().invoke(
-            app, [example, "--out", str(tmp_path / "file" / "x")], catch_exceptions=False
-        )
