@@ -164,8 +164,8 @@ class ScaledSpectrum(SpectralDensity):
     """Spectra known by one length: g depends on k times it only."""
 
     correlation_length: Positive
-    truncation: Positive | None = None
-    power_kept: Share | None = None
+    truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
+    power_kept: Share | None = dataclasses.field(default=None, kw_only=True)
 
     @model_validator(mode="after")
     def _truncated_once(self) -> Any:
@@ -254,10 +254,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     1.0
     """
 
-    correlation_length: Positive
     exponent: Annotated[float, BeforeValidator(_number), Field(ge=0.6, le=64.0)] = 4.0
-    truncation: Positive | None = None
-    power_kept: Share | None = None
     type: Literal["power_law"] = "power_law"
 
     @property
