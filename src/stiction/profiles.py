@@ -253,6 +253,7 @@ def points_of(
     """
     import xarray as xr
 
+    data: Any
     if isinstance(source, str | Path):
         data = load(Path(source), value, dims)
     elif is_labelled(source):

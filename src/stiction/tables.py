@@ -151,7 +151,8 @@ def read_table(path: Path) -> Table:
     InputError
         Naming the line that does not fit.
     """
-    lines, comment = [], ""
+    lines: list[Any] = []
+    comment = ""
     for number, line in enumerate(_decoded(path).splitlines(), 1):
         if line.lstrip().startswith("#"):
             comment = comment if lines else line.strip().lstrip("#").strip()

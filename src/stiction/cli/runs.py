@@ -103,7 +103,12 @@ def run(
     if workers is not None and scheduler is not None:
         raise InputError("--workers, --scheduler: give one of them")
     loaded = Study.from_toml(study)
-    options = {"retry": retry, "time_limit": time_limit, "part": part, "pilot": pilot}
+    options: dict[str, Any] = {
+        "retry": retry,
+        "time_limit": time_limit,
+        "part": part,
+        "pilot": pilot,
+    }
     try:
         with _terminated_like_interrupted(), _executor(scheduler) as executor:
             stored = run_into(loaded, out, workers=workers, executor=executor, **options)

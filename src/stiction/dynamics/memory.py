@@ -208,17 +208,15 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     table, ramp = (zeros(count * pairs * rows * LANES) for rows in (4, 2))
-    return ImplicitTables(
-        np.array([-1.0, -1.0]),
+    arrays: Any = (
         *(table, ramp, *work_arrays(2, entries, float), *work_arrays(2, modes, float)),
-        *(
-            *work_arrays(4, modes, complex),
-            *work_arrays(8, nodes, float),
-            np.zeros(nodes, dtype=np.int64),
-        ),
+        *work_arrays(4, modes, complex),
+        *work_arrays(8, nodes, float),
+        np.zeros(nodes, dtype=np.int64),
         *np.zeros((2, count * grid.copies * 2 * LANES)),
         np.empty((2, 2 * LANES)),
     )
+    return ImplicitTables(np.array([-1.0, -1.0]), *arrays)
 
 
 @jit_inside

@@ -133,7 +133,7 @@ def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: bool 
     before the first and after the last. The search begins at every shift that puts the steepest
     moment of the record on a step or frame, and closes in on the best three.
     """
-    record = read_record(measured) if isinstance(measured, str | Path) else measured
+    record = read_record(Path(measured)) if isinstance(measured, str | Path) else measured
     kind = str(getattr(record, "name", None))
     if kind not in UNITS:
         raise InputError(

@@ -268,8 +268,10 @@ def solve_spans(
             while waiting or running:
                 while waiting and len(running) < 2 * slots():
                     span = cut(slots())
-                    work = (solve_span, points[span.point], span, parent, versions())
-                    running[executor.submit(*work)] = span
+                    future = executor.submit(
+                        solve_span, points[span.point], span, parent, versions()
+                    )
+                    running[future] = span
                 done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
                 for future in done:
                     span = running.pop(future)

@@ -93,13 +93,13 @@ class Experiment:
     def __post_init__(self) -> None:
         check_method(self.method)
         if not isinstance(self.problem, Problem):
-            problems = [f"problem: must be a Problem, got {describe(self.problem)}"]
+            mistakes = [f"problem: must be a Problem, got {describe(self.problem)}"]
             try:
                 as_random_interface(self.random)
             except InputError as error:
-                problems += error.problems
-            raise InputError(problems)
-        problems = []
+                mistakes += error.problems
+            raise InputError(mistakes)
+        problems: list[str] = []
         names: set[str] = set()
         try:
             random = as_random_interface(self.random)
@@ -219,7 +219,7 @@ class Experiment:
         InputError
             If a sample does not fit the method.
         """
-        return self.prepare()(self.sample(profiles))
+        return dict(self.prepare()(self.sample(profiles)))
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method, which is kept for the next call."""
@@ -352,7 +352,6 @@ class Ensemble:
     first: Number = 0
     keep: Names = ()
     keep_samples: Chosen | None = None
-    keep_limit: Positive | None = None
     keep_limit: Positive | None = None
 
     def of(self, problem: Problem, random: Any, method: Any) -> Experiment:

@@ -89,7 +89,7 @@ def compute(
         check_fields(points)
         if len(points) == 1:
             points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
-    solved = done.any(axis=1)
+    solved: NDArray[np.bool_] = np.any(done, axis=1)
     lost = np.zeros(len(points), dtype=np.int64)
     enough = np.minimum(HOPELESS, (~done).sum(axis=1))
     workers = usable_cores() if workers is None else workers

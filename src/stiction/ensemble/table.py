@@ -153,7 +153,7 @@ def decode(data: bytes | Any, *, rows_only: bool = False) -> tuple[Table, dict[s
         raise
     except (*UNREADABLE, AttributeError, TypeError) as error:
         raise ValueError(f"cannot be read: {error}") from None
-    found = {"values": parts["value"], "wide": parts["wide"]}
+    found: dict[str, Any] = {"values": parts["value"], "wide": parts["wide"]}
     return Table(**rows, **found, failures=failures, seconds=seconds), about
 
 

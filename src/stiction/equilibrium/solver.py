@@ -255,7 +255,7 @@ class Solver:
         assert self.coarse is not None
         others = []
         for offset in itertools.product((0, 1), repeat=len(rows.shape)):
-            nodes = (..., *(slice(first, None, 2) for first in offset))
+            nodes: Any = (..., *(slice(first, None, 2) for first in offset))
             part = Samples(*(given[nodes] for given in rows))
             others.append(part.mean_stress(first_instabilities(self.coarse, part)))
         error: Array = np.sqrt(np.mean([(other - onset) ** 2 for other in others], axis=0)) / 3.0

@@ -230,7 +230,9 @@ class PlaneProgram:
         now = present(sample, slip)
         found = plane_onset(
             self.plane,
-            *(given.reshape(self.shape) for given in (now.strength, sample.profile, now.rate)),
+            now.strength.reshape(self.shape),
+            sample.profile.reshape(self.shape),
+            now.rate.reshape(self.shape),
             self.requested,
             slip.reshape(self.shape) if slip.any() else None,
         )

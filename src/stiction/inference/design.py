@@ -149,7 +149,8 @@ def _designs(given: dict[str, Any], prior: Prior, error: float) -> dict[str, Des
     for name, one in given.items():
         table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
         try:
-            design = Design(**({"load_cell_error": error} | dict(table)))
+            own: dict[str, Any] = {"load_cell_error": error} | dict(table)
+            design = Design(**own)
         except InputError as mistake:
             texts = (text.removeprefix("Design.") for text in mistake.problems)
             problems += [f"designs: {name}: {text}" for text in texts]

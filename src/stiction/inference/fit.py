@@ -183,8 +183,10 @@ def fit_field(
         found, setting, compared = _best(families, spectral, rows, windows, detrend)
         options = (setting, bootstrap, seed, count, meter)
         repeated = [repeat(found, *options)]
+        fields = None
         if times == 3 and len(repeated[0].fits) >= FEWEST:
             fields = at_ends(repeated[0], setting, confidence)
+        if fields:
             repeated += [repeat(field, *options) for field in fields]
     done = [len(one.fits) for one in repeated]
     if min(done) < FEWEST:

@@ -224,7 +224,8 @@ def _first_box(
     for axis in range(prior.dimension):
         mass, centres = np.cumsum(grid.marginal(axis)), grid.centres(axis)
         first = float(centres[np.searchsorted(mass, LOST)])
-        last = float(centres[min(np.searchsorted(mass, 1.0 - LOST), centres.size - 1)])
+        end = min(int(np.searchsorted(mass, 1.0 - LOST)), centres.size - 1)
+        last = float(centres[end])
         room = max(WIDEN * (last - first), 1e-3)
         low.append(max(0.0, first - room))
         high.append(min(1.0, last + room))

@@ -341,7 +341,9 @@ def _beta(values: Array, quiet: Array, noise: float, fixed: dict[str, float], st
         return Beta(alpha=a, beta=b, low=low, high=high)
 
     if start is None:
-        ends = {name: mean + 1.1 * side * room[name] for name, side in sides.items()} | fixed
+        ends: dict[str, Any] = {
+            name: mean + 1.1 * side * room[name] for name, side in sides.items()
+        } | fixed
         u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
         total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, 0.2)
         start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)

@@ -186,7 +186,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     """
     path = check("path", path, FilePath)
     try:
-        return _from_table(read_table(path), unit)
+        return _from_table(read_table(Path(path)), unit)
     except InputError as error:
         raise InputError([f"{path}: {text}" for text in error.problems]) from None
 

@@ -157,7 +157,7 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     axes.legend()
 
 
-def _band(axes: Axes, at: Array, rows: Array) -> None:
+def _band(axes: Axes, at: Any, rows: Any) -> None:
     low, high = np.nanquantile(rows, [0.05, 0.95], axis=0)
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 

@@ -52,7 +52,8 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
             raise InputError(unknown)
         if pair[0] == pair[1]:
             raise InputError(f"{named}: a property is not correlated with itself")
-        if isinstance(rho, bool) or not isinstance(rho, Real) or not -1.0 <= rho <= 1.0:
+        number = isinstance(rho, Real) and not isinstance(rho, bool)
+        if not number or not -1.0 <= float(rho) <= 1.0:
             raise InputError(f"{named}: must be a number in [-1, 1], got {describe(rho)}")
         first, second = sorted(pair, key=NAMES.index)
         known = found.setdefault(first, {}).setdefault(second, float(rho))

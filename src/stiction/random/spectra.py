@@ -138,9 +138,11 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Return the first lag at which the correlation of z on a line falls to `target`, m."""
     edges, power = _truncated(spectrum)
-    first, second = (
-        float(integrate(lambda k, m=m: spectrum.density_at(k) * k**m, edges).sum()) for m in (1, 2)
-    )
+
+    def moment(order: int) -> float:
+        return float(integrate(lambda k: spectrum.density_at(k) * k**order, edges).sum())
+
+    first, second = moment(1), moment(2)
     slope, step = first / power, 0.25 * math.sqrt(power / second)
     before = lag = 0.0
     excess = 1.0 - target

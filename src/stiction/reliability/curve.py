@@ -168,14 +168,14 @@ def failure_curve(
     decades = max(np.log10(COMMONEST / deepest), 0.0)
     count = int(np.ceil(decades * points_per_decade)) + 1
     chances = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
-    stress = np.array([tail.quantile(float(chance)) for chance in chances])
-    cv = np.array([tail.cv(float(one)) for one in stress])
+    levels = np.array([tail.quantile(float(chance)) for chance in chances])
+    cv = np.array([tail.cv(float(one)) for one in levels])
     cut = meter.over and (bool(doubts) or bool(cv[-1] > target_cv) or onsets.size < plain_samples)
     if cut and not doubts:
         lacking = "the curve is less precise than asked for, or has fewer plain samples"
         doubts = [f"{lacking}: {short_of(state, tail.spent)}"]
     warned(doubts)
-    found = np.array([tail.probability(float(one)) for one in stress])
+    found = np.array([tail.probability(float(one)) for one in levels])
     lowest = state.bounds[0]
     ends = [
         lognormal_interval(float(p), float(c), confidence) for p, c in zip(found, cv, strict=True)
@@ -184,20 +184,20 @@ def failure_curve(
         tail.stress_interval(float(p), float(c), confidence, lowest)
         for p, c in zip(chances, cv, strict=True)
     ]
-    values = {
-        "stress": stress,
-        "stress_above_bound": stress - lowest,
+    values: dict[str, Any] = {
+        "stress": levels,
+        "stress_above_bound": levels - lowest,
         "probability": found,
         "cv": cv,
     }
     values |= dict(zip(("probability_low", "probability_high"), np.array(ends).T, strict=True))
     values |= dict(zip(("stress_low", "stress_high"), np.array(sides).T, strict=True))
     if np.isfinite(experiment.pressure):
-        values["friction_coefficient"] = stress / experiment.pressure
+        values["friction_coefficient"] = levels / experiment.pressure
     if alike_everywhere(experiment):
-        values["rice_probability"] = _rice(problem, experiment.random.strength, stress, seed)
+        values["rice_probability"] = _rice(problem, experiment.random.strength, levels, seed)
     if onsets.size:
-        plain = _plain(onsets, stress, confidence)
+        plain = _plain(onsets, levels, confidence)
         values |= dict(zip(("plain_probability", "plain_low", "plain_high"), plain, strict=True))
     attributes: dict[str, Any] = {
         "lower_bound": lowest,

@@ -162,7 +162,11 @@ def failure_probability(
     )  # fmt: skip
     pressure = experiment.pressure
     limit = float((friction_coefficient or 0.0) * pressure if stress is None else stress)
-    common = {"stress": limit, "confidence": confidence, "normal_pressure": pressure}
+    common: dict[str, Any] = {
+        "stress": limit,
+        "confidence": confidence,
+        "normal_pressure": pressure,
+    }
     if exact := _without_sampling(state, limit):
         chance, reason = exact
         return FailureProbability(
@@ -175,7 +179,7 @@ def failure_probability(
             found = _sampled(
                 state, limit, algorithm, too_slow(state, max_evaluations), target_cv, seed, budget
             )
-            report = _of_count if isinstance(found[0], Counted) else _of_tail
+            report: Any = _of_count if isinstance(found[0], Counted) else _of_tail
             values, doubts = report(state, limit, *found, target_cv, seed, confidence)
         except TimeUp:
             raise nothing_known(state) from None

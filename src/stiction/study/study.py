@@ -316,8 +316,8 @@ class Study:
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
-        path = check("path", path, FilePath)
-        return cls.from_dict(read_toml(path), folder=path.parent)
+        file = Path(check("path", path, FilePath))
+        return cls.from_dict(read_toml(file), folder=file.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
