@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import csv
 import errno
 import importlib.util
-import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.errors import InputError, warn_accuracy
-from stiction.files import cannot_write, write_dataset
-from stiction.progress import Meter
+from stiction.files import cannot_write, write_atomically, write_dataset
 from stiction.results import DIRECTION
 
-ROWS = 2**14
 OVERHEAD = 2**16
 NEEDS = {".parquet": "pyarrow", ".zarr": "zarr"}
 SUFFIXES = (".nc", ".csv", ".parquet", ".zarr")
@@ -74,20 +70,20 @@ def export(result: xr.Dataset, path: str | Path) -> None:
     if path.suffix == ".nc":
         write_result(result, path)
         return
-    aside = path.with_name(path.name + ".part")
-    write: Callable[[xr.Dataset, Path], None] = {
-        ".csv": _write_csv,
-        ".parquet": _write_parquet,
-        ".zarr": _write_zarr,
-    }[path.suffix]
     try:
-        _remove(aside)
-        write(result, aside)
-        if path.is_dir():  # an earlier .zarr
-            shutil.rmtree(path)
-        os.replace(aside, path)
+        if path.suffix == ".zarr":
+            _write_zarr(result, path)
+        else:
+            frame = pd.DataFrame(columns(result))
+            plain = result.attrs.items()
+            frame.attrs = {str(k): v.item() if isinstance(v, np.generic) else v for k, v in plain}
+            # Numbers are written as the shortest text that reads back to the same bits.
+            write = {
+                ".csv": lambda aside: frame.to_csv(aside, index=False, na_rep="nan"),
+                ".parquet": lambda aside: frame.to_parquet(aside, index=False),
+            }[path.suffix]
+            write_atomically(path, write)
     except OSError as error:
-        _remove(aside)
         raise cannot_write(path, error) from error
 
 
@@ -150,40 +146,13 @@ def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
     return table
 
 
-def _write_csv(result: xr.Dataset, path: Path) -> None:
-    table = columns(result)
-    rows = len(next(iter(table.values())))
-    with (
-        path.open("w", newline="", encoding="utf-8") as file,
-        Meter(f"writing {path.stem}", rows, unit="rows") as meter,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(table)
-        for part in _parts(table, rows):
-            writer.writerows(part)
-            meter.advance(len(part))
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _parts(table: dict[str, NDArray[Any]], rows: int) -> Iterator[list[Any]]:
-    for first in range(0, rows, ROWS):
-        # Python's own numbers print as the shortest text that reads back to the same bits.
-        part = [column[first : first + ROWS].tolist() for column in table.values()]
-        yield list(zip(*part, strict=True))
-
-
-def _write_parquet(result: xr.Dataset, path: Path) -> None:
-    import pyarrow
-    import pyarrow.parquet
-
-    table = pyarrow.table({name: pyarrow.array(v) for name, v in columns(result).items()})
-    about = {
-        key: value if isinstance(value, str) else json.dumps(value)
-        for key, value in ((str(k), v) for k, v in result.attrs.items())
-    }
-    pyarrow.parquet.write_table(table.replace_schema_metadata(about), path)
-
-
 def _write_zarr(result: xr.Dataset, path: Path) -> None:
-    result.to_zarr(path)
+    aside = path.with_name(path.name + ".part")
+    try:
+        _remove(aside)
+        result.to_zarr(aside)
+        _remove(path)
+        os.replace(aside, path)
+    except OSError:
+        _remove(aside)
+        raise
