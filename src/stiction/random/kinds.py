@@ -42,8 +42,8 @@ class OneOf(NamedTuple):
             schema = pydantic.TypeAdapter(kind).json_schema()
             found.append(schema | {"required": [*schema.get("required", ()), "type"]})
         if self.also:
-            own = {"type": "string", "not": {"enum": list(self.kinds)}}
-            found.append({"type": "object", "description": self.also, "properties": {"type": own}})
+            own = {"type": {"type": "string", "description": self.also}}
+            found.append({"type": "object", "properties": own, "required": ["type"]})
         return {"anyOf": found}
 
 
