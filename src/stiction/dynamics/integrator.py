@@ -278,7 +278,7 @@ class Run:
     def _to_explicit(self, state: State) -> None:
         grid, tables = self.medium.grid, self._explicit_tables()
         scale_memory(grid, state.memory, tables.step, divide=True)
-        carry_memory(state.memory, tables.table, state.carried, grid.poles.size, grid.copies)
+        carry_memory(grid, state.memory, tables.table, state.carried)
         state.phase[0] = 1.0
         state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
 

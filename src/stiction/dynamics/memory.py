@@ -162,20 +162,17 @@ def advance_memory(
                     c[64 + j] += cr * ar - ci * ai
 
 
-@jit
-def carry_memory(memory: Array, table: Array, carried: Array, pairs: int, copies: int) -> Any:
-    """carried = Re sum w E B y without advancing: where an explicit phase begins."""
-    for block in range(carried.size // 128):
-        c = carried[block * 128 :][:128]
-        for j in range(128):
-            c[j] = 0.0
-        for p in range(pairs):
-            y = memory[(block * pairs + p) * 256 :][:256]
-            e = table[(block // copies * pairs + p) * 256 :][:256]
-            for j in range(64):
-                cr, ci = e[128 + j], e[192 + j]
-                c[j] += cr * y[j] - ci * y[64 + j]
-                c[64 + j] += cr * y[128 + j] - ci * y[192 + j]
+def carry_memory(grid: Grid, memory: Floats, table: Floats, carried: Floats) -> None:
+    """Put Re sum w E B y into `carried` without advancing: where an explicit phase begins."""
+    count, pairs = blocks(grid.frequency.size), grid.poles.size
+    rows = table.reshape(count, pairs, 4, LANES)
+    y = memory.reshape(count, grid.copies, pairs, 2, 2, LANES)  # of real signal and imaginary
+    for block in range(count):
+        real, imaginary = rows[block, :, 2, None, :], rows[block, :, 3, None, :]
+        for copy in range(grid.copies):
+            own = y[block, copy]
+            terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
+            carried.reshape(count, grid.copies, 2, LANES)[block, copy] = terms.sum(axis=0)
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
