@@ -87,22 +87,18 @@ def _excess_of_printed() -> float:
 
 
 CLAIMS = [
-    Claim(
-        "effective-modulus", "In plane stress the effective modulus of mode II is G/(1-nu).",
+    Claim("effective-modulus", "In plane stress the effective modulus of mode II is G/(1-nu).",
         "Sec. 3.2, par. 2, sentence 1 (Eq. 8); App. A, par. 3", below(0.1, "%"),
         lambda d: ([one("G/(1-nu) exceeds that of plane stress, G(1+nu), by", _excess_of_printed(),
                         "%")], []),
-        note="G/(1-nu) belongs to plane strain",
-    ),
-    Claim(
-        "nucleation-length", "The nucleation length is 0.034 of the length of the interface.",
+        note="G/(1-nu) belongs to plane strain"),
+    Claim("nucleation-length", "The nucleation length is 0.034 of the length of the interface.",
         "Sec. 3.3, par. 1, sentence 3",
         within(0.0335, 0.035, "0.034, rounded or cut off", partly=True),
         _over("length", "h_n/L by reading"),
-        note="it excludes plane stress throughout, (a), with which the figures here are computed",
-    ),
-    Claim(
-        "wrong-positions", "The position of onset is predicted wrongly in 8 of 60 simulations, 6 of"
+        note="it excludes plane stress throughout, (a), with which the figures here are computed"),
+    Claim("wrong-positions",
+        "The position of onset is predicted wrongly in 8 of 60 simulations, 6 of"
         " them at xi_0/h_n = 0.25.", "Sec. 3.3, par. 4, sentence 4",
         within(0.05, 1.0, "at least a twentieth of the largest", partly=True),
         lambda d: ([Series("likelihood of the counts over the largest, by reading", "",
@@ -112,12 +108,9 @@ CLAIMS = [
                        (f"({r.key})", Number(20.0 * sum(s.value for s in r.misplaced),
                         20.0 * sum(s.error**2 for s in r.misplaced) ** 0.5))
                        for r in compare(d)])]),
-        note="likely only if theory and simulation had different moduli",
-    ),
-    Claim(
-        "patches-at-onset", "20 to 30 patches slip at the onset of the printed example.",
+        note="likely only if theory and simulation had different moduli"),
+    Claim("patches-at-onset", "20 to 30 patches slip at the onset of the printed example.",
         "Sec. 5.2, par. 1, sentence 2", within(20.0, 30.0, partly=True),
         _over("patches", "slipping patches at the onset, mean, xi_0/h_n = 0.25, by reading"),
-        note="two or three patches more than on average are no surprise",
-    ),
+        note="two or three patches more than on average are no surprise"),
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import inspect
 import json
@@ -97,27 +98,37 @@ class Runner:
         label = name if method is None else f"{name}-{method.type}"
         return self.study(label, dataclasses.replace(study, **changes))
 
-    def kept(self, name: str, function, **inputs) -> xr.Dataset:
-        """Return function(self, **inputs), kept with a digest of its inputs and its source."""
-        about = {
-            "seed": self.seed,
-            "version": st.__version__,
-            "source": inspect.getsource(function),
-        }
-        mark = _digest({"name": name, **about, **inputs})
-        place = self.folder / f"{name}-{mark}.nc"
-        if place.exists():
-            return xr.load_dataset(place)
-        result = function(self, **inputs)
-        unfinished = place.with_suffix(".unfinished")
-        result.to_netcdf(unfinished)
-        unfinished.replace(place)
-        return result
-
     def map(self, function, items) -> list:
         """Return [function(item) for item in items], computed by all threads."""
         with ThreadPoolExecutor(self.workers) as pool:
             return list(pool.map(function, items))
+
+
+def kept(**inputs):
+    """Make a function of a runner a study: its result is kept with a digest of inputs and source.
+
+    Parameters
+    ----------
+    **inputs : function of a Size
+        Further arguments of the function.
+    """
+
+    def decorate(function):
+        @functools.wraps(function)
+        def study(run: Runner) -> xr.Dataset:
+            values = {name: choose(run.size) for name, choose in inputs.items()}
+            source = inspect.getsource(function)
+            mark = _digest([run.seed, st.__version__, source, values])
+            place = run.folder / f"{function.__name__}-{mark}.nc"
+            if not place.exists():
+                unfinished = place.with_suffix(".unfinished")
+                function(run, **values).to_netcdf(unfinished)
+                unfinished.replace(place)
+            return xr.load_dataset(place)
+
+        return study
+
+    return decorate
 
 
 def along(dim: str, values, parts) -> xr.Dataset:

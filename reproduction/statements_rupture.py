@@ -62,86 +62,65 @@ def _help(d: Data, key: str) -> Number:
 
 
 PATCHES = [
-    Claim(
-        "patches-grow", "Many patches slip at once, and their number grows with the load.",
+    Claim("patches-grow", "Many patches slip at once, and their number grows with the load.",
         "Abstract, sentence 5; Sec. 5.2, par. 1, sentences 1 and 3", each(above(1.0), above(0.0)),
         lambda d: ([Series("slipping patches just below the onset, xi_0/h_n = 0.25", "",
                            _levels(d, "patches")[-1:]),
                     Series("increase", "", _steps(d))],
-                   [Series("slipping patches", "", _levels(d, "patches"))]),
-    ),
-    Claim(
-        "patches-merge", "Patches may merge, the critical one among them.",
+                   [Series("slipping patches", "", _levels(d, "patches"))])),
+    Claim("patches-merge", "Patches may merge, the critical one among them.",
         "Sec. 5.2, par. 1, sentence 4", above(0.01, "one interface in a hundred"),
         lambda d: ([one("share of samples whose critical patch merged, xi_0/h_n = 0.25",
                         share(d.at("growth", "merged", RATIOS[0])))],
-                   [Series("mergers so far", "", _levels(d, "mergers"))]),
-    ),
-    Claim(
-        "not-the-first", "The patch that becomes unstable need not be the first to appear.",
+                   [Series("mergers so far", "", _levels(d, "mergers"))])),
+    Claim("not-the-first", "The patch that becomes unstable need not be the first to appear.",
         "Sec. 5.2, par. 1, sentence 5", above(0.01, "one interface in a hundred"),
         lambda d: ([one("share of critical patches without the weakest node, xi_0/h_n = 0.25",
-                        share(d.at("growth", "holds_weakest", RATIOS[0]) == 0))], []),
-    ),
-    Claim(
-        "critical-length", "The critical patch is h_n long, whatever the profile of strength.",
+                        share(d.at("growth", "holds_weakest", RATIOS[0]) == 0))], [])),
+    Claim("critical-length", "The critical patch is h_n long, whatever the profile of strength.",
         "Sec. 3.2, par. 2, sentences 3 to 5; App. A, par. 4, sentence 2",
         graded(above(0.95), above(0.5)),
         lambda d: ([over_ratios("share within 10 % of h_n", "", lambda r: _near_length(d, r))],
                    [over_ratios("95th percentile over h_n", "", lambda r: Number(float(
                        np.quantile(d.at("exact", "critical_patch_length", r) / H, 0.95))))]),
-        note="longer where patches merge",
-    ),
-    Claim(
-        "patch-in-simulation", "h_n predicts the size of the patch in the simulation reasonably.",
+        note="longer where patches merge"),
+    Claim("patch-in-simulation", "h_n predicts the size of the patch in the simulation reasonably.",
         "Sec. 3.3, par. 2, sentence 2", within(0.5, 1.5, "reasonable: to a half"),
         lambda d: ([one("length of the patch in the rupture of Figure 3 at the peak of the load,"
-                        " over h_n", float(d["representative"]["patch_length"]) / H)], []),
-    ),
-    Claim(
-        "residual-not-reached", "No point reaches its residual strength before the onset; the"
+                        " over h_n", float(d["representative"]["patch_length"]) / H)], [])),
+    Claim("residual-not-reached", "No point reaches its residual strength before the onset; the"
         " criterion of small-scale yielding does not apply.",
         "Sec. 3.2, par. 2, sentence 1; par. 3, sentences 5 and 6", never(0.01),
         lambda d: ([over_ratios("share of samples that do, without an arrested event", "",
                     lambda r: share((d.at("exact", "residual_reached", r) > 0)
-                                    & (d.at("exact", "arrested_events", r) == 0)))], []),
-    ),
-    Claim(
-        "stress-beside", "A patch lowers the stress inside it and raises it beside it.",
+                                    & (d.at("exact", "arrested_events", r) == 0)))], [])),
+    Claim("stress-beside", "A patch lowers the stress inside it and raises it beside it.",
         "Sec. 5.2, par. 3, sentence 6", each(below(0.0), above(0.0)),
         lambda d: ([one("inside, of the load", float(d["mechanism"]["inside"]) * PER_CENT, "%"),
-                    one("h_n/4 beside it", float(d["mechanism"]["beside"]) * PER_CENT, "%")], []),
-    ),
-    Claim(
-        "neighbours-lower", "A near patch makes another one unstable at a lower load.",
+                    one("h_n/4 beside it", float(d["mechanism"]["beside"]) * PER_CENT, "%")], [])),
+    Claim("neighbours-lower", "A near patch makes another one unstable at a lower load.",
         "Sec. 5.2, par. 3, sentences 5 and 7", each(falling(), above(0.0)),
         lambda d: ([_lowering(d), one("nearest", _lowering(d).rows[0][1], "%")], []),
-        note="two dips of the strength, which the local criterion takes for one",
-    ),
-    Claim(
-        "misplaced-by-neighbours", "Where the position is misplaced, two patches have very similar"
+        note="two dips of the strength, which the local criterion takes for one"),
+    Claim("misplaced-by-neighbours",
+        "Where the position is misplaced, two patches have very similar"
         " critical stress, and the less critical one is helped by a neighbour.",
         "Sec. 5.2, par. 4, sentences 3 and 4", each(below(3.0, "%"), above(0.0)),
         lambda d: ([one("the two differ by", _help(d, "contest_wrong"), "%"),
                     one("more help than where the position is right",
                         _help(d, "helped_wrong") - _help(d, "helped_right"), "%")],
                    [one("help where misplaced", _help(d, "helped_wrong"), "%"),
-                    one("help where right", _help(d, "helped_right"), "%")]),
-    ),
-    Claim(
-        "load-like-strength", "A non-uniform load on uniform strength, and a uniform load on"
+                    one("help where right", _help(d, "helped_right"), "%")])),
+    Claim("load-like-strength", "A non-uniform load on uniform strength, and a uniform load on"
         " non-uniform strength, are one problem.", "Sec. 3.2, par. 1, sentences 4 and 5",
         below(1e-6, "round-off of the solver"),
         lambda d: ([one("largest relative difference of tau_cr",
-                        float(d["mechanism"]["exchange"]))], []), kind="arithmetic",
-    ),
-    Claim(
-        "one-accelerates", "Most patches grow slowly until the onset; one becomes unstable.",
+                        float(d["mechanism"]["exchange"]))], []), kind="arithmetic"),
+    Claim("one-accelerates", "Most patches grow slowly until the onset; one becomes unstable.",
         "Sec. 5.2, par. 1, sentence 3", above(1.0),
         lambda d: ([one("patches at the onset, xi_0/h_n = 0.25",
                         mean(d.at("exact", "slip_patches", RATIOS[0])))], []), kind="arithmetic",
-        note="one by definition: the onset is the first moment at which one accelerates",
-    ),
+        note="one by definition: the onset is the first moment at which one accelerates"),
 ]  # fmt: skip
 
 
@@ -182,63 +161,49 @@ def _foreshocks(d: Data):
 
 
 ARREST = [
-    Claim(
-        "runaway-length", "A rupture longer than about 3 h_n cannot be arrested: its static energy"
+    Claim("runaway-length",
+        "A rupture longer than about 3 h_n cannot be arrested: its static energy"
         " release rate exceeds the largest fracture energy.",
         "Sec. 5.2, par. 5, sentences 9 and 10", within(2.5, 3.5, "about 3, as printed"),
         lambda d: ([over_ratios("length at which it does, over h_n", "", lambda r:
-                    mean(runaway_length(d.stress(r))))], []),
-    ),
-    Claim(
-        "release-rate-grows", "The static energy release rate grows in proportion to the length.",
+                    mean(runaway_length(d.stress(r))))], [])),
+    Claim("release-rate-grows", "The static energy release rate grows in proportion to the length.",
         "Sec. 5.2, par. 5, sentence 8", within(0.95, 1.05),
         lambda d: ([one("logarithmic slope from h_n to 3 h_n, periodic row of cracks",
                         math.log(math.tan(1.5 * math.pi * H / L) / math.tan(0.5 * math.pi * H / L))
-                        / math.log(3.0))], []), kind="arithmetic",
-    ),
-    Claim(
-        "longest-arrest", "Shorter than about 3 h_n a rupture may be arrested.",
+                        / math.log(3.0))], []), kind="arithmetic"),
+    Claim("longest-arrest", "Shorter than about 3 h_n a rupture may be arrested.",
         "Sec. 5.2, par. 5, sentences 10 and 11", within(0.0, 3.5),
         lambda d: ([one("longest arrested patch over h_n",
                         float(d["arrest"]["length"].max()) / H)] if d["arrest"].sizes["event"]
                    else [], [one("arrested samples looked at", d["arrest"].sizes["event"])]),
-        kind="arithmetic",
-    ),
-    Claim(
-        "both-sides", "Arrest needs a large rise of the strength on both sides at once.",
+        kind="arithmetic"),
+    Claim("both-sides", "Arrest needs a large rise of the strength on both sides at once.",
         "Sec. 5.2, par. 5, sentence 12", above(0.5, "more than at a random place"),
         lambda d: ([one("rank of the strength beside arrested patches, the weaker side, among"
                         " random places", mean(d["arrest"]["rank"]))]
                    if d["arrest"].sizes["event"] > 2 else [], []),
-        note="largest strength within h_n/2 of each end; 0.5 is chance",
-    ),
-    Claim(
-        "simulations-run-away", "In every simulation the rupture, once unstable, runs along the"
-        " whole interface.", "Sec. 5.2, par. 5, sentences 1 and 2", never(0.1), _foreshocks,
-    ),
-    Claim(
-        "precursors-unlikely", "Random strength alone makes precursory events extremely unlikely.",
+        note="largest strength within h_n/2 of each end; 0.5 is chance"),
+    Claim("simulations-run-away", "In every simulation the rupture, once unstable, runs along the"
+        " whole interface.", "Sec. 5.2, par. 5, sentences 1 and 2", never(0.1), _foreshocks),
+    Claim("precursors-unlikely",
+        "Random strength alone makes precursory events extremely unlikely.",
         "Abstract, sentence 10; Sec. 5.2, par. 5, sentence 13; Sec. 6, par. 1, sentence 9", RARE,
-        lambda d: (_arrests(d)[:1], _arrests(d)[1:]),
-    ),
-    Claim(
-        "arrest-beyond", "Arrest is very unlikely, in particular for xi_0 > h_n.",
+        lambda d: (_arrests(d)[:1], _arrests(d)[1:])),
+    Claim("arrest-beyond", "Arrest is very unlikely, in particular for xi_0 > h_n.",
         "Sec. 5.2, par. 5, sentence 12", each(RARE, below(0.0)),
         lambda d: ([_arrests(d)[0], one("share at 2 less share at 0.5",
                     arrested(d, 2.0) - arrested(d, 0.5))], _arrests(d)[1:]),
-        note="most frequent at h_n/2",
-    ),
-    Claim(
-        "harder-arrest", "A higher critical stress at shorter correlation length makes arrest more"
+        note="most frequent at h_n/2"),
+    Claim("harder-arrest",
+        "A higher critical stress at shorter correlation length makes arrest more"
         " difficult.", "Sec. 5.4, par. 3, sentence 2", rising(),
         lambda d: ([_arrests(d)[0]],
                    [over_ratios("run-away length over h_n", "", lambda r:
                                 mean(runaway_length(d.stress(r)))), *_arrests(d)[1:]]),
         note="the run-away length is shorter, as the paper argues, and yet arrest is more frequent"
-        " than at 2 h_n: strength that varies over shorter lengths stops more",
-    ),
-    Claim(
-        "shear-crack", "After some growth the slipping area is a shear crack with a constant"
+        " than at 2 h_n: strength that varies over shorter lengths stops more"),
+    Claim("shear-crack", "After some growth the slipping area is a shear crack with a constant"
         " residual strength and a cohesive zone.", "Sec. 5.2, par. 5, sentence 5",
         main(above(0.5), below(1.0, "slower than shear waves")),
         lambda d: ([one("share of the patch at its residual strength once it is 6 h_n long",
@@ -247,36 +212,28 @@ ARREST = [
                         [d.at("ruptures", "median_rupture_speed", r) for r in SIMULATED])
                         / setting.PROBLEM.solid.shear_wave_speed))], []),
         note="one rupture for the share; fronts are supershear, where the static energy balance no"
-        " longer decides",
-    ),
-    Claim(
-        "pre-slip", "Nucleation is of the pre-slip type: slow slip and one acceleration.",
-        "Sec. 5.4, par. 4, sentence 4", below(0.1, "60 simulations would show more"), _foreshocks,
-    ),
-    Claim(
-        "systematic-driving", "Arrested fronts of experiments come from non-uniform loading by the"
+        " longer decides"),
+    Claim("pre-slip", "Nucleation is of the pre-slip type: slow slip and one acceleration.",
+        "Sec. 5.4, par. 4, sentence 4", below(0.1, "60 simulations would show more"), _foreshocks),
+    Claim("systematic-driving",
+        "Arrested fronts of experiments come from non-uniform loading by the"
         " set-up.", "Abstract, sentence 11; Sec. 5.2, par. 7, sentence 2",
         main(above(0.5), above(0.5)),
         lambda d: ([_long_arrests(d, "edge"), _long_arrests(d, "gradient")],
                    [_long_arrests(d, "uniform"),
                     one("edge, with inertia, held", share(_edge_lengths(d) < 0.95 * L))]),
-        note="fronts longer than 3 h_n: an edge load makes them in every sample, a gradient seldom",
-    ),
-    Claim(
-        "griffith-arrest", "Arrest follows from the balance of energy release rate and fracture"
+        note="fronts longer than 3 h_n: an edge makes them in every sample, a gradient seldom"),
+    Claim("griffith-arrest", "Arrest follows from the balance of energy release rate and fracture"
         " energy.", "Sec. 5.2, par. 5, sentence 6", corrected(within(0.67, 1.5, "to a half")),
         lambda d: ([one("median length over Griffith's, edge load", _griffith(d, "length")),
                     one("with inertia, first event", _griffith(d, "dynamic_length"))], []),
-        note="in the median; single events scatter from near zero to 1.3 times",
-    ),
-    Claim(
-        "larger-earthquakes", "A higher stress at the onset means a larger stress drop.",
+        note="in the median; single events scatter from near zero to 1.3 times"),
+    Claim("larger-earthquakes", "A higher stress at the onset means a larger stress drop.",
         "Sec. 5.4, par. 3, sentence 2", falling(),
         lambda d: ([over_ratios("stress drop of the ruptures, mean", "MPa", lambda r:
                     mean(d.at("ruptures", "stress_drop", r)) * MPA, SIMULATED)], []),
         kind="arithmetic", note="with tau_r = 0 the drop is tau_cr; an interface that slides as a"
-        " whole has no magnitude",
-    ),
+        " whole has no magnitude"),
 ]  # fmt: skip
 
 
@@ -355,8 +312,7 @@ def _counted(d: Data) -> Series:
 
 
 SIZE = [
-    Claim(
-        "size-of-scatter", "Random local strength may be the origin of scatter of friction"
+    Claim("size-of-scatter", "Random local strength may be the origin of scatter of friction"
         " coefficients such as from 0.32 to 0.80.",
         "Sec. 1, par. 2, sentence 3; par. 4, sentence 1",
         graded(above(0.2, "a quarter of the range over its middle"), above(0.02, "visible")),
@@ -365,63 +321,46 @@ SIZE = [
                    [Series("at other lengths of the interface", "",
                            _lengths(d, _variation, 1.0))]),
         note="an origin, but with the paper's strength of a tenth of that size. The quoted range"
-        " would need a shorter interface and a wider strength",
-    ),
-    Claim(
-        "longer-interface", "A longer interface makes the critical stress vary less.",
+        " would need a shorter interface and a wider strength"),
+    Claim("longer-interface", "A longer interface makes the critical stress vary less.",
         "Sec. 5.3, par. 4, sentence 3", falling(),
         lambda d: ([Series("median less lower quartile", "kPa", _lengths(d, lower_spread, KPA))],
-                   [Series("mean", "MPa", _lengths(d, mean, MPA))]),
-    ),
-    Claim(
-        "free-end", "A free end lowers the critical stress locally.",
+                   [Series("mean", "MPa", _lengths(d, mean, MPA))])),
+    Claim("free-end", "A free end lowers the critical stress locally.",
         "Sec. 5.1, par. 6, sentence 2", corrected(below(0.0)), lambda d: ([_free(d, mean)], []),
         note="shown in mode III, where a mirrored field has free ends exactly; the paper is in"
-        " mode II",
-    ),
-    Claim(
-        "periodic-higher", "The distribution of a periodic interface tends slightly to higher"
+        " mode II"),
+    Claim("periodic-higher", "The distribution of a periodic interface tends slightly to higher"
         " values than that of a finite one.", "Sec. 5.1, par. 6, sentence 3",
         corrected(below(0.0)),
         lambda d: ([_free(d, mean)],
                    [over_ratios("share of samples lowered", "", lambda r: share(
                        d["free_end"]["change"].values[RATIOS.index(r)] < -1e-9))]),
-        note="shown in mode III; in some samples the end strengthens: there is one neighbour less",
-    ),
-    Claim(
-        "finite-size", "As h_n/L tends to zero, the distribution tends to that of the periodic"
+        note="shown in mode III; in some samples the end strengthens: there is one neighbour less"),
+    Claim("finite-size", "As h_n/L tends to zero, the distribution tends to that of the periodic"
         " interface.", "Sec. 5.1, par. 6, sentence 4", corrected(rising()),
         lambda d: ([Series("change by free ends, mean, xi_0/h_n = 0.25", "%", [
             (label, mean(d["free_end"]["change"].values[i]) * PER_CENT)
-            for label, i in (("L/4", 4), ("L/2", 5), ("L", 0))])], []), note="shown in mode III",
-    ),
-    Claim(
-        "end-range", "The range of the effect of an end scales with h_n.",
+            for label, i in (("L/4", 4), ("L/2", 5), ("L", 0))])], []), note="shown in mode III"),
+    Claim("end-range", "The range of the effect of an end scales with h_n.",
         "Sec. 5.1, par. 6, sentence 4", corrected(above(0.0)),
         lambda d: ([one("share of onsets within h_n/2 of an end, above chance", _near_end(d))], []),
-        note="shown in mode III",
-    ),
-    Claim(
-        "length-against-pressure", "The nucleation length is inversely proportional to"
+        note="shown in mode III"),
+    Claim("length-against-pressure", "The nucleation length is inversely proportional to"
         " tau_p - tau_r as pressure changes.", "Sec. 5.3, par. 4, sentence 4",
         within(-1.05, -0.95),
         lambda d: ([one("logarithmic slope of the critical patch", _pressure_slope(d))], []),
-        kind="arithmetic", note="d_c fixed",
-    ),
-    Claim(
-        "pressure-like-length", "More normal load acts like a longer interface: less variation.",
+        kind="arithmetic", note="d_c fixed"),
+    Claim("pressure-like-length", "More normal load acts like a longer interface: less variation.",
         "Sec. 5.3, par. 4, sentences 3 and 4", falling(),
         lambda d: ([Series("standard deviation over mean of the friction coefficient,"
                            " xi_0/h_n fixed", "", _pressure(d, _variation, (3, 1, 4)))],
                    [Series("with xi_0 fixed", "", _pressure(d, _variation, (0, 1, 2)))]),
-        note="xi_0/h_n held fixed, so that h_n/L alone changes",
-    ),
-    Claim(
-        "failure-probability", "The framework gives the failure probability of an interface of"
+        note="xi_0/h_n held fixed, so that h_n/L alone changes"),
+    Claim("failure-probability", "The framework gives the failure probability of an interface of"
         " known strength.", "Sec. 5.3, par. 1, sentence 2", within(0.4, 1.6, "to a half"),
         lambda d: ([_counted(d)], [one("stress with P = 1e-6",
-                   float(d["failure"]["stress"].values.min()) * MPA, "MPa")]), kind="arithmetic",
-    ),
+                   float(d["failure"]["stress"].values.min()) * MPA, "MPa")]), kind="arithmetic"),
 ]  # fmt: skip
 
 
@@ -489,60 +428,44 @@ def _triggered(d: Data):
 
 
 WHAT_IF = [
-    Claim(
-        "mirrored-variability", "Strength skewed to high values would make tau_cr vary more.",
+    Claim("mirrored-variability", "Strength skewed to high values would make tau_cr vary more.",
         "Sec. 5.3, par. 2, sentence 6", above(1.0),
         lambda d: ([over_ratios("median less lower quartile, mirrored over the paper's", "",
                     lambda r: lower_spread(d.what_if("skewness", "critical_stress",
                                                      4 + RATIOS.index(r)))
                     / lower_spread(d.what_if("skewness", "critical_stress", RATIOS.index(r))))],
-                   []),
-    ),
-    Claim(
-        "mirrored-trend", "With the other skewness, too, a shorter correlation means a higher"
+                   [])),
+    Claim("mirrored-trend", "With the other skewness, too, a shorter correlation means a higher"
         " tau_cr that varies less.", "Sec. 5.3, par. 2, sentence 7", each(falling(), rising()),
         lambda d: ([_mirrored(d, mean, MPA), _mirrored(d, lower_spread, KPA)], []),
-        note="means in MPa, median less lower quartile in kPa",
-    ),
-    Claim(
-        "spectrum-minor", "At equal length of decay the form of the spectrum hardly matters.",
+        note="means in MPa, median less lower quartile in kPa"),
+    Claim("spectrum-minor", "At equal length of decay the form of the spectrum hardly matters.",
         "Sec. 5.3, par. 3, sentence 3", each(below(1.0, "%"), below(10.0, "%")),
-        lambda d: ([_exponents(d, 0), _exponents(d, 1)], []),
-    ),
-    Claim(
-        "wider-range", "A larger variance of the strength makes arrest (slightly) more likely.",
+        lambda d: ([_exponents(d, 0), _exponents(d, 1)], [])),
+    Claim("wider-range", "A larger variance of the strength makes arrest (slightly) more likely.",
         "Sec. 5.2, par. 5, sentence 14", each(rising(), SLIGHT),
         lambda d: ([_from_usual(d), Series("at twice the range, with inertia", "",
                     shares(d, "wide_strength", (1,), inertia=True).rows)],
-                   [shares(d, "wide_strength")]),
-    ),
-    Claim(
-        "cascade", "With a much larger range of strength small events would come first.",
+                   [shares(d, "wide_strength")])),
+    Claim("cascade", "With a much larger range of strength small events would come first.",
         "Sec. 5.4, par. 4, sentences 5 and 6", above(0.5, "one in every other sample"),
         lambda d: ([one("arrested events a sample with inertia, four times the range",
                         events_a_sample(d, inertia=True))],
-                   [one("without inertia", events_a_sample(d, inertia=False))]),
-    ),
-    Claim(
-        "small-events-interact", "Arrested small events could then interact.",
+                   [one("without inertia", events_a_sample(d, inertia=False))])),
+    Claim("small-events-interact", "Arrested small events could then interact.",
         "Sec. 5.4, par. 4, sentence 5", above(0.0), _triggered,
-        note="without inertia, at four times the range: events follow events nearby",
-    ),
-    Claim(
-        "required", "Non-uniform driving is required for arrested fronts.", "Abstract, sentence 11",
+        note="without inertia, at four times the range: events follow events nearby"),
+    Claim("required",
+        "Non-uniform driving is required for arrested fronts.", "Abstract, sentence 11",
         RARE, _both("wide_strength", 3),
-        note="judged by wide strength under uniform driving: fronts are arrested without it",
-    ),
-    Claim(
-        "random-stress-drop", "A random driving force, by a random stress drop, can arrest fronts.",
+        note="judged by wide strength under uniform driving: fronts are arrested without it"),
+    Claim("random-stress-drop",
+        "A random driving force, by a random stress drop, can arrest fronts.",
         "Abstract, sentence 11; Sec. 5.2, par. 6, sentence 3", above(0.01),
-        _both("random_residual", 4),
-    ),
-    Claim(
-        "random-load", "Random load on a small scale does not cause arrest.",
+        _both("random_residual", 4)),
+    Claim("random-load", "Random load on a small scale does not cause arrest.",
         "Sec. 5.2, par. 7, sentence 3", below(0.05, "one sample in twenty"),
-        _both("random_load", 5),
-    ),
+        _both("random_load", 5)),
 ]  # fmt: skip
 
 

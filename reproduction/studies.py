@@ -13,7 +13,7 @@ from scipy.stats import ks_2samp
 import stiction as st
 from reproduction import setting
 from reproduction.numbers_with_errors import mean
-from reproduction.runner import Runner, along
+from reproduction.runner import Runner, along, kept
 from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
@@ -57,12 +57,9 @@ def dynamic(run: Runner) -> xr.Dataset:
     return run.sweep("dynamic", PROBLEM, strength, RUNAWAY, run.size.dynamic)
 
 
-def moments(run: Runner) -> xr.Dataset:
+@kept(samples=lambda size: size.samples)
+def moments(run: Runner, samples: int) -> xr.Dataset:
     """Weakest point, moments and histogram of tau_n, and the bound that is strict on the grid."""
-    return run.kept("moments", _moments, samples=run.size.samples)
-
-
-def _moments(run: Runner, samples: int) -> xr.Dataset:
     interface = PROBLEM.interface
     weights = setting.discrete_weights()
     kernel = np.zeros(interface.size)
@@ -109,12 +106,9 @@ def _moments(run: Runner, samples: int) -> xr.Dataset:
     return along("correlation_ratio", RATIOS, parts)
 
 
+@kept()
 def theory(run: Runner) -> xr.Dataset:
     """Correlations, and the variance of tau_n on this interface and on an infinite one."""
-    return run.kept("theory", _theory)
-
-
-def _theory(run: Runner) -> xr.Dataset:
     interface = PROBLEM.interface
     ratios = np.geomspace(0.02, 20.0, 41)
     usable = ratios[ratios > 0.1]
@@ -188,12 +182,9 @@ def readings(run: Runner) -> xr.Dataset:
     return along("reading", list(READINGS), parts)
 
 
+@kept()
 def representative(run: Runner) -> xr.Dataset:
     """One rupture in space and time at the shortest correlation length."""
-    return run.kept("representative", _representative)
-
-
-def _representative(run: Runner) -> xr.Dataset:
     ratio = SIMULATED[0]
     tau_p = strength(ratio).sample(PROBLEM.interface, seed=run.seed_of(ratio))[0]
     found = st.simulate_rupture(
@@ -234,13 +225,9 @@ def _representative(run: Runner) -> xr.Dataset:
     )
 
 
-def convergence(run: Runner) -> xr.Dataset:
+@kept(count=lambda size: 8 if size.ruptures >= 20 else 2)
+def convergence(run: Runner, count: int) -> xr.Dataset:
     """Ruptures with other grids, loading rates and time steps, on the same samples."""
-    count = 8 if run.size.ruptures >= 20 else 2
-    return run.kept("convergence", _convergence, count=count)
-
-
-def _convergence(run: Runner, count: int) -> xr.Dataset:
     onset = dataclasses.replace(RUPTURE, stop="onset")
     half = dataclasses.replace(
         onset, courant=onset.courant / 2, load_step=onset.load_step / 2,
@@ -300,12 +287,9 @@ def trend(run: Runner) -> xr.Dataset:
     return along("mean_mode", (0, 1), parts)
 
 
-def window(run: Runner) -> xr.Dataset:
+@kept(samples=lambda size: size.trend // 2)
+def window(run: Runner, samples: int) -> xr.Dataset:
     """One field and ever smaller h_n: xi_0/h_n grows with L/xi_0 held fixed."""
-    return run.kept("window", _window, samples=run.size.trend // 2)
-
-
-def _window(run: Runner, samples: int) -> xr.Dataset:
     ratio = RATIOS[-1]
     fine = setting.grid(PROBLEM, nodes=2.0)
 
@@ -338,12 +322,9 @@ def _window(run: Runner, samples: int) -> xr.Dataset:
     )
 
 
+@kept()
 def modes(run: Runner) -> xr.Dataset:
     """Changes of tau_cr by rounded weights, by the modes left out, and by Eq. 11 cut off."""
-    return run.kept("modes", _modes)
-
-
-def _modes(run: Runner) -> xr.Dataset:
     parts = []
     for ratio in RATIOS:
         field, interface = strength(ratio), PROBLEM.interface
@@ -367,11 +348,6 @@ def _modes(run: Runner) -> xr.Dataset:
     return along("correlation_ratio", RATIOS, parts)
 
 
-def growth(run: Runner) -> xr.Dataset:
-    """How slip patches appear, grow and merge while the load rises to the onset."""
-    return run.kept("growth", _growth, count=run.size.few)
-
-
 def patches(slipping):
     """Return the number of the patch that each node belongs to, -1 where it sticks."""
     starts = slipping & ~np.roll(slipping, 1)
@@ -380,7 +356,9 @@ def patches(slipping):
     return np.where(slipping, (np.cumsum(starts) - 1) % count, -1)
 
 
-def _growth(run: Runner, count: int) -> xr.Dataset:
+@kept(count=lambda size: size.few)
+def growth(run: Runner, count: int) -> xr.Dataset:
+    """How slip patches appear, grow and merge while the load rises to the onset."""
     interface = PROBLEM.interface
 
     def one(item):
@@ -427,12 +405,10 @@ def dips(*places):
     return MEAN * (1.0 - shape)
 
 
-def mechanism(run: Runner) -> xr.Dataset:
+@kept(samples=lambda size: size.samples)
+def mechanism(run: Runner, samples: int) -> xr.Dataset:
     """How patches act on each other: one, two, a pair with a helper, and misplaced samples."""
-    return run.kept("mechanism", _mechanism, samples=run.size.samples)
 
-
-def _mechanism(run: Runner, samples: int) -> xr.Dataset:
     def onset(profile, problem=PROBLEM):
         return st.onset(problem, profile, method=EXACT, progress=False)
 
@@ -505,12 +481,9 @@ def _contest(run: Runner) -> dict:
     return result
 
 
-def arrest(run: Runner) -> xr.Dataset:
+@kept(samples=lambda size: size.samples, most=lambda size: 10)
+def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Samples whose first instability comes to rest by equilibrium, run again with inertia."""
-    return run.kept("arrest", _arrest, samples=run.size.samples, most=10)
-
-
-def _arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     found = exact(run)["arrested_events"]
     interface = PROBLEM.interface
     chosen = [
@@ -560,12 +533,9 @@ def driven(case: str):
     return dataclasses.replace(problem, friction=friction, load=DRIVING[case])
 
 
-def driving(run: Runner) -> xr.Dataset:
+@kept(count=lambda size: 16 if size.few >= 24 else 4)
+def driving(run: Runner, count: int) -> xr.Dataset:
     """Arrested events under non-uniform loads, by equilibrium and with inertia."""
-    return run.kept("driving", _driving, count=16 if run.size.few >= 24 else 4)
-
-
-def _driving(run: Runner, count: int) -> xr.Dataset:
     field = strength(RATIOS[1])
 
     def one(item):
@@ -620,16 +590,13 @@ def _held(problem, tau_p, stress: float) -> float:
     return float(longest) * problem.interface.spacing
 
 
-def free_end(run: Runner) -> xr.Dataset:
+@kept(count=lambda size: min(size.what_if, 400))
+def free_end(run: Runner, count: int) -> xr.Dataset:
     """Onset on interfaces with free ends in mode III, where a mirrored field has them exactly.
 
     A field mirrored at x = 0 and L makes antiplane displacement even there: no stress acts on
     these planes, as if the solids ended.
     """
-    return run.kept("free_end", _free_end, count=min(run.size.what_if, 400))
-
-
-def _free_end(run: Runner, count: int) -> xr.Dataset:
     base = dataclasses.replace(PROBLEM, mode="III")
     length = base.nucleation_length
     cases = [(ratio, 1.0) for ratio in RATIOS] + [(RATIOS[0], 0.25), (RATIOS[0], 0.5)]
@@ -666,12 +633,9 @@ def _free_end(run: Runner, count: int) -> xr.Dataset:
     )
 
 
+@kept()
 def failure(run: Runner) -> xr.Dataset:
     """P(tau_cr < s) down to one in a million at xi_0 = h_n/2, by the local criterion."""
-    return run.kept("failure", _failure)
-
-
-def _failure(run: Runner) -> xr.Dataset:
     return st.failure_curve(
         PROBLEM, strength(RATIOS[1]), method=LOCAL, smallest=1e-6, target_cv=0.2,
         seed=run.seed, progress=False,

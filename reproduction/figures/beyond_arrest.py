@@ -9,18 +9,7 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.claims import Data, Series
-from reproduction.figures.style import (
-    COLOURS,
-    GREY,
-    INK,
-    RED,
-    TAU_CR,
-    XI,
-    dots,
-    letter,
-    line,
-    new,
-)  # fmt: skip
+from reproduction.figures.style import COLOURS, GREY, INK, RED, TAU_CR, XI, dots, letter, line, new
 from reproduction.numbers_with_errors import deviation, mean
 from reproduction.setting import HIGH, MEAN, RATIOS, SIMULATED, H, L
 from reproduction.statements_rupture import arrested, shares
