@@ -8,11 +8,14 @@ import numpy as np
 import xarray as xr
 
 from stiction.arrays import Array
-from stiction.equilibrium.follow import follow
+from stiction.equilibrium import dense
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.follow import Event, follow
 from stiction.equilibrium.solver import event_table, event_variables, make_program
+from stiction.equilibrium.transforms import PlaneProgram
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, check_memory, real_array, to_plain
-from stiction.problem import Problem
+from stiction.problem import Problem, Sample
 from stiction.results import Variable, along, coordinate, to_dataset
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -107,15 +110,15 @@ def equilibrium_path(
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)
     sample = program.sample_of(rows, 0)
-    path = follow(program, sample)
+    passed, end, known = _life(program, rows)
     slip, stress = np.full((2, given.size, interface.size), np.nan)
-    passed = np.array([event.before.load for event in path.events])
-    events = (passed[None, :] < given[:, None]).sum(axis=1)
-    sliding = given > path.last.load
+    at = np.array([event.before.load for event in passed])
+    events = (at[None, :] < given[:, None]).sum(axis=1)
+    sliding = given > end
     state = program.at_rest(sample)
     for i, load in enumerate(map(float, given[~sliding])):
         if events[i]:
-            after = path.events[events[i] - 1].after
+            after = passed[events[i] - 1].after
             state = max(state, after, key=lambda one: one.load)
         there = program.at(sample, state, load, fresh=not events[i])
         if there is None:  # within the accuracy of the load of sliding
@@ -125,9 +128,9 @@ def equilibrium_path(
         slip[i] = state.slip
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
-    if not path.known and sliding.any():
+    if not known and sliding.any():
         warn_accuracy(
-            f"no equilibrium was found beyond {path.last.load:g} Pa, and none was ruled out; the"
+            f"no equilibrium was found beyond {end:g} Pa, and none was ruled out; the"
             " path ends there"
         )
     wide = (given.size, *interface.shape)
@@ -137,11 +140,20 @@ def equilibrium_path(
         "mean_stress": stress.mean(axis=1),
         "arrested_events": events,
         "sliding": sliding,
-    } | event_table(problem, rows, 0, path.events)
+    } | event_table(problem, rows, 0, passed)
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
-    coordinates = {"load": (given, LOAD), "event": (np.arange(len(path.events)), EVENT)}
+    coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
     dims = (*interface.dims, "direction") if interface.is_plane else interface.dims
     coordinates |= {dim: coordinate(interface, dim) for dim in dims}
     attributes = {"study": {"problem": to_plain(problem)}}
     return to_dataset(values, variables, coordinates, attributes)
+
+
+def _life(program: LineProgram | PlaneProgram, rows: Sample) -> tuple[list[Event], float, bool]:
+    """Arrested events of a sample, the load at which it slides (Pa), whether that is known."""
+    first, states = program.first(rows, False)
+    if first is not None and 0 not in states:  # it runs away at its first instability
+        return [], float(first.table[0, dense.LOAD]), True
+    path = follow(program, program.sample_of(rows, 0), states[0])
+    return path.events, path.last.load, path.known
