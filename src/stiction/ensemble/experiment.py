@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,17 +24,12 @@ from stiction.random.pressure import (
     profiles_in_stress,
     support_in_stress,
 )
-from stiction.random.random_interface import as_random_interface
+from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.synthesis import block_of
 from stiction.results import Variable, along
 
-if TYPE_CHECKING:
-    from stiction.random.random_field import RandomField
-    from stiction.random.random_interface import RandomInterface
-
-    AnyRandom: TypeAlias = RandomInterface | RandomField
-else:
-    AnyRandom = Any  # an `Experiment` checks it
+AnyRandom: TypeAlias = RandomInterface | RandomField
 
 MOST_KEPT = 10**6
 """Samples whose profiles may be kept."""
