@@ -64,7 +64,7 @@ def by_counting(base, field, method, values, peaks, samples):
     found = np.empty(values.size)
     for i, value in enumerate(values):
         simulated = st.monte_carlo(
-            base, field(value), method=method, samples=samples, seed=99, progress=False
+            base, field(value), method=method, samples=samples, seed=99, progress=False, pilot=False
         ).critical_stress.values
         kernels = scipy.stats.gaussian_kde(simulated, "silverman")
         found[i] = kernels.logpdf(peaks).sum()
@@ -79,7 +79,7 @@ def by_counting(base, field, method, values, peaks, samples):
 def test_posterior_of_one_parameter(name):
     base, field, method, key, prior, truth, count = CASES[name]
     peaks = st.monte_carlo(
-        base, field(truth), method=method, samples=count, seed=4, progress=False
+        base, field(truth), method=method, samples=count, seed=4, progress=False, pilot=False
     ).critical_stress.values
     samples = 1500 if method is LOCAL else 150
     found = st.infer(
@@ -104,7 +104,9 @@ def test_designs_of_one_parameter():
     prior = {"marginal.loc": (0.5e6, 0.7e6)}
     marginal = scipy.stats.lognorm(0.3, loc=0.6e6, scale=0.5e6)
     field = dataclasses.replace(beta(0.6e6, 1.6e6), marginal=marginal)
-    onsets = st.monte_carlo(base, field, method=LOCAL, samples=1000, seed=5, progress=False)
+    onsets = st.monte_carlo(
+        base, field, method=LOCAL, samples=1000, seed=5, progress=False, pilot=False
+    )
     kernels = scipy.stats.gaussian_kde(onsets.critical_stress.values - 0.6e6, "silverman")
     steps = 0.5e6 + 0.2e6 * (np.arange(200) + 0.5) / 200
     rng = np.random.default_rng(0)

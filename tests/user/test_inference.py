@@ -23,7 +23,9 @@ PRIOR = {
 }
 LOW = {"marginal.low": (0.4e6, 0.9e6)}
 PEAKS = (
-    st.monte_carlo(PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99, progress=False)
+    st.monte_carlo(
+        PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99, progress=False, pilot=False
+    )
 ).critical_stress.values
 
 
@@ -79,7 +81,9 @@ def test_arviz(posterior):
 
 def test_a_second_length_tells_more():
     short = dataclasses.replace(PROBLEM, interface=st.Interface(length=0.05, nodes=128))
-    more = st.monte_carlo(short, STRENGTH, method=LOCAL, samples=30, seed=5, progress=False)
+    more = st.monte_carlo(
+        short, STRENGTH, method=LOCAL, samples=30, seed=5, progress=False, pilot=False
+    )
     both = infer({0.1: PEAKS, 0.05: more.critical_stress.values}, prior=PRIOR, samples=1000)
     assert both.peaks.lengths == (0.1, 0.05)
     assert len(both.predicted) == 2
