@@ -181,15 +181,15 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
 
 
 def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
-    """An overstressed patch that radiates: the mean stress falls below that without a load."""
+    """The mean stress is never above that at the start, which no load has raised."""
     initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
     problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
     held = {"load": ([0.0, 1.0], [0.0, 0.0]), "stop": "time", "end_time": 5e-5}
     run = simulate(TAU_P, problem, **held)
     assert np.isnan(float(run["critical_load"]))
-    assert float(run["critical_stress"]) < initial.mean()
+    assert float(run["critical_stress"]) <= initial.mean() * (1.0 + 1e-12)
     # Nor where nothing becomes unstable.
-    run = simulate(TAU_P, load=([0.0, 0.1, 0.2], [0.0, 5e5, 5e5]), stop="time", end_time=0.3)
+    run = simulate(TAU_P, load=([0.0, 0.1, 0.2], [0.0, 7.6e5, 7.6e5]), stop="time", end_time=0.3)
     assert np.isnan(float(run["critical_load"]))
 
 
