@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 from line_and_plane_figures import draw
 from scipy.stats import rankdata
-from stiction.ensemble.cost_estimate import probe_time
 
 import stiction as st
 from stiction.equilibrium.solver import first_instabilities, make_program
@@ -123,9 +122,6 @@ def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str,
     found = {}
     for case in CASES:
         pair = studies(case, most)
-        if progress:
-            cost = probe_time(pair["exact"].plans, pair["exact"].ensemble.samples, budget=0.2)
-            print(f"{case.name}: about {cost.seconds / 60.0:.1f} min of one core from the start")
         results = {
             which: study.run(
                 out=folder / f"{case.name.replace(', ', '-')}-{which}", progress=progress
