@@ -1,6 +1,7 @@
 """How likely is sliding below a stress, by a reliability code of others (OpenTURNS)?
 
-`st.external.limit_state` is a function of standard normal draws, which is all that such codes ask for.
+`st.external.limit_state` is a function of standard normal draws, which is all that such codes
+ask for.
 """
 
 import numpy as np

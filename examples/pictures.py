@@ -75,7 +75,9 @@ def monte_carlo(
             lowest = int(tau_n[0].argmin())
             below.plot(x[lowest], tau_n[0, lowest], "o", color=color(i), markersize=3.5)
             _density(beside[1], tau_n[:, ::16].ravel(), i)
-            estimate = st.statistics.density(onsets[ratio].critical_stress.values * 1e-6, bounds=(0.66, 1.66))
+            estimate = st.statistics.density(
+                onsets[ratio].critical_stress.values * 1e-6, bounds=(0.66, 1.66)
+            )
             seen = estimate.value > 2e-3 * estimate.value.max()
             onset.fill_betweenx(
                 estimate.x[seen], 0, estimate.value[seen], color=color(i), alpha=0.18, linewidth=0

@@ -22,7 +22,9 @@ status = stored.status()
 print(f"{stored.study.title}: {status.done} of {status.samples} samples")
 result = stored.dataset()
 for length in result.correlation_length.values:
-    found = st.statistics.quantiles(result.critical_stress.sel(correlation_length=length), [0.05, 0.5, 0.95])
+    found = st.statistics.quantiles(
+        result.critical_stress.sel(correlation_length=length), [0.05, 0.5, 0.95]
+    )
     low, median, high = found.value / 1e6
     print(f"xi_0 = {length * 1e3:.2f} mm: {median:.3f} MPa, 5 to 95 %: {low:.3f} to {high:.3f} MPa")
 st.plot.quantiles(result)

@@ -58,9 +58,7 @@ def far_from_the_criterion():
 def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
     problem, strength = far_from_the_criterion()
     given = {"method": st.LocalCriterion(), "samples": 200, "seed": 11}
-    with pytest.warns(
-        st.AccuracyWarning, match=r"differs from the exact onset by .*a pilot of 32"
-    ):
+    with pytest.warns(st.AccuracyWarning, match=r"differs from the exact onset by .*a pilot of 32"):
         found = st.monte_carlo(problem, strength, **given)
     alone = st.monte_carlo(problem, strength, **given, pilot=False)
     np.testing.assert_array_equal(found.critical_stress, alone.critical_stress)
