@@ -154,5 +154,5 @@ def write_csv(findings: Sequence[Finding], path: Path) -> None:
                 for key, number in series.rows:
                     ratio, case = (key, "") if isinstance(key, float) else ("", key)
                     table.writerow((found.claim.name, found.verdict.value, series.label, ratio,
-                                    case, repr(number.value), repr(number.error), series.unit,
+                                    case, float(number.value), float(number.error), series.unit,
                                     series in found.judged))  # fmt: skip
