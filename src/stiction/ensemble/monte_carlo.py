@@ -173,7 +173,8 @@ def gather(
     rows = Gathered(points, samples, first)
     compute(points, rows.done.copy(), rows, first=first, **options)
     if pilot:
-        attributes = {**attributes, **pilot_attributes(points, samples, first)}
+        show = options.get("progress", True) is True
+        attributes = {**attributes, **pilot_attributes(points, samples, first, show=show)}
     result = rows.dataset(attributes, axes)
     warn_of_failures(rows.failed, rows.done.size)
     for failure in rows.failed:

@@ -96,7 +96,7 @@ def compare(
 
 
 def pilot_attributes(
-    points: Sequence[Experiment], samples: int, first: int = 0
+    points: Sequence[Experiment], samples: int, first: int = 0, *, show: bool = True
 ) -> Mapping[str, Any]:
     """Compare the first samples of some points, and warn of a difference beyond 1 %.
 
@@ -106,6 +106,8 @@ def pilot_attributes(
         Of many, eight are taken, the first and the last among them.
     samples, first : int
         Of the ensemble.
+    show : bool
+        Whether progress is shown.
 
     Returns
     -------
@@ -115,7 +117,8 @@ def pilot_attributes(
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     found: list[Pilot] = []
-    with Meter("comparing with the exact onset", len(chosen), unit="points") as meter:
+    what = "comparing some samples with the exact onset"
+    with Meter(what, len(chosen), show, unit="points" if len(points) > 1 else "ensemble") as meter:
         for number in chosen:
             experiment = points[int(number)]
             size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE

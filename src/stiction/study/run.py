@@ -242,7 +242,9 @@ def run_into(
             seconds=SAVE_SECONDS,
         )
         if pilot and (mine is None or mine.number == 1) and store.pilot() is None:
-            store.note_pilot(pilot_attributes(points, ensemble.samples, ensemble.first))
+            show = progress is True
+            found = pilot_attributes(points, ensemble.samples, ensemble.first, show=show)
+            store.note_pilot(found)
     finally:
         with suppress(StoreError):
             store.close()
