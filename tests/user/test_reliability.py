@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import stiction as st
 from stiction.cli.reliability import reliability
 from stiction.equilibrium.method import Equilibrium
+from stiction.progress import Meter
 from stiction.reliability.curve import failure_curve
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
@@ -369,6 +370,31 @@ def test_the_local_criterion_is_checked_by_equilibrium(joint):
 def test_no_word_of_equilibrium_where_it_agrees(system):
     found = failure_probability(*system, 0.67e6, method=LOCAL, target_cv=0.3)
     assert not any("by equilibrium" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("checked", [0, 1])
+def test_an_answer_outlives_the_time_for_its_check(joint, monkeypatch, checked):
+    """The time is over while equilibrium checks the samples: what is known is returned."""
+    asked = []
+
+    def over(meter):
+        asked.append(meter.note == "checking by equilibrium")
+        return sum(asked) > checked
+
+    monkeypatch.setattr(Meter, "over", property(over))
+    options = {"method": LOCAL, "target_cv": 0.4, "progress": False, "workers": 1}
+    for compute, number in (
+        (lambda: failure_probability(*joint, 0.66e6, algorithm="subset", **options), "probability"),
+        (lambda: failure_probability(*joint, 0.75e6, algorithm="plain", **options), "probability"),
+        (lambda: design_stress(*joint, probability=3e-3, algorithm="subset", **options), "stress"),
+    ):
+        asked.clear()
+        assert getattr(compute(), number) > 0.0
+        assert sum(asked) > checked
+    asked.clear()
+    with pytest.warns(st.AccuracyWarning, match="less precise than asked for"):
+        curve = failure_curve(*joint, smallest=1e-2, plain_samples=100, **options)
+    assert (curve.probability > 0.0).all()
 
 
 def test_auto_leaves_a_guide_whose_samples_do_not_fail(joint):
