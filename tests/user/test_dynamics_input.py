@@ -224,10 +224,15 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(held, tmp_path, monkeypatch
         with pytest.raises(Cut):
             simulate(st.Save(**kept), progress=cut)
         assert open_rupture(tmp_path / "run").sizes["time"] > 0  # readable as it was left
-    simulate(st.Save(**kept))
-    read = open_rupture(tmp_path / "run")
-    for name in whole.data_vars:
-        assert np.array_equal(read[name].values, whole[name].values, equal_nan=True), name
+    for _ in range(2):  # the second reads what has ended
+        found = simulate(st.Save(**kept))
+        read = open_rupture(tmp_path / "run")
+        for name in whole.data_vars:
+            assert np.array_equal(read[name].values, whole[name].values, equal_nan=True), name
+            if name in found:
+                assert np.array_equal(found[name].values, whole[name].values, equal_nan=True), name
+        assert found.attrs["stopped"] == whole.attrs["stopped"]
+        assert "critical_stress" in found
 
 
 def test_damaged_checkpoints_are_refused(tmp_path):

@@ -407,7 +407,7 @@ def excess_of(sample: Sample) -> Array:
         raise InputError(
             "strength: the local criterion averages the strength over the nucleation length, so it"
             " must be finite everywhere; where some of it cannot break, give a large finite"
-            " strength, or use st.Equilibrium() or st.Rupture()"
+            " strength, or use st.Rupture()"
         )
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 

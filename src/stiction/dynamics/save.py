@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -130,7 +131,7 @@ class Save:
         Folder to write to while the run goes on; memory then stays bounded, the result holds no
         fields, and `stiction.dynamics.save.open_rupture` reads them. If the folder holds the same
         run, cut short, it goes on from where that was last written: every number is then the same
-        as without the interruption, to the bit.
+        as without the interruption, to the bit. A run that has ended is read.
 
     Examples
     --------
@@ -297,6 +298,9 @@ class Recorder:
         checkpoint = folder / _CHECKPOINT
         if checkpoint.exists():
             read_checkpoint(checkpoint, self.run, state, self._others)
+            if self.finished:
+                return
+            (folder / _SUMMARY).unlink(missing_ok=True)  # of a run that goes on, to another end
             for path in _chunks(folder):
                 if int(path.stem.removeprefix("frames-")) > state.steps:
                     path.unlink()
@@ -307,6 +311,16 @@ class Recorder:
             )
         folder.mkdir(parents=True, exist_ok=True)
         write_checkpoint(checkpoint, self.run, state, self._others)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the folder holds this very run up to its end."""
+        import xarray as xr
+
+        if self.save.to is None or not (self.save.to / _SUMMARY).exists():
+            return False
+        with xr.open_dataset(self.save.to / _SUMMARY, engine="netcdf4") as whole:
+            return bool(whole.attrs["study"] == json.dumps(self.attributes["study"]))
 
     @property
     def _others(self) -> str:
