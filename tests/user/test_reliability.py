@@ -1,5 +1,6 @@
 """Mistakes, budgets that do not suffice, odd cases, and the command line of failure probability."""
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -370,6 +371,24 @@ def test_the_local_criterion_is_checked_by_equilibrium(joint):
 def test_no_word_of_equilibrium_where_it_agrees(system):
     found = failure_probability(*system, 0.67e6, method=LOCAL, target_cv=0.3)
     assert not any("by equilibrium" in text for text in found.warnings)
+
+
+def test_the_check_sees_samples_that_fail_by_equilibrium_only(joint):
+    """Counting: strength that varies within a tenth of h_n, where the criterion is too high."""
+    problem = dataclasses.replace(joint[0], friction=st.LinearWeakening(weakening_rate=0.5e12))
+    spectrum = st.PowerLawSpectrum(0.12 * problem.nucleation_length)
+    strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, True)
+    with pytest.warns(st.AccuracyWarning, match=r"32 fail by the local criterion and 4\d by equil"):
+        found = failure_probability(
+            problem, strength, 0.818e6, method=LOCAL, algorithm="plain", progress=False
+        )
+    samples = strength.sample(problem.interface, samples=1500, seed=31)
+    local, exact = (
+        np.mean(st.onset(problem, samples, method=m, progress=False).critical_stress < 0.818e6)
+        for m in (LOCAL, Equilibrium())
+    )
+    assert exact > 1.2 * local
+    assert found.probability == pytest.approx(float(local), rel=0.3)
 
 
 @pytest.mark.parametrize("checked", [0, 1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,18 @@ class Count:
     until_failure : bool
         Whether counting ended at a failure, because it was the last one wanted. That one says
         nothing of how frequent failures are, and neither does its sample.
+    near, near_values : (up to 64,) arrays
+        Sample numbers and stresses of the weakest samples up to one of the failures, twice as many
+        as failures among them: samples on both sides of the stress, failures and others in the
+        shares that they have.
     """
 
     failures: int
     samples: int
     numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     until_failure: bool = False
+    near: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    near_values: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def probability(self) -> float:
@@ -68,7 +74,16 @@ class Count:
 def tally(values: Array, stress: float, first: int = 0) -> Count:
     """Count among samples first, first + 1, ... of these stresses at onset."""
     failed = np.flatnonzero(values < stress)
-    return Count(failed.size, values.size, first + failed[:SHOWN])
+    near, stresses = _near(values, failed, first)
+    return Count(failed.size, values.size, first + failed[:SHOWN], False, near, stresses)
+
+
+def _near(values: Array, failed: NDArray[np.int64], first: int) -> tuple[NDArray[np.int64], Array]:
+    """Return numbers and stresses of samples on both sides of the stress; see `Count.near`."""
+    some = failed[: SHOWN // 2]
+    seen = values[: some[-1] + 1] if some.size else values[:0]
+    near = np.argsort(seen, kind="stable")[: 2 * some.size]
+    return first + near, seen[near]
 
 
 def failures_wanted(target_cv: float) -> int:
@@ -116,7 +131,7 @@ def count_failures(
     """
     wanted = failures_wanted(target_cv)
     least = min(least, max_evaluations)
-    parts: list[NDArray[np.bool_]] = []
+    parts: list[Array] = []
     done = failures = 0
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
@@ -128,15 +143,16 @@ def count_failures(
             values = state(state.draws(seed, start + done, min(size, BATCH)))
         except TimeUp as up:
             values = up.values
-        parts.append(values < stress)
-        done, failures = done + values.size, failures + int(parts[-1].sum())
+        parts.append(values)
+        done, failures = done + values.size, failures + int(np.sum(values < stress))
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
         if state.meter.over:
             break
     if not done:
         raise TimeUp
-    numbers = np.flatnonzero(np.concatenate(parts))
-    shown = start + numbers[:SHOWN]
-    if failures >= wanted and numbers[wanted - 1] >= least:
-        return Count(wanted, int(numbers[wanted - 1]) + 1, shown, until_failure=True), done
-    return Count(failures, done, shown), done
+    count = tally(np.concatenate(parts), stress, start)
+    if failures >= wanted:
+        last = int(np.flatnonzero(np.concatenate(parts) < stress)[wanted - 1])
+        if last >= least:
+            count = replace(count, failures=wanted, samples=last + 1, until_failure=True)
+    return count, done

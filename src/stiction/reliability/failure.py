@@ -6,7 +6,9 @@ import math
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError, UnitWarning, warn_user
 from stiction.methods import MethodObject
@@ -271,8 +273,7 @@ def _of_count(
     confidence: float,
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the answer by counting, and the doubts."""
-    shown = [state.draws(seed, int(i), 1) for i in count.numbers]
-    draws = np.concatenate(shown) if shown else np.empty((0, state.dimension))
+    draws = _drawn(state, seed, count.numbers[:SHOWN])
     values = {
         "probability": count.probability,
         "cv": count.cv,
@@ -280,13 +281,20 @@ def _of_count(
         "evaluations": evaluations,
         "algorithm": "plain",
         "reason": reason,
-        "failing_profiles": profiles_of(state, draws[:SHOWN]),
+        "failing_profiles": profiles_of(state, draws),
         "diagnostics": {"failures": count.failures, "samples": count.samples},
     }
     doubts = imprecise(state, count.cv, target_cv, evaluations)
-    if draws.shape[0] and not state.meter.over:
-        doubts += exact_doubts(state, draws, state(draws), stress, count.probability)
+    if count.near.size and not state.meter.over:
+        near = _drawn(state, seed, count.near)
+        doubts += exact_doubts(state, near, count.near_values, stress, count.probability)
     return values, doubts
+
+
+def _drawn(state: LimitState, seed: int, numbers: NDArray[np.int64]) -> Array:
+    """Return the draws of some samples, (samples, dimension)."""
+    rows = [state.draws(seed, int(number), 1) for number in numbers]
+    return np.concatenate([np.empty((0, state.dimension)), *rows])
 
 
 def _of_tail(
