@@ -44,8 +44,8 @@ def limits(seconds: float = SECONDS, extra_bytes: int = BYTES) -> Iterator[None]
 def trial(call: Callable[[], Any], seconds: float = SECONDS) -> tuple[str, str]:
     """Outcome of one call that may be refused, and a word on it.
 
-    'fine'; 'refused' with an `InputError` or `RunError`; 'FAULT' with a traceback, a hang, too much
-    memory, or a refusal without a word.
+    'fine'; 'refused' with an `InputError`, a `RunError` or the `TimeoutError` of a time limit;
+    'FAULT' with a traceback, a hang, too much memory, or a refusal without a word.
     """
     from stiction import InputError, RunError
 
@@ -55,7 +55,7 @@ def trial(call: Callable[[], Any], seconds: float = SECONDS) -> tuple[str, str]:
             warnings.simplefilter("ignore")
             call()
         outcome = "fine", ""
-    except (InputError, RunError) as error:
+    except (InputError, RunError, TimeoutError) as error:
         outcome = ("refused", str(error)) if str(error).strip() else ("FAULT no word", "")
     except Hang:
         return "FAULT hang", f"{time.perf_counter() - begin:.1f} s"

@@ -59,8 +59,9 @@ def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
     """Text that refuses a name and offers the nearest valid one."""
     names = list(valid)
     near = get_close_matches(given, names, n=1, cutoff=0.5)
+    shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"{what}: unknown {given!r}{hint} (valid: {', '.join(names)})"
+    return f"{what}: unknown {shown}{hint} (valid: {', '.join(names)})"
 
 
 def warn_accuracy(message: str) -> None:

@@ -235,6 +235,16 @@ def _path(value: Any) -> Path:
     return Path(text)
 
 
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError("must be text")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError("must be valid UTF-8, which TOML and NetCDF need") from None
+    return value
+
+
 def _numbers(value: Any) -> Array:
     try:
         return real_array(value)
@@ -247,6 +257,7 @@ Progress: TypeAlias = Annotated[Show, WrapValidator(lambda value, _: _progress(v
 """True, False, or a function of (done, total)."""
 Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
 """One name or several, as a tuple."""
+Text: TypeAlias = Annotated[str, BeforeValidator(_text)]
 FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
 """Real numbers of any shape, as a float64 array."""
@@ -297,7 +308,7 @@ def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[
         found: dict[str, Any] = {}
         for one in owners:
             found |= _parameters(one)
-        if isinstance(step, int) and step < len(found):
+        if isinstance(step, int) and not path and step < len(found):
             step = list(found)[step]
         path.append(str(step))
         inside = _models_in(found.get(str(step)))

@@ -15,13 +15,16 @@ from stiction.friction import SCALES, Friction, contradictions
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
-from stiction.model import Mode, describe, is_unplaced, model, real_array
+from stiction.model import Mode, Names, check, describe, is_unplaced, model, real_array
 from stiction.placing import describe_gaps
 from stiction.profiles import at_nodes, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
 
 FEWEST_NODES = 4
+ACCEPTED = ("barriers", "overstress", "constant")
+LARGEST = 1e100
+"""Of a profile, in SI units; sums and products of larger numbers overflow."""
 MOST_NODES = 5e4
 """A problem that needs more has a wrong unit rather than a long interface."""
 WEAKEST, STRONGEST = 1e-8, 1.0
@@ -378,6 +381,10 @@ class Problem:
         """
         if isinstance(profiles, Sample):
             return profiles
+        accept = check("accept", accept, Names)
+        unknown = [name for name in accept if name not in ACCEPTED]
+        if unknown:
+            raise InputError([unknown_name("accept", name, ACCEPTED) for name in unknown])
         values, scale, problems = self._values(named_profiles(profiles), accept)
         problems += self._impossible(values, scale, accept)
         if problems:
@@ -529,7 +536,9 @@ def profiles_of(
 
 
 def _check_finite(name: str, array: Array, interface: Interface, infinite: bool) -> None:
-    bad = np.isnan(array) | (array == -np.inf) if infinite else ~np.isfinite(array)
+    bad = ~(np.abs(array) <= LARGEST)
+    if infinite:
+        bad &= array != np.inf
     if not bad.any():
         return
     missing = np.isnan(array)
@@ -541,7 +550,9 @@ def _check_finite(name: str, array: Array, interface: Interface, infinite: bool)
             " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
         )
     entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-    raise InputError(f"{name}: must be finite{unless}; entry {entry} is not")
+    raise InputError(
+        f"{name}: must be finite{unless}; entry {entry} is not, or lies beyond {LARGEST:g}"
+    )
 
 
 def named_profiles(given: Any) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.interface import FEWEST, Interface
-from stiction.model import Flag, checked, describe, real_array
+from stiction.model import FilePath, Flag, check, checked, describe, real_array
 from stiction.placing import AtNodes, Gaps, Points, close_gaps, place
 from stiction.tables import OF_A_PLANE, load, read_npy
 from stiction.units import factor_to, is_in, parse
@@ -679,8 +679,7 @@ def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
         raise InputError("a profile as a table needs either file or values")
     if "file" not in table:
         return table
-    if not isinstance(table["file"], str | Path):
-        raise InputError("file: must be a path")
+    check("file", table["file"], FilePath)
     read = ("x", "value", "unit", "x_unit")
     options = _checked_options(table, ("file", *read))
     path = Path(folder) / table["file"]

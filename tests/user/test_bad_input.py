@@ -26,6 +26,15 @@ def make_strength(**options):
     return st.RandomField(**(arguments | options))
 
 
+def make_study(**options):
+    return st.Study(
+        problem=make_problem(),
+        random=make_strength(),
+        method=st.LocalCriterion(),
+        **({"ensemble": st.Ensemble(samples=2)} | options),
+    )
+
+
 CASES = {
     "wrong type": (lambda: st.Solid(**GOOD_SOLID | {"density": "heavy"}), ["density", "'heavy'"]),
     "a number as text": (lambda: st.Solid(**GOOD_SOLID | {"density": "1170"}), ["density"]),
@@ -296,6 +305,42 @@ CASES = {
         ),
         ["keep", "'initial_stress'", "valid: strength"],
     ),
+    "text for a flag": (lambda: st.Equilibrium(slip="1"), ["slip", "True or False", "'1'"]),
+    "a number for a flag": (
+        lambda: st.Rupture(loading_rate=1e9, implicit=1),
+        ["implicit", "True or False", "1"],
+    ),
+    "text for a seed": (
+        lambda: st.theory.rice_distribution(make_problem(), make_strength(), seed="1"),
+        ["seed", "whole", "'1'"],
+    ),
+    "entry of a list": (
+        lambda: st.Ensemble(samples=3, keep_samples=[1, "x"]),
+        ["keep_samples.1: ", "'x'"],
+    ),
+    "accepted by nobody": (
+        lambda: make_problem().sample(np.full(256, 1e6), accept=0.5),
+        ["accept", "0.5"],
+    ),
+    "accepted with a slip": (
+        lambda: make_problem().sample(np.full(256, 1e6), accept=("barrier",)),
+        ["accept", "did you mean 'barriers'"],
+    ),
+    "profile whose square overflows": (
+        lambda: st.onset(make_problem(), np.full(256, 1e308), method=st.LocalCriterion()),
+        ["strength", "finite", "1e+100"],
+    ),
+    "length whose square vanishes": (
+        lambda: st.PowerLawSpectrum(correlation_length=5e-324),
+        ["correlation_length", "1e-100"],
+    ),
+    "title in bytes": (lambda: make_study(title=b"x"), ["title", "text", "b'x'"]),
+    "title that is no Unicode": (lambda: make_study(title="\udcff"), ["title", "UTF-8"]),
+    "swept key of nothing": (
+        lambda: make_study(sweep={"type": ["beta"]}),
+        ["sweep", "unknown 'type'", "valid: problem"],
+    ),
+    "trusted in text": (lambda: st.Study.from_dict({}, trusted="no"), ["trusted", "'no'"]),
 }
 
 
@@ -323,6 +368,21 @@ def test_short_interface_warns_and_the_mean_mode_silences_it(recwarn):
     recwarn.clear()
     make_strength(spectrum=spectrum, mean_mode=True).sample(interface)
     assert not recwarn.list
+
+
+def test_long_names_are_cut_short():
+    with pytest.raises(st.InputError) as caught:
+        make_study(ensemble=st.Ensemble(samples=2, keep="x" * 10_000))
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize("nodes", [64, (32, 32)])
+def test_no_samples_are_an_empty_array(nodes):
+    length = 0.1 if nodes == 64 else (0.1, 0.1)
+    field = make_strength(spectrum=st.PowerLawSpectrum(correlation_length=0.02)).sample(
+        st.Interface(length=length, nodes=nodes), samples=0
+    )
+    assert field.shape == (0, *np.atleast_1d(nodes))
 
 
 @pytest.mark.parametrize(("lost", "warns"), [(0.05, True), (5e-5, False)])

@@ -27,7 +27,7 @@ from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.laws import FrictionLaw
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
-from stiction.model import Count, Positive, _number, model
+from stiction.model import Count, Flag, Positive, _number, model
 from stiction.problem import Problem, Sample, steepest_rate
 from stiction.results import Variable, onset_variables
 
@@ -166,7 +166,7 @@ class Rupture:
     slip_step: Fraction = 0.02
     load_step: Fraction = 1e-3
     event_drop: Fraction = 1e-4
-    implicit: bool = True
+    implicit: Flag = True
     arrival: Fraction = 0.5
     start: Start = "equilibrium"
     stop: Stop = "sliding"

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import FilePath, checked, describe
+from stiction.model import FilePath, Flag, checked, describe
 from stiction.tables import read_table
 from stiction.units import factor_to
 
@@ -98,7 +98,7 @@ def read_record(path: FilePath) -> xr.DataArray:
     return xr.DataArray(values, coords=coordinates, dims=("time", "x"), name=kinds[0])
 
 
-def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: bool = True) -> Misfit:
+def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: Flag = True) -> Misfit:
     """Return how far a simulated rupture is from what gauges recorded.
 
     Parameters

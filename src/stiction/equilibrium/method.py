@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from stiction.equilibrium.sample import pieces_of, refused
 from stiction.equilibrium.solver import Solver, event_variables
-from stiction.model import Real, _count, model
+from stiction.model import Flag, Real, _count, model
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
 from stiction.results import Variable, along, onset_variables, position
@@ -109,10 +109,10 @@ class Equilibrium:
     True
     """
 
-    sensitivity: bool = False
-    slip: bool = False
-    discretization_error: bool = False
-    prove_sliding: bool = False
+    sensitivity: Flag = False
+    slip: Flag = False
+    discretization_error: Flag = False
+    prove_sliding: Flag = False
     events: Number = 0
     gap: Gap = 1e-6
     type: Literal["equilibrium"] = "equilibrium"

@@ -17,7 +17,14 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    WithJsonSchema,
+    model_validator,
+)
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import (
@@ -38,6 +45,15 @@ Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
 ACCURACY = 1e-12
 LARGEST_ERROR = 1e-6
 """Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
+
+
+def _length(value: float) -> float:
+    if not 1e-100 < value < 1e100:  # else its inverse or its square overflows
+        raise ValueError("must lie between 1e-100 and 1e+100 m")
+    return value
+
+
+Length: TypeAlias = Annotated[Positive, AfterValidator(_length)]
 
 
 class SpectralDensity:
@@ -165,7 +181,7 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 class ScaledSpectrum(SpectralDensity):
     """Spectra known by one length: g depends on k times it only."""
 
-    correlation_length: Positive
+    correlation_length: Length
     truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Share | None = dataclasses.field(default=None, kw_only=True)
 

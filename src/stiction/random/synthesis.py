@@ -8,6 +8,8 @@ generator, a block of its own.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -134,5 +136,7 @@ def gaussian(
     z = np.empty((draws.shape[0], *shape))
     if len(shape) == 1:
         numbers = np.concatenate([np.zeros_like(numbers), numbers])
-    _synthesise(draws, sigma, numbers, has_mean, z.reshape(z.shape[0], -1, shape[-1]))
+    _synthesise(
+        draws, sigma, numbers, has_mean, z.reshape(z.shape[0], math.prod(shape[:-1]), shape[-1])
+    )
     return z

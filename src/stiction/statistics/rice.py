@@ -19,7 +19,7 @@ from stiction.arrays import Array
 from stiction.criterion.local import nucleation_stress
 from stiction.errors import InputError
 from stiction.jit import jit
-from stiction.model import Count, Numbers, brief, checked
+from stiction.model import Count, Number, Numbers, brief, checked
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField, too_many_samples
 from stiction.statistics.moments import stationary
@@ -104,7 +104,7 @@ def rice_distribution(
     strength: RandomField,
     *,
     profiles: Count = 512,
-    seed: int = 0,
+    seed: Number = 0,
     stress: Numbers | None = None,
 ) -> RiceDistribution:
     """Approximate the distribution of the critical stress of the local criterion.

@@ -31,6 +31,7 @@ from stiction.model import (
     Flag,
     Progress,
     Seconds,
+    Text,
     check,
     checked,
     explain,
@@ -113,7 +114,7 @@ class Study:
     ensemble: Ensemble
     sweep: Sweep = ()
     save: Save | None = None
-    title: str = ""
+    title: Text = ""
 
     @model_validator(mode="after")
     def _fits_together(self, info: pydantic.ValidationInfo) -> Study:
@@ -299,6 +300,7 @@ class Study:
         that was valid when it was stored, are not looked at one by one.
         """
         check("study", given, dict)
+        check("trusted", trusted, Flag)
         folder = None if folder is None else check("folder", folder, FilePath)
         sweep, mistakes = read_sweep(given, folder, cls)
         if sweep:

@@ -24,8 +24,16 @@ from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
 
 MOST_POINTS = 100_000
-_FIXED = ("ensemble.samples", "ensemble.first", "ensemble.keep", "ensemble.keep_samples")
-_FIXED_TABLES = ("title", "sweep", "ensemble.keep_limit")
+_FIXED = (
+    "ensemble.samples",
+    "ensemble.first",
+    "ensemble.keep",
+    "ensemble.keep_samples",
+    "ensemble.keep_limit",
+    "title",
+    "sweep",
+)
+_TABLES = ("problem", "random", "method", "ensemble", "save")
 _RANGE = ("start", "stop", "count", "spacing")
 _UNITS = {
     "length": "m",
@@ -180,8 +188,11 @@ def _axes(given: Any, info: pydantic.ValidationInfo) -> tuple[Axis, ...]:
             problems += error.problems
     keys = [key for axis in axes for key in axis.keys]
     for key in sorted(keys):
-        if key in _FIXED or key.split(".")[0] in _FIXED_TABLES or key in _FIXED_TABLES:
+        table = key.split(".")[0]
+        if key in _FIXED:
             problems.append(f"{key}: cannot be swept")
+        elif table not in _TABLES:
+            problems.append(unknown_name(key, table, _TABLES))
         if keys.count(key) > 1:
             problems.append(f"{key}: is swept twice")
         inner = [other for other in keys if other.startswith(f"{key}.")]
