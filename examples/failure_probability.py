@@ -12,7 +12,7 @@ strength = st.paper.strength(problem, correlation_ratio=0.5)
 found = st.failure_probability(problem, strength, 0.664e6, method=st.Equilibrium(), target_cv=0.3)
 print(found)
 again = st.failure_probability(
-    problem, strength, 0.664e6, method=st.Equilibrium(), algorithm="importance"
+    problem, strength, 0.664e6, method=st.LocalCriterion(), target_cv=0.3
 )
 print(again)
 design = st.design_stress(

@@ -7,7 +7,7 @@ import scipy.stats
 import stiction as st
 from stiction.statistics.densities import density
 from stiction.statistics.estimates import Estimate, mean, share, standard_deviation
-from stiction.statistics.quantiles import quantiles
+from stiction.statistics.order_statistics import quantiles
 
 RNG = np.random.default_rng(20)
 

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import stiction as st
-from stiction.cli.app import app
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
 COEFFICIENT = st.RandomField(st.Lognormal(mean=0.5, cv=0.15), SPECTRUM, of="friction_coefficient")
@@ -139,41 +137,3 @@ RELIABILITY = [
     "reliability", "study.toml", "--out", "out", "--smallest", "0.01", "--plain-samples", "0",
     "--target-cv", "0.5",
 ]  # fmt: skip
-
-
-def test_the_command_is_asked_in_coefficients(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    table = study_table() | {"method": {"type": "local_criterion"}}
-    table["problem"]["friction"] = {"type": "linear", "weakening_rate": 2e11}
-    st.Study.from_dict(table).to_toml("study.toml")
-    said = CliRunner().invoke(
-        app, [*RELIABILITY, "--friction-coefficient", "0.42"], catch_exceptions=False
-    )
-    assert said.exit_code == 0
-    assert "below 0.84 MPa (friction coefficient 0.42)" in said.output
-    curve = np.genfromtxt("out/failure_curve.csv", delimiter=",", names=True)
-    np.testing.assert_allclose(curve["coefficient"] * PRESSURE, curve["stress_Pa"], rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("options", "pressure", "text"),
-    [
-        (["0.4"], None, "--friction-coefficient: the study has no normal pressure"),
-        (["-0.4"], PRESSURE, "--friction-coefficient: must be a positive number"),
-        (["0.4", "--stress", "8e5"], PRESSURE, "give it or --stress, not both"),
-    ],
-)
-def test_the_command_refuses_before_it_computes(tmp_path, monkeypatch, options, pressure, text):
-    monkeypatch.chdir(tmp_path)
-    table = study_table() | {"method": {"type": "local_criterion"}}
-    if pressure is None:
-        table["problem"].pop("load")
-        table["random"]["strength"].pop("of")
-        table["random"]["strength"]["marginal"] = {"type": "lognormal", "mean": 1e6, "cv": 0.15}
-        table["problem"]["friction"] = {"type": "linear", "weakening_rate": 2e11}
-    st.Study.from_dict(table).to_toml("study.toml")
-    with pytest.raises(st.InputError, match=text):
-        CliRunner().invoke(
-            app, [*RELIABILITY, "--friction-coefficient", *options], catch_exceptions=False
-        )
-    assert not (tmp_path / "out").exists()

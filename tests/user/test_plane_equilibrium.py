@@ -160,9 +160,9 @@ def test_labelled_strength(plane):
     found = st.onset(plane, labelled, method=st.Equilibrium())
     # A conversion of units rounds.
     assert found["critical_load"].item() == pytest.approx(plain["critical_load"].item(), rel=1e-12)
-    elsewhere = labelled.assign_coords(x=labelled["x"] + 0.1)
+    elsewhere = labelled.assign_coords(x=0.9 * labelled["x"])
     elsewhere["x"].attrs["units"] = "mm"
-    with pytest.raises(st.InputError, match="taken at the nodes only"):
+    with pytest.raises(st.InputError, match="interpolate=True"):
         st.onset(plane, elsewhere, method=st.Equilibrium())
 
 
@@ -180,18 +180,17 @@ def test_events_and_path_of_a_plane_that_just_slides(plane):
 
 
 def test_command(tmp_path):
-    study, profile, out = (tmp_path / name for name in ("study.toml", "tau.npy", "onset.png"))
+    study, profile = tmp_path / "study.toml", tmp_path / "tau.npy"
     study.write_text(STUDY)
     np.save(profile, smooth((72, 64)) * 1e-6)
     run = CliRunner().invoke(
         app,
         ["onset", str(study), "--strength", str(profile), "--unit", "MPa", "--method",
-         "equilibrium", "--out", str(out)],
+         "equilibrium"],
     )  # fmt: skip
     assert run.exit_code == 0, run.output
     assert "x = " in run.output
     assert "y = " in run.output
-    assert out.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_command_refuses_profiles_of_other_shapes(tmp_path):

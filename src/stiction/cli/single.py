@@ -218,7 +218,8 @@ def rupture(
 
 
 def _summary(result: Any, problem: Any) -> str:
-    """The rupture in a few lines; what is not known at its end is left out."""
+    """Return the rupture in a few lines, without what is not known at its end."""
+    from stiction.plot.axes import unit_for
 
     def value(name: str, scale: float = 1.0) -> str:
         numbers = np.atleast_1d(result[name].values) * scale
@@ -228,8 +229,9 @@ def _summary(result: Any, problem: Any) -> str:
     if np.isfinite(result.kinetic_stress):
         lines[0] += f", stress drop {value('stress_drop', 1e-6)} MPa"
     if np.isfinite(result.onset_time):
-        place = value("critical_position", 1e3)
-        lines.append(f"onset at {place} mm after {value('onset_time')} s")
+        factor, unit = unit_for("m", problem.interface.lengths)
+        place = value("critical_position", factor)
+        lines.append(f"onset at {place} {unit} after {value('onset_time')} s")
     if np.isfinite(result.median_rupture_speed).any():
         lines.append(
             f"apparent front speed, median over h_n/2: {value('median_rupture_speed')} m/s (c_R"

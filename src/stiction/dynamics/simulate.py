@@ -90,7 +90,7 @@ def simulate_rupture(
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=128)
+    >>> problem = st.paper.problem(nodes=256)
     >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
     >>> method = st.Rupture(loading_rate=1e8, stop="onset")
     >>> run = st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(["slip"]))

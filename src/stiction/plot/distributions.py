@@ -14,7 +14,7 @@ from stiction.plot.axes import named, need, on_axes, scaled, shown_quantity
 from stiction.plot.style import color, series
 from stiction.results import DIRECTION
 from stiction.statistics.densities import density
-from stiction.statistics.quantiles import quantiles as estimate_quantiles
+from stiction.statistics.order_statistics import quantiles as estimate_quantiles
 
 CURVES = 6
 FEWEST = 20

@@ -84,7 +84,7 @@ def save_figure(figure: Figure | SubFigure, path: Path) -> None:
     """
     data = io.BytesIO()
     root: Any = figure.figure  # of a part of a figure the whole
-    root.savefig(data, format=path.suffix[1:])
+    root.savefig(data, format=path.suffix[1:], dpi=_RC["savefig.dpi"])
     write_whole(path, data.getvalue())
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 _HOMES = {
     "density": "stiction.statistics.densities",
-    "quantiles": "stiction.statistics.quantiles",
+    "quantiles": "stiction.statistics.order_statistics",
     "combined_mean": "stiction.statistics.control_variates",
     "misfit": "stiction.dynamics.misfit",
 }
