@@ -44,6 +44,30 @@ def fuzz(request):
     return SimpleNamespace(count=option("--fuzz-count"), seed=option("--fuzz-seed"))
 
 
+def _files():
+    """Return the files of the tree that are neither caches nor made by git."""
+    folders = ("src", "tests", "examples", "docs", "validation", "benchmarks", "reproduction")
+    return {
+        str(path.relative_to(ROOT))
+        for folder in folders
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and not {"__pycache__", ".hypothesis"} & set(path.parts)
+    }
+
+
+def pytest_configure(config):
+    if not hasattr(config, "workerinput"):
+        config.files_before = _files()
+
+
+def pytest_sessionfinish(session):
+    """No test writes into the tree."""
+    before = getattr(session.config, "files_before", None)
+    if before is not None and (new := sorted(_files() - before)):
+        print(f"\nfailed: tests have written into the tree: {', '.join(new)}")
+        session.exitstatus = 1
+
+
 @pytest.fixture
 def solid():
     import stiction as st
