@@ -535,7 +535,7 @@ def brief(self: Any) -> str:
     for field in dataclasses.fields(self):
         value = getattr(self, field.name)
         if field.repr and not _is_default(value, field.default):
-            parts.append(f"{field.name}={_text(value)}")
+            parts.append(f"{field.name}={_shown(value)}")
     return f"{type(self).__name__}({', '.join(parts)})"
 
 
@@ -545,7 +545,7 @@ def _is_default(value: Any, default: Any) -> bool:
     return bool(value == default)
 
 
-def _text(value: Any) -> str:
+def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
         shape = " x ".join(str(size) for size in value.shape)
         if value.dtype.kind not in "fiub" or value.size == 0:

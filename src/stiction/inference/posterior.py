@@ -174,12 +174,6 @@ class Posterior:
             attrs={"method": self.method},
         )
 
-    def plot(self) -> Any:
-        """Posterior against prior, pairs, and predicted against measured peaks."""
-        from stiction.inference.posterior_figure import posterior_figure
-
-        return posterior_figure(self)
-
     def __str__(self) -> str:
         width = max(map(len, self.names))
         lines = [f"{self.peaks}; onset by {self.method}"]
