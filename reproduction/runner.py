@@ -68,7 +68,7 @@ class Runner:
         plain["ensemble"] = {k: v for k, v in plain["ensemble"].items() if k != "samples"}
         plain.pop("title", None)
         place = self.folder / f"{name}-{_digest(plain)}"
-        return study.run(out=place, workers=self.workers, progress=False)
+        return study.run(out=place, workers=self.workers, progress=False, pilot=False)
 
     def sweep(self, name: str, problem, field_of, method, samples: int, ratios=setting.RATIOS):
         """Run one study at each xi_0/h_n, with draws of its own, along 'correlation_ratio'."""
