@@ -125,3 +125,19 @@ def test_designs_of_one_parameter():
     error = 3.0 * np.hypot(float(found.standard_error[0, 0]), np.std(gains) / np.sqrt(100))
     assert float(found.information[0, 0]) == pytest.approx(np.mean(gains), abs=error)
     assert float(found.spread_left[0, 0]) == pytest.approx(np.mean(spreads), rel=0.15)
+
+
+def test_a_posterior_by_a_criterion_that_does_not_hold_says_so():
+    """Lognormal strength of cv 0.9 reaches its residual strength long before the onset."""
+    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
+    rate = 2.0 * 0.5788869 * solid.effective_modulus() / 0.025
+    law = st.LinearWeakening(weakening_rate=rate)
+    problem = st.Problem(solid, st.Interface(length=0.1, nodes=128), law)
+    spectrum = st.PowerLawSpectrum(correlation_length=0.0075)
+    random = st.RandomField(st.Lognormal(mean=1e6, cv=0.9), spectrum, mean_mode=True)
+    given = {"method": st.LocalCriterion(), "samples": 40, "seed": 3, "progress": False}
+    peaks = st.monte_carlo(problem, random, pilot=False, **given).critical_stress.values
+    found = {"prior": {"marginal.cv": (0.3, 1.5)}, "method": st.LocalCriterion()}
+    with pytest.warns(st.AccuracyWarning, match="differs from the exact onset"):
+        posterior = st.infer(problem, random, peaks, progress=False, **found)
+    assert any("Equilibrium" in note for note in posterior.notes)

@@ -95,6 +95,17 @@ def compare(
     return Pilot(int(both.sum()), float(difference.mean()), float(difference.std(ddof=1)))
 
 
+def doubt(pilot: Pilot, where: str = "") -> str | None:
+    """Return what to warn of: a difference beyond 1 %."""
+    if max(abs(pilot.bias), pilot.scatter) <= WORTH_A_WARNING:
+        return None
+    return (
+        f"the local criterion differs from the exact onset by {100.0 * pilot.bias:+.2g} % on"
+        f" average, with a scatter of {100.0 * pilot.scatter:.2g} %{where} (a pilot of"
+        f" {pilot.samples} samples); method=st.Equilibrium() has no such error"
+    )
+
+
 def pilot_attributes(
     points: Sequence[Experiment], samples: int, first: int = 0, *, show: bool = True
 ) -> Mapping[str, Any]:
@@ -130,11 +141,7 @@ def pilot_attributes(
         return {}
     bias = max((pilot.bias for pilot in found), key=abs)
     scatter = max(pilot.scatter for pilot in found)
-    if max(abs(bias), scatter) > WORTH_A_WARNING:
-        where = " at the worst point of the sweep" if len(points) > 1 else ""
-        warn_accuracy(
-            f"the local criterion differs from the exact onset by {100.0 * bias:+.2g} % on average,"
-            f" with a scatter of {100.0 * scatter:.2g} %{where} (a pilot of {found[0].samples}"
-            " samples); method=st.Equilibrium() has no such error"
-        )
+    worst = Pilot(found[0].samples, bias, scatter)
+    if text := doubt(worst, " at the worst point of the sweep" if len(points) > 1 else ""):
+        warn_accuracy(text)
     return {"pilot_samples": found[0].samples, "pilot_bias": bias, "pilot_scatter": scatter}

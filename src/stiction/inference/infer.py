@@ -9,6 +9,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
+from stiction.ensemble.pilot import ON_A_LINE, compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, on_grid
 from stiction.inference.likelihood import Likelihood, local_refused, make_model
@@ -146,7 +147,7 @@ def infer(
         (own,) = experiments_at(parameters, middle, method)
         own.problem.warn_of_units(own.mean("strength"))
         likelihood, grid = _located(parameters, method, measured, samples, options, meter)
-        return _posterior(likelihood, grid, measured, seed, meter)
+        return _posterior(likelihood, grid, measured, seed, method, meter)
 
 
 def _load_cell(given: float, unit: str, peaks: Peaks, si: bool) -> float:
@@ -245,7 +246,7 @@ def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _posterior(
-    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, meter: Meter
+    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, method: Any, meter: Meter
 ) -> Posterior:
     model = likelihood.model
     prior = model.prior
@@ -262,7 +263,7 @@ def _posterior(
         monte_carlo_error=errors,
         method=model.method.label,
         peaks=peaks,
-        notes=_notes(likelihood, errors, u),
+        notes=_notes(likelihood, errors, u, method),
         likelihood=likelihood,
         u=u,
         seed=seed,
@@ -271,11 +272,17 @@ def _posterior(
     return posterior
 
 
-def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tuple[str, ...]:
+def _notes(
+    likelihood: Likelihood, errors: Mapping[str, float], u: Array, method: Any
+) -> tuple[str, ...]:
     """What limits the posterior; what is serious is a warning as well."""
     model = likelihood.model
     worst = max(errors, key=lambda name: errors[name])
     serious = [piled_up(model, u)]
+    middle = model.prior.theta(u.mean(axis=0, keepdims=True))
+    (experiment,) = experiments_at(model.prior, middle, method)
+    if pilot := compare(experiment, experiment.draws(0, 0, ON_A_LINE)):
+        serious.append(doubt(pilot))
     if errors[worst] > TOLERABLE:
         samples = model.specimens[0].onsets.shape[1]
         serious.append(
