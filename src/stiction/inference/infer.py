@@ -278,7 +278,7 @@ def _notes(
     """What limits the posterior; what is serious is a warning as well."""
     model = likelihood.model
     worst = max(errors, key=lambda name: errors[name])
-    serious = [piled_up(model, u)]
+    serious: list[str | None] = [piled_up(model, u)]
     middle = model.prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(model.prior, middle, method)
     if pilot := compare(experiment, experiment.draws(0, 0, ON_A_LINE)):
