@@ -112,12 +112,10 @@ def _density(axes: Axes, values: Any, index: int) -> None:
 
 
 def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
-    """The strength above slip rate in space and time."""
-    figure = new_figure(PAGE, 4.0)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.4))
-    st.plot.field(problem, run["peak_strength"], ax=above)
-    above.set_xlabel("")
-    st.plot.rupture(run, problem=problem, ax=below)
+    """Slip rate in space and time."""
+    with paper_style():
+        figure = new_figure(PAGE, 3.4)
+        st.plot.rupture(run, problem=problem, ax=figure.subplots())
     return figure
 
 
