@@ -107,7 +107,7 @@ def test_strength_that_cannot_break_is_refused_with_a_way_out(problem):
     rows = problem.sample(np.full(256, 1e6))
     strength = rows.strength.copy()
     strength[0, 3] = np.inf
-    with pytest.raises(st.InputError, match=r"must be finite everywhere.*st\.Equilibrium"):
+    with pytest.raises(st.InputError, match=r"must be finite everywhere.*st\.Rupture"):
         excess_of(rows._replace(strength=strength))
 
 

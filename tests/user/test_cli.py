@@ -394,7 +394,7 @@ def test_a_cache_that_others_can_write_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"random.strength.spectrum.correlation_length": 1e-308}, "check the units of the lengths"),
+        ({"random.strength.spectrum.correlation_length": 1e-308}, "must lie between 1e-100"),
         ({"ensemble.samples": 10**13}, r"samples: must be at most 1e\+10"),
         ({"problem.interface.nodes": 10**30}, "at most 2\\^24"),
         ({"problem.interface.length": 1e-308}, "length: the nodes must be at least"),
