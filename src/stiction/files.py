@@ -39,10 +39,6 @@ ONE_AT_A_TIME = threading.RLock()
 """The NetCDF library is not thread-safe: one thread may look at a run that another one writes."""
 
 
-class DamagedError(ValueError):
-    """A file is not what was written."""
-
-
 def write_atomically(path: Path, content: bytes | Callable[[Path], object]) -> None:
     """Write a file aside, sync it and rename it: an older one stays until the new one is whole.
 
@@ -173,38 +169,6 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
 
     with ONE_AT_A_TIME:
         write_atomically(path, write)
-
-
-def read_dataset(path: Path) -> xr.Dataset:
-    """Read what `write_dataset` has written.
-
-    Raises
-    ------
-    FileNotFoundError, PermissionError
-    DamagedError
-        If it is no such file, or not what was written.
-    """
-    import netCDF4
-    import xarray as xr
-
-    try:
-        with ONE_AT_A_TIME:
-            with xr.open_dataset(path, engine="netcdf4") as opened:
-                dataset = opened.load()
-            with netCDF4.Dataset(path) as file:
-                marked = GROUP in file.groups and DIGEST in file[GROUP].ncattrs()
-                mark = str(file[GROUP].getncattr(DIGEST)) if marked else ""
-        found = digest_of(dataset)
-    except (FileNotFoundError, PermissionError):
-        raise
-    # A damaged file makes the NetCDF library and xarray raise nearly anything.
-    except Exception as error:
-        raise DamagedError(f"is no NetCDF file that can be read: {error}") from None
-    if not mark:
-        raise DamagedError("has no checksum: it was changed by others, or is damaged")
-    if mark != found:
-        raise DamagedError("fails its checksum: it was changed by others, or is damaged")
-    return dataset
 
 
 def digest_of(dataset: xr.Dataset) -> str:
