@@ -398,17 +398,6 @@ def test_custom_spectra_with_steps_and_lines():
     assert ends.power_within(15000.0) == pytest.approx(share, rel=1e-9)
 
 
-def test_a_line_between_the_modes_is_not_missed_silently():
-    def line(k):
-        return np.exp(-((k / 500.0) ** 2)) + 50.0 * ((k > 20000.0) & (k < 20010.0))
-
-    spectrum = st.CustomSpectrum(function=line, break_points=(20000.0, 20010.0))
-    field = st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum)
-    # Modes 62.8 rad/m apart: none falls on the line.
-    with pytest.warns(st.AccuracyWarning, match=r"carry 0\.45\d times the power"):
-        field.sample(st.Interface(length=0.1, nodes=1024), samples=1)
-
-
 def test_a_density_whose_integral_does_not_converge_is_refused():
     with pytest.raises(st.InputError, match=r"does not converge; give max_wavenumber"):
         st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k))

@@ -6,7 +6,7 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.random.checks import check_residual, share_below_residual
+from stiction.random.stresses import check_residual, share_below_residual
 
 
 def test_strength_below_the_residual_strength_is_said_before_computing(solid, make_strength):

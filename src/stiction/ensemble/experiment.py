@@ -17,15 +17,15 @@ from stiction.errors import InputError, unknown_name
 from stiction.methods import Solver, Values, accepted, check_method, prepared, variables_of
 from stiction.model import Count, Names, Number, Positive, describe, model, whole
 from stiction.problem import PROFILES, Problem, Sample, refusals
-from stiction.random.checks import check_residual, warn_if_unresolved
-from stiction.random.pressure import (
+from stiction.random.random_field import RandomField
+from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.stresses import (
     check_pressure,
+    check_residual,
     mean_in_stress,
     profiles_in_stress,
     support_in_stress,
 )
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.synthesis import block_of
 from stiction.results import Variable, along
 
@@ -165,7 +165,6 @@ class Experiment:
         self.random.warn_if_inaccurate(self.problem.interface)
         self.problem.warn_of_units(self.mean("strength"))
         check_residual(self.problem, self.random.properties)
-        warn_if_unresolved(self.problem, self.random)
 
     def draws(self, seed: int, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.

@@ -15,14 +15,9 @@ from stiction.model import to_plain
 class OneOf(NamedTuple):
     """Annotation of such a field.
 
-    Attributes
-    ----------
-    kinds : dict
-        The classes by `type`. A class that is added here may be named in study files.
-    convert, plain : callable
-        Map what was given to an object of one of the classes, and that to what a file holds.
-    also : str
-        What a table may hold besides, for editors; empty if nothing.
+    `kinds` are the classes by `type`: one that is added may be named in study files. `convert` and
+    `plain` map what was given to an object of one of them, and that to what a file holds; `also`
+    tells editors what else a table may hold.
     """
 
     kinds: Mapping[str, Any]
@@ -31,34 +26,23 @@ class OneOf(NamedTuple):
     also: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            self.convert,
-            serialization=core_schema.plain_serializer_function_ser_schema(self.plain),
-        )
+        plain = core_schema.plain_serializer_function_ser_schema(self.plain)
+        return core_schema.no_info_plain_validator_function(self.convert, serialization=plain)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
-        found: list[Any] = []
-        for kind in self.kinds.values():
-            schema = pydantic.TypeAdapter(kind).json_schema()
-            found.append(schema | {"required": [*schema.get("required", ()), "type"]})
+        found = [pydantic.TypeAdapter(kind).json_schema() for kind in self.kinds.values()]
         if self.also:
             own = {"type": {"type": "string", "description": self.also}}
-            found.append({"type": "object", "properties": own, "required": ["type"]})
-        return {"anyOf": found}
+            found.append({"type": "object", "properties": own})
+        return {"anyOf": [one | {"required": [*one.get("required", ()), "type"]} for one in found]}
 
 
 def from_table(kinds: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
-    """Make an object of the class that `type` names in a table.
-
-    Raises
-    ------
-    InputError
-        If there is no such class, or the rest of the table does not fit it.
-    """
+    """Make an object of the class that `type` names in a table, or raise an `InputError`."""
     rest = dict(given)
     name = rest.pop("type", None)
     if name is None:
         raise InputError(f"type: missing (valid: {', '.join(kinds)})")
-    if not isinstance(name, str) or name not in kinds:
+    if name not in kinds:
         raise InputError(unknown_name("type", str(name), kinds))
     return kinds[name](**rest)

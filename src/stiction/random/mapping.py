@@ -31,22 +31,11 @@ SMALL = 1e-6  # share of the variance
 
 
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
-    """Compute F^-1(Phi(z)) by scipy, through the survival function above the median.
+    """Compute F^-1(Phi(z)) of a frozen scipy.stats distribution (Grigoriu, 1995).
 
-    Parameters
-    ----------
-    distribution : frozen scipy.stats distribution
-    z : array
-
-    Returns
-    -------
-    array of the shape of `z`
-
-    Notes
-    -----
-    Grigoriu (1995): translation process. Phi(z) rounds to 1 long before z = 8; the upper tail
-    keeps its digits only through 1 - Phi(z) = Phi(-z), and only where scipy computes the inverse
-    survival function of the family directly.
+    Phi(z) rounds to 1 long before z = 8. The upper tail keeps its digits only through
+    1 - Phi(z) = Phi(-z), and only where scipy computes the inverse survival function of the family
+    directly.
     """
     z = np.asarray(z, dtype=np.float64)
     tail = ndtr(-np.abs(z))
@@ -125,12 +114,8 @@ def hermite_coefficients(marginal: Any) -> Array:
     a fine trapezoidal rule on |z| <= 8: unlike Gauss-Hermite quadrature it stays accurate where
     the map has kinks, and its error for smooth maps is round-off. Heavy tails have their variance
     further out and in high orders: then on |z| <= 37, and up to order 1000. The last coefficient
-    stands for all the rest of the variance, so that the correlation is 1 at zero lag.
-
-    Raises
-    ------
-    InputError
-        If the quantile is not finite where it matters or the moments of scipy disagree with it.
+    stands for all the rest of the variance, so that the correlation is 1 at zero lag. An
+    `InputError` if scipy's quantile and moments disagree.
     """
     coefficients, tail = _expand(marginal.distribution, REACH)
     if tail > SMALL:
@@ -173,9 +158,7 @@ def _expand(distribution: Any, reach: float) -> tuple[Array, float]:
     if not rest > -SMALL * variance or (reach == FURTHEST and rest > 0.5 * variance):
         raise InputError(
             "marginal: scipy's quantile of this distribution is not accurate enough in its tails"
-            f" for a correlation ({np.count_nonzero(~np.isfinite(value))} values of"
-            f" {value.size} are not finite; {100.0 * rest / variance:.2g} % of the variance are"
-            " not accounted for)"
+            f" for a correlation: {100.0 * rest / variance:.2g} % of its variance are missing"
         )
     found.append(np.sqrt(max(rest, 0.0)))
     return np.array(found), tail

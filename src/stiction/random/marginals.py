@@ -2,14 +2,15 @@
 
 In the families that are given by mean and coefficient of variation, `mean` is the mean of the field
 and `cv` its standard deviation over its mean, whatever the bound `low`. scipy's own parameters
-(shapes, loc, scale) follow from them. To add a family, write one class with a `_freeze` and add it
-to `MARGINALS`.
+(shapes, loc, scale) follow from them. To add a family, write one class with a `distribution` and
+add it to `MARGINALS`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
@@ -20,7 +21,7 @@ from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
 from stiction.errors import InputError, unknown_name
-from stiction.model import Positive, Real, _number, model
+from stiction.model import Positive, Real, describe, is_finite, model, to_plain
 from stiction.random.kinds import OneOf, from_table
 
 
@@ -29,13 +30,10 @@ class Marginal:
 
     type: str
 
-    def _freeze(self) -> Any:
-        raise NotImplementedError
-
     @cached_property
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-        return self._freeze()
+        raise NotImplementedError
 
     @property
     def affine(self) -> tuple[str, ...]:
@@ -78,13 +76,14 @@ class Beta(Marginal):
     type: Literal["beta"] = "beta"
 
     @model_validator(mode="after")
-    def _ordered(self) -> Beta:
+    def _ordered(self) -> Self:
         if not self.low < self.high:
             raise InputError(f"low must be below high, got low={self.low:g}, high={self.high:g}")
         return self
 
-    def _freeze(self) -> Any:
-        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
+    @cached_property
+    def distribution(self) -> Any:
+        return scipy.stats.beta(self.alpha, self.beta, *self.location_and_scale)
 
     @property
     def affine(self) -> tuple[str, ...]:
@@ -96,7 +95,7 @@ class Beta(Marginal):
 
 
 @model(kw_only=True)
-class _AboveLow(Marginal):
+class _ByMoments(Marginal):
     """Families above a lower bound, known by mean and coefficient of variation."""
 
     mean: Positive
@@ -107,6 +106,7 @@ class _AboveLow(Marginal):
     def _mean_above_low(self) -> Self:
         if not self.mean > self.low:
             raise InputError(f"mean must be above low, got mean={self.mean:g}, low={self.low:g}")
+        _ = self.distribution  # there may be none with these moments
         return self
 
     @property
@@ -117,7 +117,7 @@ class _AboveLow(Marginal):
     @property
     def _ratio(self) -> float:
         """Standard deviation over the mean above the lower bound."""
-        return self.cv * abs(self.mean) / self._excess
+        return self.cv * self.mean / self._excess
 
     @property
     def affine(self) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ class _AboveLow(Marginal):
 
 
 @model(kw_only=True)
-class Lognormal(_AboveLow):
+class Lognormal(_ByMoments):
     """Lognormal distribution above `low`.
 
     Parameters
@@ -148,14 +148,15 @@ class Lognormal(_AboveLow):
 
     type: Literal["lognormal"] = "lognormal"
 
-    def _freeze(self) -> Any:
+    @cached_property
+    def distribution(self) -> Any:
         shape = math.sqrt(math.log1p(self._ratio**2))
         scale = self._excess / math.sqrt(1.0 + self._ratio**2)
         return scipy.stats.lognorm(shape, self.low, scale)
 
 
 @model(kw_only=True)
-class Weibull(_AboveLow):
+class Weibull(_ByMoments):
     """Weibull distribution (of minima) above `low`.
 
     Parameters
@@ -174,16 +175,14 @@ class Weibull(_AboveLow):
 
     type: Literal["weibull"] = "weibull"
 
-    @model_validator(mode="after")
-    def _as_wide_as_can_be_solved(self) -> Weibull:
+    @cached_property
+    def distribution(self) -> Any:
         if not 1e-3 < self._ratio < 10.0:
             raise InputError(
                 "cv: the standard deviation over the mean above low must lie between 0.001 and"
                 f" 10, got {self._ratio:g}"
             )
-        return self
 
-    def _freeze(self) -> Any:
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)
             spread = gammaln(1.0 + 2.0 * inverse) - 2.0 * gammaln(1.0 + inverse)
@@ -196,7 +195,7 @@ class Weibull(_AboveLow):
 
 
 @model(kw_only=True)
-class Gamma(_AboveLow):
+class Gamma(_ByMoments):
     """Gamma distribution above `low`.
 
     Parameters
@@ -215,13 +214,14 @@ class Gamma(_AboveLow):
 
     type: Literal["gamma"] = "gamma"
 
-    def _freeze(self) -> Any:
+    @cached_property
+    def distribution(self) -> Any:
         shape = self._ratio**-2
         return scipy.stats.gamma(shape, self.low, self._excess / shape)
 
 
 @model(kw_only=True)
-class TruncatedNormal(Marginal):
+class TruncatedNormal(_ByMoments):
     """Normal distribution cut off at `low` and `high`.
 
     Parameters
@@ -229,7 +229,7 @@ class TruncatedNormal(Marginal):
     mean : float
         Mean of the field, that is after the cut; between `low` and `high`.
     cv : float
-        Standard deviation over mean, after the cut, positive.
+        Standard deviation over mean, after the cut.
     low, high : float, optional
         0 and no upper bound if left out.
 
@@ -247,34 +247,17 @@ class TruncatedNormal(Marginal):
     1000000
     """
 
-    mean: Real
-    cv: Positive
-    low: Real = 0.0
     high: Real | None = None
     type: Literal["truncated_normal"] = "truncated_normal"
 
-    @property
-    def _top(self) -> float:
-        return math.inf if self.high is None else self.high
-
-    @model_validator(mode="after")
-    def _ordered(self) -> TruncatedNormal:
-        if not self.low < self.mean < self._top:
-            raise InputError(
-                f"mean must lie between low and high, got low={self.low:g}, mean={self.mean:g},"
-                f" high={self._top:g}"
-            )
-        _ = self.distribution
-        return self
-
-    def _freeze(self) -> Any:
-        deviation = self.cv * abs(self.mean)
-        excess, room = self.mean - self.low, self._top - self.mean
+    @cached_property
+    def distribution(self) -> Any:
+        deviation, high = self.cv * self.mean, math.inf if self.high is None else self.high
 
         def parameters(guess: Any) -> tuple[float, float, float, float]:
             centre = self.mean + deviation * float(guess[0])
             width = deviation * math.exp(float(guess[1]))
-            return (self.low - centre) / width, (self._top - centre) / width, centre, width
+            return (self.low - centre) / width, (high - centre) / width, centre, width
 
         def moments(guess: Any) -> Any:
             try:
@@ -283,23 +266,21 @@ class TruncatedNormal(Marginal):
                 return np.array([1e3, 1e3])
             return np.array([(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0])
 
-        possible = deviation < excess and deviation**2 < excess * room / 2.0
-        found = root(moments, [0.0, 0.0], tol=1e-12) if possible else None
+        # An exponential distribution, and between two bounds a uniform one, are the widest.
+        room = min(self._excess**2, self._excess * max(high - self.mean, 0.0) / 2.0)
+        found = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if found is None or not np.abs(moments(found.x)).max() < 1e-8:
             raise InputError(
-                f"no normal distribution cut at low={self.low:g} and high={self._top:g} has"
-                f" mean={self.mean:g} and cv={self.cv:g}: it would have to be wider than the cut"
-                " leaves; lower cv or the bound, or take st.Lognormal or st.Beta"
+                f"no normal distribution cut at low={self.low:g} and high={high:g} has"
+                f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between them, and it"
+                " would have to be wider than the cut leaves; lower cv or the bound, or take"
+                " st.Lognormal or st.Beta"
             )
         return scipy.stats.truncnorm(*parameters(found.x))
 
     @property
     def affine(self) -> tuple[str, ...]:
-        return ("mean",) if self.low == 0.0 and self.high is None else ()
-
-    @property
-    def location_and_scale(self) -> tuple[float, float]:
-        return self.low, self.mean - self.low
+        return super().affine if self.high is None else ()
 
 
 @dataclass(frozen=True)
@@ -320,10 +301,9 @@ class ScipyMarginal(Marginal):
     parameters: tuple[tuple[str, float], ...] = ()
     frozen: Any = None
 
-    def _freeze(self) -> Any:
-        if self.frozen is not None:
-            return self.frozen
-        return getattr(scipy.stats, self.type)(**dict(self.parameters))
+    @cached_property
+    def distribution(self) -> Any:
+        return self.frozen or getattr(scipy.stats, self.type)(**dict(self.parameters))
 
     @property
     def affine(self) -> tuple[str, ...]:
@@ -346,7 +326,7 @@ MARGINALS: dict[str, Any] = {
 
 
 def marginal_of(value: Any) -> Marginal:
-    """The marginal of one, of a table {type, ...}, or of a frozen scipy.stats distribution.
+    """Return the marginal of one, of a table {type, ...}, or of a frozen scipy.stats distribution.
 
     Raises
     ------
@@ -355,36 +335,23 @@ def marginal_of(value: Any) -> Marginal:
     """
     if isinstance(value, Marginal):
         return value
-    if isinstance(value, dict):
-        return _of_table(value)
-    if isinstance(value, scipy.stats.rv_continuous):
-        value = _without_parameters(value)
-    family = getattr(value, "dist", None)
+    if isinstance(value, Mapping):
+        name, rest = value.get("type"), {k: v for k, v in value.items() if k != "type"}
+        theirs = name in ("beta", "gamma") and {"a", "b", "loc", "scale"} & rest.keys()
+        if name is None or (name in MARGINALS and not theirs):
+            found: Marginal = from_table(MARGINALS, value)
+            return found
+        return _of_scipy(str(name), rest)
+    family: Any = getattr(value, "dist", None)
     if not isinstance(family, scipy.stats.rv_continuous):
         raise InputError(
             "must be st.Beta(...), st.Lognormal(...) or a frozen continuous scipy.stats"
             f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
-    if not _is_scipys(family):
-        found = ScipyMarginal(type(family).__name__, frozen=value)
-        return _with_moments(found, value.args)
-    parameters = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return _of_scipy(family.name, parameters)
-
-
-def _of_table(table: dict[str, Any]) -> Marginal:
-    name = str(table.get("type"))
-    scipys = {"a", "b", "loc", "scale"} & set(table)
-    if "type" in table and (name not in MARGINALS or (name in ("beta", "gamma") and scipys)):
-        return _of_scipy(name, {key: one for key, one in table.items() if key != "type"})
-    found: Marginal = from_table(MARGINALS, table)
-    return found
-
-
-def _is_scipys(family: Any) -> bool:
-    """Whether a family is the one that scipy has under its name."""
-    name = str(getattr(family, "name", None) or type(family).__name__)
-    return type(family) is type(getattr(scipy.stats, name, None))
+    if type(family) is not type(getattr(scipy.stats, str(family.name), None)):  # a histogram, say
+        return _with_moments(ScipyMarginal(type(family).__name__, frozen=value))
+    given = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
+    return _of_scipy(family.name, given)
 
 
 def _parameter_names(family: Any) -> list[str]:
@@ -392,60 +359,43 @@ def _parameter_names(family: Any) -> list[str]:
     return [*shapes, "loc", "scale"]
 
 
-def _of_scipy(name: str, parameters: dict[str, Any]) -> Marginal:
+def _of_scipy(name: str, parameters: Mapping[str, Any]) -> Marginal:
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
-        valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm"]
-        text = unknown_name("type", name, valid)
-        raise InputError(f"{text.removesuffix(')')} and scipy.stats' other continuous)")
+        valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]
+        raise InputError(unknown_name("type", name, valid))
     known = _parameter_names(family)
     problems = [unknown_name(name, key, known) for key in parameters if key not in known]
     problems += [f"{name}.{key}: missing" for key in known[:-2] if key not in parameters]
-    for key, value in parameters.items():
-        try:
-            finite = math.isfinite(_number(value))
-        except ValueError:
-            finite = False
-        if not finite:
-            problems.append(f"{name}.{key}: must be a finite number, got {value!r}")
+    problems += [
+        f"{name}.{key}: must be a finite number, got {describe(value)}"
+        for key, value in parameters.items()
+        if not is_finite(value)
+    ]
     if problems:
         raise InputError(problems)
-    found = ScipyMarginal(name, tuple((key, float(value)) for key, value in parameters.items()))
-    return _with_moments(found, parameters)
+    given = tuple((key, float(value)) for key, value in parameters.items())
+    return _with_moments(ScipyMarginal(name, given))
 
 
-def _with_moments(marginal: Marginal, parameters: Any) -> Marginal:
+def _with_moments(marginal: ScipyMarginal) -> Marginal:
     mean, deviation = marginal.distribution.mean(), marginal.distribution.std()
     if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
         raise InputError(
             f"{marginal.type}: must have a finite mean and a positive, finite standard deviation,"
-            f" got {mean:g} and {deviation:g} from {parameters}"
+            f" got {mean:g} and {deviation:g} from {dict(marginal.parameters)}"
         )
     return marginal
 
 
-def _without_parameters(family: Any) -> Any:
-    """Freeze a distribution without parameters, such as a histogram, and refuse all others.
-
-    A named family without its parameters would stand at 0 Pa with a width of 1 Pa.
-    """
-    if _is_scipys(family) or family.shapes:
-        name = str(getattr(family, "name", None) or type(family).__name__)
-        given = ", ".join(f"{key}=..." for key in _parameter_names(family))
-        raise InputError(
-            f"scipy.stats.{name} is a family without parameters; freeze it by giving them:"
-            f" scipy.stats.{name}({given}), loc and scale in Pa"
-        )
-    return family()
-
-
 def _plain(value: Any) -> dict[str, Any]:
     if not isinstance(value, ScipyMarginal):
-        known = {field.name: getattr(value, field.name) for field in fields(value)}
-        return {name: one for name, one in known.items() if one is not None}
+        found: dict[str, Any] = to_plain(value)
+        return found
     if value.frozen is not None:
-        raise ValueError(f"marginal is the Python distribution {value.type!r}; use one that scipy"
-                         " names")  # fmt: skip
+        raise ValueError(
+            f"marginal is the Python distribution {value.type!r}; use one that scipy names"
+        )
     return {"type": value.type, **dict(value.parameters)}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.optimize import brentq
@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import Flag, Numbers, Positive, check, check_memory, describe, model, whole
+from stiction.model import Flag, Number, Numbers, Positive, check_memory, checked, describe, model
 from stiction.random.mapping import (
     correlation_of_mapped,
     from_normal,
@@ -28,12 +28,12 @@ from stiction.random.synthesis import block_of, gaussian, standard_normal
 ENOUGH_ACCOUNTED = 0.01
 FEWEST_LENGTHS = 8.0 * math.pi
 """e-folding lengths in an interface below which a missing mean mode may be felt."""
-LOST, FALLEN, MISSED = 1e-4, 0.02, 0.1
-"""What is worth a warning: shares of the variance and the power, and of a correlation."""
-
-
+LOST, FALLEN = 1e-4, 0.02
+"""What is worth a warning: a share of the variance, and a negative correlation."""
 MOST_SAMPLES = 10**10
 LAST_SAMPLE = 2**62
+
+Of: TypeAlias = Literal["strength", "z"]
 
 
 @model
@@ -99,6 +99,7 @@ class RandomField:
         """Standard deviation of the field, in its own unit."""
         return float(self.marginal.distribution.std())
 
+    @checked
     def modes(self, interface: Interface) -> Modes:
         """Return the modes of this field on an interface.
 
@@ -108,11 +109,13 @@ class RandomField:
             If truncation leaves no mode: the correlation length is too long for the interface. If
             a line is given an anisotropy.
         """
-        return _modes(self, check("interface", interface, Interface))
+        return _modes(self, interface)
 
+    @checked
     def draws(
-        self, interface: Interface, samples: int, seed: int, first: int = 0, *, stream: int = 0
-    ) -> Array:
+        self, interface: Interface, samples: Number, seed: Number, first: Number = 0, *,
+        stream: Number = 0,
+    ) -> Array:  # fmt: skip
         """Draw samples number `first`, `first` + 1, ..., standard normal numbers.
 
         Draw j of sample i depends on (seed, stream, i, j) only: not on the batch, the spectrum or
@@ -129,16 +132,17 @@ class RandomField:
         (samples, dimension) array
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
-        counts = check_counts(samples=samples, seed=seed, first=first, stream=stream)
-        modes = self.modes(interface)
-        check_memory("samples", 8.0 * counts["samples"] * (modes.dimension + interface.size))
-        block = block_of(len(interface.shape))
-        return standard_normal(**counts, ranks=modes.ranks, mean_mode=self.mean_mode, block=block)
+        modes = _modes(self, interface)
+        check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
+        return standard_normal(
+            seed, samples, modes.ranks, first=first, stream=stream, mean_mode=self.mean_mode,
+            block=block_of(len(interface.shape)),
+        )  # fmt: skip
 
-    def gaussian(self, interface: Interface, draws: Array) -> Array:
+    @checked
+    def gaussian(self, interface: Interface, draws: Numbers) -> Array:
         """Compute the Gaussian field z of given draws, (samples, *shape), of unit variance."""
-        modes = self.modes(interface)
-        draws = check("draws", draws, Numbers)
+        modes = _modes(self, interface)
         if draws.ndim != 2 or draws.shape[1] != modes.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {modes.dimension}), got shape {draws.shape}"
@@ -163,27 +167,16 @@ class RandomField:
         return from_normal(self.marginal, self.gaussian(interface, draws))
 
     def sample(
-        self,
-        interface: Interface,
-        *,
-        samples: int = 1,
-        seed: int = 0,
-        first: int = 0,
+        self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0,
         stream: int = 0,
-    ) -> Array:
+    ) -> Array:  # fmt: skip
         """Sample profiles.
 
         Parameters
         ----------
         interface : Interface
-        samples : int
-            How many.
-        seed : int
-            Not negative.
-        first : int
-            Number of the first sample: sample i is the same in whatever batch it comes.
-        stream : int
-            Fields of different streams are independent under one seed.
+        samples, seed, first, stream : int
+            How many; as for `draws`. Sample i is the same in whatever batch it comes.
 
         Returns
         -------
@@ -200,8 +193,8 @@ class RandomField:
             If the grid is coarser than the spectrum, or the interface is short against the
             correlation length and the field has no mean mode.
         """
-        self.warn_if_inaccurate(interface)
         draws = self.draws(interface, samples, seed, first, stream=stream)
+        self.warn_if_inaccurate(interface)
         return self.profiles(interface, draws)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
@@ -216,20 +209,19 @@ class RandomField:
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
                 f" grid does not resolve (interface.nodes >= {enough} resolves all)"
             )
-        if isinstance(self.spectrum, CustomSpectrum):
-            _warn_of_lines(self.spectrum, modes, interface, self.anisotropy or 1.0)
-        if self.mean_mode:
-            return
         ratio = min(interface.lengths) / self.spectrum.efolding_length
-        gap = _lowest_correlation(self, interface) if ratio < FEWEST_LENGTHS else 0.0
-        if gap > FALLEN:
+        if self.mean_mode or ratio >= FEWEST_LENGTHS:
+            return
+        lowest = _lowest_correlation(self, interface)
+        if lowest < -FALLEN:
             warn_accuracy(
                 f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
-                f" mean mode: the correlation falls to {-gap:.2f} instead of 0;"
+                f" mean mode: the correlation falls to {lowest:.2f} instead of 0;"
                 " RandomField(mean_mode=True) restores the mean's variability"
             )
 
-    def correlation(self, interface: Interface, *, of: str = "strength") -> Array:
+    @checked
+    def correlation(self, interface: Interface, *, of: Of = "strength") -> Array:
         """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
         Parameters
@@ -243,15 +235,13 @@ class RandomField:
         AccuracyWarning
             If the tails of the marginal are too heavy for its correlation, with the largest error.
         """
-        modes = self.modes(interface)
+        modes = _modes(self, interface)
         # The field whose amplitudes are its own standard deviations.
         draws = np.zeros((1, modes.dimension))
         start = int(self.mean_mode)
         draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
         rho = self.gaussian(interface, draws)[0]
-        if _which(of) == "z":
-            return rho
-        return correlation_of_mapped(rho, self._map_coefficients())
+        return rho if of == "z" else correlation_of_mapped(rho, self._map_coefficients())
 
     def _map_coefficients(self) -> Array:
         coefficients = hermite_coefficients(self.marginal)
@@ -264,7 +254,8 @@ class RandomField:
             )
         return coefficients
 
-    def efolding_length(self, *, of: str = "strength") -> float:
+    @checked
+    def efolding_length(self, *, of: Of = "strength") -> float:
         """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
         Truncation is included. On a plane it is that along x, but for what truncation leaves out.
@@ -274,8 +265,8 @@ class RandomField:
         of : {"strength", "z"}
             Of the mapped field or of the Gaussian one.
         """
-        if _which(of) == "z":
-            return self.spectrum.efolding_length
+        if of == "z":
+            return float(self.spectrum.efolding_length)
         coefficients = self._map_coefficients()
         # The correlation of the mapped field is monotone in that of z.
         rho = brentq(
@@ -284,7 +275,8 @@ class RandomField:
         )  # fmt: skip
         return lag_of_correlation(self.spectrum, float(rho))
 
-    def with_efolding_length(self, length: float, *, of: str = "strength") -> RandomField:
+    @checked
+    def with_efolding_length(self, length: Positive, *, of: Of = "strength") -> RandomField:
         """Return the same field with a correlation that falls to 1/e at `length` (m).
 
         Parameters
@@ -296,30 +288,9 @@ class RandomField:
         """
         if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")
-        length = check("length", length, Positive)
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
-        spectrum = self.spectrum.with_correlation_length(xi)
+        spectrum = dataclasses.replace(self.spectrum, correlation_length=xi)
         return dataclasses.replace(self, spectrum=spectrum)
-
-
-def _which(of: str) -> str:
-    check("of", of, Literal["strength", "z"])
-    return of
-
-
-def check_counts(**counts: Any) -> dict[str, int]:
-    """`samples`, `seed`, `first`, ... as ints, or an `InputError` with all that are none."""
-    numbers = {name: whole(value) for name, value in counts.items()}
-    problems = [
-        f"{name}: must be a whole number >= 0, got {describe(counts[name])}"
-        for name, number in numbers.items()
-        if number is None or number < 0
-    ]
-    if not problems:
-        problems = too_many_samples(counts["samples"], counts["first"])
-    if problems:
-        raise InputError(problems)
-    return {name: int(counts[name]) for name in numbers}
 
 
 @lru_cache(maxsize=256)
@@ -334,38 +305,7 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
 
 @lru_cache(maxsize=64)
 def _lowest_correlation(field: RandomField, interface: Interface) -> float:
-    """By how much the correlation of z falls below zero."""
-    return -float(field.correlation(interface, of="z").min())
-
-
-def _warn_of_lines(
-    spectrum: CustomSpectrum, modes: Modes, interface: Interface, anisotropy: float
-) -> None:
-    """Warn where the modes of an interface fall beside or upon something narrow.
-
-    Each mode stands for a cell around k and one around -k. Their sum is compared with the integral
-    over the ball that has the volume of all these cells, less that of the cell around zero.
-    """
-    if modes.count < 1:
-        return
-    dimensions = len(interface.shape)
-    cell = (2.0 * math.pi) ** dimensions / interface.extent * anisotropy ** (dimensions - 1)
-    k = modes.lengths(interface, anisotropy)[1:]
-    seen = 2.0 * cell * float(spectrum.density(k, dimensions).sum())
-    ball = (2.0, math.pi)[dimensions - 1]  # volume of that of radius 1
-    inner, outer = (
-        spectrum.power_integral((cells * cell / ball) ** (1.0 / dimensions), dimensions)
-        for cells in (1, 2 * modes.count + 1)
-    )
-    whole = dimensions * ball * (outer - inner)
-    ratio = seen / whole if whole > 0.0 else math.inf
-    if abs(ratio - 1.0) > MISSED:
-        apart = 2.0 * math.pi / max(interface.lengths)
-        warn_accuracy(
-            f"the modes of this interface, {apart:.3g} rad/m apart, carry {ratio:.3g} times the"
-            " power of the spectrum: it has lines or steps narrower than that, which a longer"
-            " interface would resolve"
-        )
+    return float(field.correlation(interface, of="z").min())
 
 
 def too_many_samples(samples: int, first: int, points: int = 1) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import cached_property, lru_cache, reduce
-from numbers import Real
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -16,10 +15,9 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
-from stiction.model import check_memory, describe, model
+from stiction.model import Number, check_memory, checked, describe, is_real, model
 from stiction.problem import PROFILES
-from stiction.random.modes import Modes
-from stiction.random.random_field import RandomField, check_counts
+from stiction.random.random_field import RandomField
 from stiction.random.synthesis import block_of, standard_normal
 
 NAMES = tuple(PROFILES)
@@ -36,29 +34,26 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
             "must map pairs of names to numbers, such as"
             f' {{("strength", "residual_strength"): 0.8}}, got {describe(value)}'
         )
-    flat: dict[tuple[Any, Any], Any] = {}
+    flat: dict[Any, Any] = {}
     for key, inner in value.items():
-        if isinstance(inner, Mapping):
-            flat |= {(key, other): rho for other, rho in inner.items()}
-        elif isinstance(key, tuple) and len(key) == 2:
-            flat[key] = inner
-        else:
-            raise InputError(f"must name a pair of properties, got {describe(key)}")
+        flat |= (
+            {(key, b): rho for b, rho in inner.items()}
+            if isinstance(inner, Mapping)
+            else {key: inner}
+        )
     found: dict[str, dict[str, float]] = {}
     for pair, rho in flat.items():
-        named = ", ".join(map(str, pair))
+        if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
+            raise InputError(f"must name two different properties, got {describe(pair)}")
         unknown = [unknown_name("correlation", str(n), NAMES) for n in pair if n not in NAMES]
         if unknown:
             raise InputError(unknown)
-        if pair[0] == pair[1]:
-            raise InputError(f"{named}: a property is not correlated with itself")
-        number = isinstance(rho, Real) and not isinstance(rho, bool)
-        if not number or not -1.0 <= float(rho) <= 1.0:
-            raise InputError(f"{named}: must be a number in [-1, 1], got {describe(rho)}")
+        if not is_real(rho) or not -1.0 <= rho <= 1.0:
+            raise InputError(f"{', '.join(pair)}: must be a number in [-1, 1], got {describe(rho)}")
         first, second = sorted(pair, key=NAMES.index)
-        known = found.setdefault(first, {}).setdefault(second, float(rho))
-        if known != rho:
-            raise InputError(f"{named}: given twice, as {known:g} and {rho:g}")
+        if second in found.setdefault(first, {}):
+            raise InputError(f"{first}, {second}: given twice")
+        found[first][second] = float(rho)
     return found
 
 
@@ -75,30 +70,34 @@ def lower_factor(matrix: Array) -> Array:
         pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
         if pivot <= DEFINITE:
             continue  # property j follows from those before it
-        factor[j, j] = np.sqrt(pivot)
-        factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / factor[
-            j, j
-        ]
+        root = factor[j, j] = np.sqrt(pivot)
+        factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
     return factor
 
 
-class Drawn(NamedTuple):
-    """The draws of one property in the vector of all draws of a sample.
+class Stream(NamedTuple):
+    """The draws of one property, and where they stand in the vector of all draws of a sample.
 
     Attributes
     ----------
-    columns : slice
-        Where they stand.
+    number : int
+        Of the stream of draws; that of a property never changes.
     ranks : array of int
         Modes drawn, by their `Modes.ranks`: those of the property and of all that it is correlated
         with.
     mean_mode : bool
         Whether the mean mode is drawn.
+    columns : slice
+        Of the vector of all draws.
+    own : slice or array of int
+        Which of these columns are of modes of the property itself.
     """
 
-    columns: slice
+    number: int
     ranks: NDArray[np.int64]
     mean_mode: bool
+    columns: slice
+    own: slice | NDArray[np.int64]
 
 
 @model(kw_only=True)
@@ -167,20 +166,20 @@ class RandomInterface:
             for name, field in self.properties.items()
             if field.of is not None and name not in COEFFICIENTS
         ]
-        scales = [name for name in SCALES if getattr(self, name) is not None]
+        scales = [name for name in SCALES if name in self.properties]
         if len(scales) > 1:
             problems.append(f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}")
         for one, others in (self.correlation or {}).items():
-            for name in (one, *others):
-                if getattr(self, name) is None:
-                    problems.append(f"correlation: {name!r} is correlated but not random here")
-        if not problems:
-            matrix = self.matrix
-            if np.linalg.eigvalsh(matrix)[0] < -DEFINITE:
-                problems.append(
-                    "correlation: these coefficients contradict each other (their matrix is not"
-                    " positive definite); bring them nearer to 0"
-                )
+            problems += [
+                f"correlation: {name!r} is correlated but not random here"
+                for name in (one, *others)
+                if name not in self.properties
+            ]
+        if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
+            problems.append(
+                "correlation: these coefficients contradict each other (their matrix is not"
+                " positive definite); bring them nearer to 0"
+            )
         if problems:
             raise InputError(problems)
         return self
@@ -208,9 +207,12 @@ class RandomInterface:
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        return max(drawn.columns.stop for drawn in _layout(self, interface).values())
+        return max(stream.columns.stop for stream in _layout(self, interface).values())
 
-    def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
+    @checked
+    def draws(
+        self, interface: Interface, samples: Number, seed: Number, first: Number = 0
+    ) -> Array:
         """Draw samples number `first`, `first` + 1, ..., independent standard normal numbers.
 
         Draw j of a property of sample i depends on (seed, property, i, j) only.
@@ -220,36 +222,27 @@ class RandomInterface:
         (samples, dimension) array
             Those of each property side by side, in the order of `names`.
         """
-        counts = check_counts(samples=samples, seed=seed, first=first)
         each = self.dimension(interface) + len(self.names) * interface.size
-        check_memory("samples", 8.0 * counts["samples"] * each)
+        check_memory("samples", 8.0 * samples * each)
         block = block_of(len(interface.shape))
         parts = [
             standard_normal(
-                **counts,
-                ranks=drawn.ranks,
-                stream=NAMES.index(name),
-                mean_mode=drawn.mean_mode,
-                block=block,
+                seed, samples, stream.ranks, first=first, stream=stream.number,
+                mean_mode=stream.mean_mode, block=block,
             )
-            for name, drawn in _layout(self, interface).items()
-        ]
+            for stream in _layout(self, interface).values()
+        ]  # fmt: skip
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
         layout = _layout(self, interface)
-        own = [draws[:, drawn.columns] for drawn in layout.values()]
-        factor = lower_factor(self.matrix) if self.correlation else np.eye(len(own))
+        independent = [draws[:, stream.columns] for stream in layout.values()]
         found = {}
-        for i, (name, field) in enumerate(self.properties.items()):
-            mixed = own[i]
-            if factor[i, i] != 1.0:
-                mixed = sum((factor[i, j] * own[j] for j in np.flatnonzero(factor[i])), 0.0 * mixed)
-            if layout[name].mean_mode and not field.mean_mode:
-                mixed = mixed[:, 1:]
-            mixed = _of_modes(mixed, layout[name].ranks, field.modes(interface))
-            found[name] = field.profiles(interface, np.ascontiguousarray(mixed))
+        for name, row in zip(layout, lower_factor(self.matrix), strict=True):
+            mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
+            own = np.ascontiguousarray(mixed[:, layout[name].own])
+            found[name] = self.properties[name].profiles(interface, own)
         return found
 
     def profiles(
@@ -271,27 +264,24 @@ class RandomInterface:
             field.warn_if_inaccurate(interface)
 
 
-def _of_modes(draws: Array, ranks: NDArray[np.int64], modes: Modes) -> Array:
-    """Of draws for the modes of `ranks`, those of the modes of one field."""
-    if np.array_equal(ranks[: modes.count], modes.ranks):
-        return draws[:, : modes.dimension]
-    mean = modes.dimension - 2 * modes.count
-    pairs = mean + 2 * np.searchsorted(ranks, modes.ranks)[:, None] + np.arange(2)
-    return draws[:, np.concatenate((np.arange(mean), pairs.ravel()))]
-
-
 @lru_cache(maxsize=256)
-def _layout(random: RandomInterface, interface: Interface) -> dict[str, Drawn]:
+def _layout(random: RandomInterface, interface: Interface) -> dict[str, Stream]:
     """Draws of each property by name."""
-    fields_of = list(random.properties.values())
-    linked = np.linalg.matrix_power(random.matrix != 0.0, len(fields_of))
+    properties = list(random.properties.values())
+    linked = np.linalg.matrix_power(random.matrix != 0.0, len(properties))
     found, start = {}, 0
-    for name, row in zip(random.names, linked, strict=True):
-        group = [fields_of[j] for j in np.flatnonzero(row)]
-        ranks = reduce(np.union1d, [field.modes(interface).ranks for field in group])
-        mean_mode = any(field.mean_mode for field in group)
+    for (name, field), row in zip(random.properties.items(), linked, strict=True):
+        group = [properties[j] for j in np.flatnonzero(row)]
+        ranks = reduce(np.union1d, [one.modes(interface).ranks for one in group])
+        mean_mode = any(one.mean_mode for one in group)
         end = start + 2 * ranks.size + int(mean_mode)
-        found[name] = Drawn(slice(start, end), ranks, mean_mode)
+        own: slice | NDArray[np.int64] = slice(None)
+        modes = field.modes(interface)
+        if modes.dimension < end - start:
+            places = np.searchsorted(ranks, modes.ranks)
+            pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
+            own = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        found[name] = Stream(NAMES.index(name), ranks, mean_mode, slice(start, end), own)
         start = end
     return found
 
@@ -300,13 +290,7 @@ assert {field.name for field in fields(RandomInterface)} == {*NAMES, "correlatio
 
 
 def as_random_interface(given: Any) -> RandomInterface:
-    """A `RandomInterface`, of a bare `RandomField` that of the strength alone.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Return a `RandomInterface`; of a bare `RandomField` that of the strength alone."""
     if isinstance(given, RandomField):
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):

@@ -27,14 +27,7 @@ from pydantic import (
 )
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.special import (
-    betainc,
-    betaincinv,
-    gammainc,
-    gammainccinv,
-    gammaln,
-    kve,
-)
+from scipy.special import betainc, betaincinv, gammainc, gammainccinv, gammaln, kve
 
 from stiction.arrays import Array
 from stiction.errors import InputError
@@ -75,10 +68,6 @@ class SpectralDensity:
         """Return the wavenumber (rad/m) below which a share of the power lies."""
         raise NotImplementedError
 
-    def untruncated_correlation(self, lag: Array) -> Array:
-        """Return the correlation that z would have at `lag` (m) without truncation, on a line."""
-        raise NotImplementedError
-
     def _edges(self, end: float) -> Array:
         """Wavenumbers (rad/m) from 0 to `end` between which the density is smooth."""
         raise NotImplementedError
@@ -94,11 +83,9 @@ class SpectralDensity:
 
     def correlation(self, lag: Array) -> Array:
         """Return the correlation of z at `lag` (m), truncation included, on a line."""
-        return self._correlation(lag, *_truncated(self))
-
-    def _correlation(self, lag: Array, edges: Array, power: float) -> Array:
+        edges, power = _truncated(self)
         found = [
-            float(integrate(self.density_at, edges, float(one), power).sum())
+            integrate(self.density_at, edges, float(one), power).sum()
             for one in np.abs(np.ravel(lag))
         ]
         return np.reshape(found, np.shape(lag)) / power
@@ -119,13 +106,8 @@ def integrate(
 ) -> Array:
     """Integrate a density times cos(k lag) over each interval between `edges`.
 
-    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, says which errors
-    are small: 1e-12 of it, and of each part otherwise. Returns one integral for each interval.
-
-    Raises
-    ------
-    InputError
-        If an integral does not settle.
+    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides which
+    errors are small: 1e-12 of it, and of each part otherwise.
     """
     options: dict[str, Any] = {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
     options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
@@ -143,6 +125,11 @@ def integrate(
     return result
 
 
+def moment(spectrum: SpectralDensity, order: int) -> Callable[[float], float]:
+    """Return the density on a line times a power of the wavenumber, as a function of that."""
+    return lambda k: spectrum.density_at(k) * k**order
+
+
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
     """Edges of intervals up to the cutoff, rad/m, and the power below it, up to a factor."""
@@ -154,11 +141,7 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Return the first lag at which the correlation of z on a line falls to `target`, m."""
     edges, power = _truncated(spectrum)
-
-    def moment(order: int) -> float:
-        return float(integrate(lambda k: spectrum.density_at(k) * k**order, edges).sum())
-
-    first, second = moment(1), moment(2)
+    first, second = (float(integrate(moment(spectrum, m), edges).sum()) for m in (1, 2))
     slope, step = first / power, 0.25 * math.sqrt(power / second)
     before = lag = 0.0
     excess = 1.0 - target
@@ -168,8 +151,6 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
         before, lag = lag, lag + max(excess / slope, step)
         excess = float(spectrum.correlation(np.array(lag))) - target
         step *= 1.005  # for spectra whose power sits far below their truncation
-        if not math.isfinite(lag):
-            raise InputError("spectrum: its correlation does not fall to 1/e at any distance")
     root: float = brentq(
         lambda ratio: float(spectrum.correlation(np.array(ratio * lag))) - target,
         before / lag, 1.0, xtol=1e-15, rtol=1e-14,
@@ -209,16 +190,13 @@ class ScaledSpectrum(SpectralDensity):
     def efolding_length(self) -> float:
         """Distance at which the correlation of z first falls to 1/e, m, on a line."""
         # Searched for once a shape: a sweep may hold a hundred thousand lengths.
-        unit = self.with_correlation_length(1.0)
+        unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
-
-    def with_correlation_length(self, correlation_length: float) -> Any:
-        """Return the same spectrum with another `correlation_length` (m)."""
-        return dataclasses.replace(self, correlation_length=correlation_length)
 
     def with_efolding_length(self, length: float) -> Any:
         """Return the same shape of spectrum whose correlation of z falls to 1/e at `length` (m)."""
-        return self.with_correlation_length(self.correlation_length * length / self.efolding_length)
+        xi = self.correlation_length * length / self.efolding_length
+        return dataclasses.replace(self, correlation_length=xi)
 
 
 class _PowerOfWavenumber(ScaledSpectrum):
@@ -423,29 +401,14 @@ class CustomSpectrum(SpectralDensity):
     def _is_a_density(self) -> CustomSpectrum:
         if self.max_wavenumber is not None and self.power_kept is not None:
             raise InputError("give max_wavenumber or power_kept, not both")
-        probe = np.geomspace(1e-3, 1e6, 64)
         try:
-            values = np.asarray(self.function(probe), dtype=np.float64)
+            values = self.density(np.geomspace(1e-3, 1e6, 64))
         except Exception as error:
             raise InputError(f"function: fails on an array of wavenumbers: {error!r}") from None
-        if values.shape != probe.shape or not np.all(np.isfinite(values)) or values.min() < 0.0:
+        if values.shape != (64,) or not np.all(np.isfinite(values)) or values.min() < 0.0:
             raise InputError("function: must map (m,) wavenumbers to (m,) finite values >= 0")
-        self._check_power(1)
+        _cumulative(self, 1)
         return self
-
-    def _check_power(self, dimensions: int) -> None:
-        total = self.power_integral(SHORTEST, dimensions)
-        if not 0.0 < total < np.inf:
-            raise InputError("function: its integral over wavenumbers must be positive and finite")
-        last = 1.0 - self.power_within(1e-3 * SHORTEST, dimensions)
-        if self.max_wavenumber is None and last > 1e-3:
-            what = (
-                "its integral" if dimensions == 1 else "on a plane, where it is that of g(k) k, it"
-            )
-            raise InputError(
-                f"function: {100.0 * last:.2g} % of its power lie above {1e-3 * SHORTEST:g} rad/m:"
-                f" {what} does not converge; give max_wavenumber"
-            )
 
     def _edges(self, end: float) -> Array:
         octaves = np.exp2(np.arange(math.log2(LONGEST), math.log2(SHORTEST)))
@@ -454,57 +417,40 @@ class CustomSpectrum(SpectralDensity):
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
 
-    def power_integral(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Integrate g, on a plane g(k) k, from 0 to `wavenumber` or to `max_wavenumber`."""
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         edges, sums = _cumulative(self, dimensions)
         end = min(wavenumber, float(edges[-1]))
-        before = int(np.searchsorted(edges, end))
-        if edges[before] == end:
-            return float(sums[before])
-        part = integrate(_moment(self, dimensions), np.array([edges[before - 1], end]))
-        return float(sums[before - 1] + part[0])
-
-    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        whole = _cumulative(self, dimensions)[1][-1]
-        return min(self.power_integral(wavenumber, dimensions) / float(whole), 1.0)
+        before = max(int(np.searchsorted(edges, end)) - 1, 0)
+        part = integrate(moment(self, dimensions - 1), np.array([edges[before], end]))
+        return min(float((sums[before] + part[0]) / sums[-1]), 1.0)
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        return _quantile(self, share, dimensions)
+        edges, sums = _cumulative(self, dimensions)
+        above = int(np.searchsorted(sums, share * sums[-1]))
+        root: float = brentq(
+            lambda k: self.power_within(k, dimensions) - share,
+            edges[above - 1], edges[above], xtol=1e-300,
+        )  # fmt: skip
+        return root
 
     def cutoff(self, dimensions: int = 1) -> float:
-        if self.max_wavenumber is not None:
-            return self.max_wavenumber
-        return super().cutoff(dimensions)
-
-
-def _moment(spectrum: CustomSpectrum, dimensions: int) -> Callable[[float], float]:
-    """Power per wavenumber, whose integral is the power, up to a factor."""
-
-    def moment(k: float) -> float:
-        return spectrum.density_at(k) * k ** (dimensions - 1)
-
-    return moment
+        return self.max_wavenumber or super().cutoff(dimensions)
 
 
 @lru_cache(maxsize=64)
 def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array]:
     """Edges of octaves, rad/m, and the power below each, up to a factor."""
     edges = spectrum._edges(spectrum.max_wavenumber or SHORTEST)
-    parts = integrate(_moment(spectrum, dimensions), edges)
-    return edges, np.concatenate(([0.0], np.cumsum(parts)))
-
-
-@lru_cache(maxsize=64)
-def _quantile(spectrum: CustomSpectrum, share: float, dimensions: int) -> float:
-    spectrum._check_power(dimensions)
-    edges, sums = _cumulative(spectrum, dimensions)
-    above = int(np.searchsorted(sums, share * sums[-1]))
-
-    def excess(wavenumber: float) -> float:
-        return spectrum.power_within(wavenumber, dimensions) - share
-
-    root: float = brentq(excess, edges[above - 1], edges[above], xtol=1e-300)
-    return root
+    sums = np.cumsum([0.0, *integrate(moment(spectrum, dimensions - 1), edges)])
+    if not 0.0 < sums[-1] < np.inf:
+        raise InputError("function: its integral over wavenumbers must be positive and finite")
+    last = 1.0 - np.interp(1e-3 * SHORTEST, edges, sums) / sums[-1]
+    if spectrum.max_wavenumber is None and last > 1e-3:
+        raise InputError(
+            f"function: {100.0 * last:.2g} % of its power lie above {1e-3 * SHORTEST:g} rad/m: the"
+            f" integral of g(k){' k' * (dimensions - 1)} does not converge; give max_wavenumber"
+        )
+    return edges, sums
 
 
 SPECTRA: dict[str, Any] = {
@@ -528,13 +474,11 @@ def spectrum_of(value: Any) -> SpectralDensity:
     if isinstance(value, dict):
         found: SpectralDensity = from_table(SPECTRA, value)
         return found
-    if isinstance(value, type):
-        raise InputError(f"must be a spectrum such as st.{value.__name__}(...), got the class")
-    if callable(value):
+    if callable(value) and not isinstance(value, type):
         return CustomSpectrum(function=value)
     raise InputError(
-        "must be a spectrum such as st.PowerLawSpectrum(...) or a function g(k), got"
-        f" {describe(value)}"
+        "must be a spectrum such as st.PowerLawSpectrum(...), not its class, or a function g(k),"
+        f" got {describe(value)}"
     )
 
 

@@ -24,14 +24,6 @@ def block_of(dimensions: int) -> int:
     return BLOCK if dimensions == 1 else 1
 
 
-def _block(seed: int, stream: int, block: int, modes: int, size: int) -> Array:
-    """Draws A_j, B_j of modes 0..modes for one block, shape (2 (modes + 1), size)."""
-    place = (stream, block) if size == BLOCK else (stream, block, size)
-    key = np.random.SeedSequence(entropy=seed, spawn_key=place)
-    generator = np.random.Generator(np.random.PCG64DXSM(key))
-    return generator.standard_normal((2 * (modes + 1), size))
-
-
 def standard_normal(
     seed: int,
     samples: int,
@@ -58,19 +50,20 @@ def standard_normal(
     (samples, dimension) array
         A, B of one mode after the other, with A_0 in front if `mean_mode`.
     """
-    samples, first = int(samples), int(first)  # small numpy integers would overflow
     modes = int(ranks[-1]) if ranks.size else 0
-    start = 0 if mean_mode else 1
     kept: slice | NDArray[np.int64] = slice(2, None)
     if mean_mode or ranks.size < modes:
-        pairs = (2 * ranks[:, None] + np.arange(2)).ravel()
-        kept = np.concatenate(([0], pairs)) if mean_mode else pairs
-    draws = np.empty((samples, 2 * ranks.size + 1 - start))
+        kept = (2 * ranks[:, None] + np.arange(2)).ravel()
+        kept = np.concatenate(([0], kept)) if mean_mode else kept
+    draws = np.empty((samples, 2 * ranks.size + int(mean_mode)))
     done = 0
     while done < samples:
         number, offset = divmod(first + done, block)
         count = min(block - offset, samples - done)
-        rows = _block(seed, stream, number, modes, block)
+        place = (stream, number) if block == BLOCK else (stream, number, block)
+        key = np.random.SeedSequence(entropy=seed, spawn_key=place)
+        generator = np.random.Generator(np.random.PCG64DXSM(key))
+        rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of modes 0, 1, ...
         draws[done : done + count] = rows[kept, offset : offset + count].T
         done += count
     return draws
@@ -113,30 +106,16 @@ def _synthesise(
 
 
 def gaussian(
-    draws: Array,
-    sigma: Array,
-    numbers: NDArray[np.int64],
-    has_mean: bool,
-    shape: tuple[int, ...],
+    draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, shape: tuple[int, ...]
 ) -> Array:
     """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
 
-    One inverse transform a sample, so that the numbers do not depend on the batch.
-
-    Parameters
-    ----------
-    draws : (samples, dimension) array
-    sigma : (modes + 1,) array
-    numbers : (dimensions, modes + 1) array of int
-        Wave vectors in units of 2 pi/length.
-    has_mean : bool
-    shape : tuple of int
-        Nodes in each direction.
+    One inverse transform a sample, so that the numbers do not depend on the batch. `draws` are
+    (samples, dimension), `sigma` and `numbers` those of `Modes`.
     """
     z = np.empty((draws.shape[0], *shape))
     if len(shape) == 1:
         numbers = np.concatenate([np.zeros_like(numbers), numbers])
-    _synthesise(
-        draws, sigma, numbers, has_mean, z.reshape(z.shape[0], math.prod(shape[:-1]), shape[-1])
-    )
+    out = z.reshape(z.shape[0], math.prod(shape[:-1]), shape[-1])
+    _synthesise(draws, sigma, numbers, has_mean, out)
     return z

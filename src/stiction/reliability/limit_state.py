@@ -19,9 +19,9 @@ from stiction.friction import SCALES
 from stiction.model import Count, checked, real_array
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions, TimeUp
-from stiction.random.pressure import coefficients_of
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.random.stresses import coefficients_of
 
 Event = Literal["critical_stress", "first_instability"]
 
