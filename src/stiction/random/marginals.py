@@ -157,14 +157,7 @@ class Lognormal(_ByMoments):
 
 @model(kw_only=True)
 class Weibull(_ByMoments):
-    """Weibull distribution (of minima) above `low`.
-
-    Parameters
-    ----------
-    mean, cv : float
-        Mean of the field, above `low`, and its standard deviation over the mean.
-    low : float
-        Lower bound, 0 if left out.
+    """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`.
 
     Examples
     --------
@@ -196,14 +189,7 @@ class Weibull(_ByMoments):
 
 @model(kw_only=True)
 class Gamma(_ByMoments):
-    """Gamma distribution above `low`.
-
-    Parameters
-    ----------
-    mean, cv : float
-        Mean of the field, above `low`, and its standard deviation over the mean.
-    low : float
-        Lower bound, 0 if left out.
+    """Gamma distribution above `low`; parameters as for `Lognormal`.
 
     Examples
     --------
@@ -348,10 +334,11 @@ def marginal_of(value: Any) -> Marginal:
             "must be st.Beta(...), st.Lognormal(...) or a frozen continuous scipy.stats"
             f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
-    if type(family) is not type(getattr(scipy.stats, str(family.name), None)):  # a histogram, say
+    name = str(getattr(family, "name", None))
+    if type(family) is not type(getattr(scipy.stats, name, None)):  # a histogram, say
         return _with_moments(ScipyMarginal(type(family).__name__, frozen=value))
     given = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return _of_scipy(family.name, given)
+    return _of_scipy(name, given)
 
 
 def _parameter_names(family: Any) -> list[str]:

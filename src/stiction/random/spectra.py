@@ -293,13 +293,6 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     truncation, power_kept : float, optional
         Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.9997 of
         the power if neither is given.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> spectrum = st.SquaredExponentialSpectrum(correlation_length=2e-3)
-    >>> round(spectrum.with_efolding_length(1e-3).efolding_length * 1e3, 6)  # mm
-    1.0
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -332,13 +325,6 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     truncation, power_kept : float, optional
         Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.99 of the
         power if neither is given, since every further nine takes ten times as many modes.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> spectrum = st.ExponentialSpectrum(correlation_length=2e-3)
-    >>> round(spectrum.with_efolding_length(1e-3).efolding_length * 1e3, 6)  # mm
-    1.0
     """
 
     type: Literal["exponential"] = "exponential"
