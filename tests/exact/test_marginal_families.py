@@ -78,18 +78,6 @@ def test_what_is_no_distribution_is_refused(make, text):
         make()
 
 
-def test_strength_below_the_residual_strength_is_said_before_anything_is_computed():
-    problem = st.Problem(
-        solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
-        interface=st.Interface(length=0.1, nodes=512),
-        friction=st.LinearWeakening(weakening_rate=5e11, residual_strength=0.6e6),
-    )
-    strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.17), SPECTRUM)
-    share = 100.0 * strength.marginal.distribution.cdf(0.6e6)
-    with pytest.warns(st.AccuracyWarning, match=f"strength: {share:.3g} % of its marginal"):
-        st.monte_carlo(problem, strength, method=st.LocalCriterion(), samples=2, seed=0)
-
-
 def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
     @model
     class Triangular(Marginal):

@@ -6,7 +6,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.statistics.densities import density
-from stiction.statistics.estimates import Estimate, mean, share, standard_deviation
+from stiction.statistics.estimates import Estimate, mean, standard_deviation
 from stiction.statistics.order_statistics import quantiles
 
 RNG = np.random.default_rng(20)
@@ -23,10 +23,7 @@ def test_errors_are_the_scatter_of_repetitions(estimator):
     assert claimed / scatter == pytest.approx(1.0, abs=0.15)
 
 
-def test_share_is_never_certain():
-    assert share(np.zeros(100, dtype=bool)).value == 0.0
-    assert 0.0 < share(np.zeros(100, dtype=bool)).error < 0.03
-    assert share(np.ones(100, dtype=bool)).error > 0.0
+def test_errors_of_independent_estimates_add_in_squares():
     difference = Estimate(3.0, 0.3) - Estimate(1.0, 0.4)
     assert (difference.value, difference.error) == pytest.approx((2.0, 0.5))
 

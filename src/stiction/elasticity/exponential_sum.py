@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 
 MAX_WEIGHT = 10.0
 MAX_PAIRS = 60
+ROUNDS = 14
 _DAMPING = 0.3  # every pole decays at least like exp(-0.3 T / T_max)
 # Decay over T_max that balanced truncation is told of, in the order tried: seen to be good starts
 # for polishing at loose and at tight tolerances.
@@ -35,14 +36,8 @@ _LOOSE, _TIGHT = (10.0, 1.0), (1.0, 0.3)
 class ExponentialSum:
     """Poles and weights of a validated fit, and what was found when it was validated.
 
-    Attributes
-    ----------
-    poles, weights : ndarrays of complex, shape (pairs,)
-        In units of |k| c_s, Re s < 0 (1).
-    error : float
-        Largest |C - sum| found on [0, t_max] (1).
-    t_max : float
-        End of the validated range of T = |k| c_s t (1).
+    `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the largest
+    |C - sum| found on 0 <= T = |k| c_s t <= t_max.
     """
 
     poles: Complex
@@ -155,12 +150,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 
 
 def _attempt(
-    arcs: tuple[Complex, Complex],
-    pairs: int,
-    fit: _Polish,
-    tolerance: float,
-    decay: float,
-    rounds: int = 14,
+    arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
     """The best fit with so many pairs, by repeated polishing with the error levelled."""
     shift = fit.floor * decay / _DAMPING
@@ -168,7 +158,7 @@ def _attempt(
     emphasis = np.ones(fit.times.size)
     poles, weights = fit.run(poles, emphasis, 60)
     best, kept = np.inf, (poles, weights)
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         error = np.abs(fit.values - exponential_sum(fit.times, poles, weights))
         worst = error.max()
         if worst < best:
@@ -184,7 +174,7 @@ def _attempt(
 def fit_exponentials(
     mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
 ) -> ExponentialSum:
-    """Shortest sum of exponentials found whose validated error is below the tolerance.
+    """Return the shortest sum of exponentials found whose validated error is below the tolerance.
 
     Parameters
     ----------
@@ -194,31 +184,16 @@ def fit_exponentials(
     tolerance : float
         Allowed error of C(T), absolute (1), between 1e-9 and 1e-2; C(0) = G*/G.
     t_max : float
-        The error holds on 0 <= T <= t_max (1); beyond, the sum decays.
-
-    Returns
-    -------
-    ExponentialSum
+        The error holds on 0 <= T <= t_max (1), between 10 and 1e8; beyond, the sum decays.
 
     Raises
     ------
     InputError
         If the options are out of range or no sum of up to 60 pairs reaches the tolerance.
     """
-    problems = []
-    if not 1e-9 <= tolerance <= 1e-2:
-        problems.append(f"kernel tolerance: must lie in [1e-9, 1e-2], got {tolerance!r}")
-    if not 10.0 <= t_max <= 1e8:
-        problems.append(f"kernel t_max: must lie in [10, 1e8], got {t_max!r}")
-    if problems:
-        raise InputError(problems)
-    # The matrices are small: more BLAS threads only wait for each other.
-    with one_blas_thread():
-        return _search(mode, eta, tolerance, t_max)
-
-
-def _search(mode: str, eta: float, tolerance: float, t_max: float) -> ExponentialSum:
-    """Add pairs until a fit is good."""
+    for name, value, low, high in (("tolerance", tolerance, 1e-9, 1e-2), ("t_max", t_max, 10, 1e8)):
+        if not low <= value <= high:
+            raise InputError(f"kernel {name}: must lie in [{low:g}, {high:g}], got {value!r}")
     arcs = arc_quadrature(mode, eta)
     fit_times = sample_times(t_max, 40 if tolerance > 3e-8 else 80, 8, seed=0)
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs), _DAMPING / t_max)
@@ -229,12 +204,13 @@ def _search(mode: str, eta: float, tolerance: float, t_max: float) -> Exponentia
     expected = 1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7
     pairs = max(3, round(expected * decades))
     starts = _LOOSE if tolerance > 1e-7 else _TIGHT
-    for count, decay in itertools.product(range(pairs, MAX_PAIRS + 1), starts):
-        poles, weights = _attempt(arcs, count, fit, tolerance, decay)
-        error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())
-        if error < tolerance and _acceptable(poles, weights):
-            order = np.argsort(-poles.real)
-            return ExponentialSum(poles[order], weights[order], error, t_max)
+    with one_blas_thread():  # the matrices are small: more threads only wait for each other
+        for count, decay in itertools.product(range(pairs, MAX_PAIRS + 1), starts):
+            poles, weights = _attempt(arcs, count, fit, tolerance, decay)
+            error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())
+            if error < tolerance and _acceptable(poles, weights):
+                order = np.argsort(-poles.real)
+                return ExponentialSum(poles[order], weights[order], error, t_max)
     raise InputError(
         f"kernel tolerance: {tolerance!r} on [0, {t_max:g}] was not reached with {MAX_PAIRS} "
         f"pairs of exponentials (mode {mode}, c_d/c_s = {eta:.6g}); ask for less"

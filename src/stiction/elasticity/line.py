@@ -19,17 +19,7 @@ from stiction.lanes import multiply_add
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
-    """First column of K, shape (nodes,), Pa/m.
-
-    Parameters
-    ----------
-    nodes : int
-        Even number of nodes.
-    length : float
-        Period, m.
-    modulus : float
-        Effective modulus G*, Pa.
-    """
+    """First column of K, (nodes,), Pa/m: an even number of nodes, the period (m) and G* (Pa)."""
     scale = np.pi * modulus / length
     column = np.zeros(nodes)
     odd = np.arange(1, nodes, 2)
@@ -73,17 +63,9 @@ def _add_four(
 def apply_stiffness(
     stiffness: Stiffness, members: Array, size: int, values: Array, halves: Array, result: Array
 ) -> None:
-    """K times a field that vanishes off the members, at all nodes.
+    """`result` (n,) = K times a field that has `values` at the first `size` of the `members`.
 
-    Parameters
-    ----------
-    stiffness : Stiffness
-    members, size : (n,) int array and int
-        Where the field is not zero.
-    values : (>= size,) array
-        The field there, in the same order.
-    halves : (2, n/2) array, work space
-    result : (n,) array, output
+    Elsewhere the field is zero; `halves` (2, n/2) is work space.
     """
     strip = stiffness.strip
     half = halves.shape[1]
@@ -119,13 +101,8 @@ def apply_stiffness(
 def griffith_length(drop: float, energy: float, modulus: float) -> float:
     """Critical length of a crack (m), infinite without a stress drop.
 
-    A crack of half-length a with stress drop D releases pi a D^2/(2 G*) at each tip (Griffith,
-    1921), and grows where that is more than the fracture energy.
-
-    Parameters
-    ----------
-    drop, energy, modulus : float
-        D (Pa), fracture energy (J/m²), G* (Pa).
+    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip (Griffith,
+    1921), and grows where that is more than the fracture energy (J/m²); the modulus is G* (Pa).
     """
     if drop <= 0.0:
         return np.inf

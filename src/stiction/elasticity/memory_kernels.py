@@ -21,24 +21,12 @@ _CHUNK = 2048
 
 
 def symbol(s: ArrayLike, mode: str, eta: float) -> NDArray[np.complex128]:
-    """Laplace symbol D(s) of the traction per slip, in units of G|k|/2.
+    """Laplace symbol D(s) of the traction per slip, in units of G|k|/2; s in units of |k| c_s.
 
-    Parameters
-    ----------
-    s : array_like
-        Dimensionless Laplace variable, in units of |k| c_s (1). Cuts run from the branch points
-        +-i and +-i eta straight to the left.
-    mode : {"II", "III"}
-        In-plane or anti-plane slip.
-    eta : float
-        c_d / c_s (1); not used in mode III.
-
-    Returns
-    -------
-    ndarray of complex
-        Mode II: [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2));
-        mode III: sqrt(1 + s^2). Both are s + O(1/s) for large s (radiation damping) and reach
-        the static stiffness G*/G at s = 0. Source: Geubelle and Rice (1995), in Laplace space.
+    Mode II: [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta =
+    c_d/c_s; mode III: sqrt(1 + s^2). Both are s + O(1/s) for large s (radiation damping) and reach
+    the static stiffness G*/G at s = 0 (Geubelle and Rice 1995, in Laplace space). Cuts run from the
+    branch points +-i and +-i eta straight to the left.
     """
     z = np.asarray(s, dtype=np.complex128)
     shear = np.sqrt(z - 1j) * np.sqrt(z + 1j)
@@ -63,19 +51,10 @@ def _half_arc() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def arc_quadrature(mode: str, eta: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Nodes s and weights w with C(T) = Re sum w exp(s T) for all T >= 0.
+    """Nodes s, Re s < 0, and weights w, some 140 an arc, with C(T) = Re sum w exp(s T), T >= 0.
 
-    Parameters
-    ----------
-    mode : {"II", "III"}
-    eta : float
-        c_d / c_s (1).
-
-    Returns
-    -------
-    nodes, weights : ndarrays of complex, shape (about 140 an arc,)
-        Re s < 0. The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across
-        the arc |s| = 1 (the shear root) and |s| = eta (the dilatational root) contribute.
+    The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across the arc |s| = 1
+    (the shear root) and |s| = eta (the dilatational root) contribute.
     """
     angle, weight = _half_arc()
     turn = np.exp(1j * angle)
@@ -108,19 +87,8 @@ def exponential_sum(
 
 
 def memory_kernel(time: ArrayLike, mode: str, eta: float) -> NDArray[np.float64]:
-    """The kernel C(T) of the velocity form, to about 2e-15 for every T >= 0.
+    """The kernel C(T) of the velocity form at times T, any shape, to about 2e-15 for all T >= 0.
 
-    Parameters
-    ----------
-    time : array_like
-        T = |k| c_s t >= 0 (1), any shape.
-    mode : {"II", "III"}
-    eta : float
-        c_d / c_s (1).
-
-    Returns
-    -------
-    ndarray of the shape of `time`
-        C(0) = G*/G; falls like T^-1/2 (mode II) or T^-3/2 (mode III), so never truncate it.
+    C(0) = G*/G; it falls like T^-1/2 (mode II) or T^-3/2 (mode III), so never truncate it.
     """
     return exponential_sum(time, *arc_quadrature(mode, eta))

@@ -24,21 +24,9 @@ from stiction.jit import jit
 def stiffness_symbol(
     shape: tuple[int, ...], lengths: tuple[float, ...], in_plane: float, anti_plane: float
 ) -> Array:
-    """K(k) for the modes of ``numpy.fft.rfftn``, Pa/m.
+    """K(k) for the modes of ``numpy.fft.rfftn`` of an interface with these nodes and periods, Pa/m.
 
-    Parameters
-    ----------
-    shape : (int,) or (int, int)
-        Nodes of a line; along x (direction of slip) and y of a plane.
-    lengths : (float,) or (float, float)
-        Periods, m.
-    in_plane, anti_plane : float
-        G* of mode II (of a line: of its mode) and G, Pa.
-
-    Returns
-    -------
-    array
-        (n // 2 + 1,) on a line, (nx, ny // 2 + 1) on a plane.
+    `in_plane` is G* of mode II (of a line: of its mode), `anti_plane` G, Pa.
     """
     last = 2.0 * np.pi / lengths[-1] * np.arange(shape[-1] // 2 + 1)
     if len(shape) == 1:

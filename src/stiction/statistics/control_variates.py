@@ -23,16 +23,10 @@ from stiction.statistics.estimates import Estimate, as_sample
 
 @dataclass(frozen=True)
 class Combined:
-    """An estimate from all methods.
+    """A mean from all methods: `estimate` with its `value` and standard `error`.
 
-    Attributes
-    ----------
-    estimate : Estimate
-        `value` and standard `error`.
-    plain_error : float
-        Standard error of the expensive runs by themselves.
-    freedom : int
-        Degrees of freedom of the error.
+    `plain_error` is the standard error of the expensive results by themselves, `freedom` the number
+    of degrees of freedom of the error.
     """
 
     estimate: Estimate
@@ -41,7 +35,7 @@ class Combined:
 
     @property
     def saving(self) -> float:
-        """How many times as many expensive runs plain sampling would need for the same error."""
+        """How many times as many expensive results alone would have the same error."""
         return (self.plain_error / self.estimate.error) ** 2
 
     def interval(self, confidence: float = 0.95) -> tuple[float, float]:
@@ -65,9 +59,7 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
     Returns
     -------
     Combined
-        `estimate` with its `value` and standard `error`, `interval(confidence)`, `plain_error` of
-        the expensive results alone, and `saving`, how many times as many of these would give the
-        same error.
+        With `estimate`, `interval(confidence)`, `plain_error` and `saving`.
 
     Raises
     ------

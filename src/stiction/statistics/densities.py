@@ -30,10 +30,8 @@ class Density:
 
     Attributes
     ----------
-    x : (m,) array
-        Centres of equal cells, in the unit of the values.
-    value : (m,) array
-        The density, 1/unit. It integrates to 1 over the support.
+    x, value : (m,) arrays
+        Centres of equal cells, in the unit of the values, and the density there, 1/unit.
     error : (m,) array
         Its standard error from sampling; smoothing over `bandwidth` is not part of it.
     bandwidth : float
@@ -139,20 +137,14 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     spread = largest - smallest
     if spread == 0.0:
         raise InputError(f"values: all are equal to {smallest:g}; they have no density")
-    low, high = bounds
-    problems = []
-    if low is not None and smallest < low:
-        problems.append(f"values: {smallest:g} is below the lower bound {low:g}")
-    if high is not None and largest > high:
-        problems.append(f"values: {largest:g} is above the upper bound {high:g}")
-    if problems:
-        raise InputError(problems)
+    low = -math.inf if bounds[0] is None else bounds[0]
+    high = math.inf if bounds[1] is None else bounds[1]
+    if smallest < low:
+        raise InputError(f"values: {smallest:g} is below the lower bound {low:g}")
+    if largest > high:
+        raise InputError(f"values: {largest:g} is above the upper bound {high:g}")
     # A far bound only wastes grid cells; the kernel does not reach half a spread beyond the data.
-    near_low, near_high = smallest - 0.5 * spread, largest + 0.5 * spread
-    return (
-        near_low if low is None else max(low, near_low),
-        near_high if high is None else min(high, near_high),
-    )
+    return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
 
 
 def _diffusion_time(cosine: Array, n: float, cells: int) -> float:

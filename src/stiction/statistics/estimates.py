@@ -1,4 +1,4 @@
-"""Estimates with standard errors: moments and shares of independent samples."""
+"""Estimates with standard errors: moments of independent samples."""
 
 from __future__ import annotations
 
@@ -37,13 +37,7 @@ class Estimate:
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
-    """Return independent, finite values as a flat array.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than `fewest`, or one is not finite.
-    """
+    """Return independent, finite values, at least `fewest`, as a flat array."""
     array = check("values", values, Numbers).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
@@ -54,34 +48,16 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
 
 
 def mean(values: Any) -> Estimate:
-    """Estimate the mean of independent values.
-
-    Parameters
-    ----------
-    values : (samples,) array
-
-    Returns
-    -------
-    Estimate, in the unit of the values
-    """
+    """Estimate the mean of independent values (samples,), in their unit."""
     sample = as_sample(values)
     return Estimate(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
 
 
 def standard_deviation(values: Any) -> Estimate:
-    """Estimate the standard deviation of independent values, without a Gaussian assumption.
+    """Estimate the standard deviation of independent values (samples,), in their unit.
 
-    Parameters
-    ----------
-    values : (samples,) array
-
-    Returns
-    -------
-    Estimate, in the unit of the values
-
-    Notes
-    -----
-    Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s).
+    Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s), without a Gaussian
+    assumption.
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))
@@ -89,26 +65,3 @@ def standard_deviation(values: Any) -> Estimate:
         return Estimate(0.0, 0.0)
     fourth = float(np.mean((sample - sample.mean()) ** 4))
     return Estimate(s, math.sqrt(max(fourth - s**4, 0.0) / sample.size) / (2.0 * s))
-
-
-def share(events: Any) -> Estimate:
-    """Estimate the share of independent events that happened.
-
-    Parameters
-    ----------
-    events : (samples,) array of bool
-
-    Returns
-    -------
-    Estimate, dimensionless
-
-    Notes
-    -----
-    The error is that of Agresti and Coull (1998), which stays positive when all or none happened.
-    """
-    happened = np.asarray(events, dtype=bool).ravel()
-    if happened.size == 0:
-        raise InputError("events: at least 1 is needed, got 0")
-    n = happened.size
-    adjusted = (happened.sum() + 2.0) / (n + 4.0)
-    return Estimate(float(happened.mean()), math.sqrt(adjusted * (1.0 - adjusted) / (n + 4.0)))

@@ -11,7 +11,7 @@ from stiction.arrays import Array
 from stiction.criterion.local import check_law, check_window
 from stiction.criterion.windows import Weights, middle_aspect, windows_of
 from stiction.errors import InputError
-from stiction.model import check
+from stiction.model import checked
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
 
@@ -22,14 +22,10 @@ class NucleationStatistics:
 
     Attributes
     ----------
-    mean : float
-        E[tau_n], Pa.
-    variance : float
-        Var[tau_n], Pa^2.
-    strength_mean : float
-        E[tau_p], Pa.
-    strength_variance : float
-        Var[tau_p], Pa^2.
+    mean, variance : float
+        E[tau_n], Pa, and Var[tau_n], Pa^2.
+    strength_mean, strength_variance : float
+        E[tau_p], Pa, and Var[tau_p], Pa^2.
     """
 
     mean: float
@@ -48,12 +44,9 @@ class NucleationStatistics:
         return self.variance / self.strength_variance
 
 
+@checked
 def nucleation_statistics(
-    problem: Problem,
-    strength: RandomField,
-    *,
-    weights: Weights = "exact",
-    aspect: float | None = None,
+    problem: Problem, strength: RandomField, *, weights: Weights = "exact"
 ) -> NucleationStatistics:
     """Compute the exact mean and variance of the nucleation stress.
 
@@ -65,10 +58,6 @@ def nucleation_statistics(
         Peak strength, Pa; or friction coefficients under a uniform normal pressure.
     weights : {"exact", "rounded"}
         As in `nucleation_stress`.
-    aspect : float, optional
-        On a plane, the extent along x over that along y of the critical ellipse over which tau_n
-        is the average; the middle one of `LocalCriterion` if left out. The least over several
-        shapes, which `LocalCriterion` takes, has no moments in closed form.
 
     Returns
     -------
@@ -82,6 +71,9 @@ def nucleation_statistics(
 
     Notes
     -----
+    On a plane tau_n is the average over the middle one of the ellipses of `LocalCriterion`; the
+    least over several shapes, which that takes, has no moments in closed form.
+
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
     integral of the correlation of tau_p against the weights, on a periodic interface the sum over
     wave vectors of the spectrum of tau_p times the squared transform of the weight. The
@@ -98,9 +90,8 @@ def nucleation_statistics(
     True
     """
     scale, load, initial = stationary(problem, strength)
+    aspect = middle_aspect(problem) if problem.interface.is_plane else None
     check_window(problem, weights, aspect)
-    if problem.interface.is_plane and aspect is None:
-        aspect = middle_aspect(problem)
     rate = problem.uniform_rate
     assert rate is not None
     window = windows_of(problem, rate, weights, aspect)[0]
@@ -125,15 +116,9 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
     """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
 
-    The unit of friction coefficients is the normal pressure.
-
-    Raises
-    ------
-    InputError
-        If the nucleation stress is not stationary.
+    The unit of friction coefficients is the normal pressure. An `InputError` if the nucleation
+    stress is not stationary.
     """
-    check("problem", problem, Problem)
-    check("strength", strength, RandomField)
     check_law(problem)
     sampled = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
     problems = [

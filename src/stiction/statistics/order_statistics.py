@@ -77,13 +77,11 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Real = 0.95) -> 
     """
     ordered = np.sort(as_sample(values, 1))
     p = np.atleast_1d(probability)
-    problems = []
-    if p.ndim != 1 or not np.all((p > 0.0) & (p < 1.0)):
-        problems.append(
-            f"probability: must be between 0 and 1, exclusive, got {describe(probability)}"
-        )
-    if not 0.0 < confidence < 1.0:
-        problems.append(f"confidence: must be between 0 and 1, exclusive, got {confidence!r}")
+    problems = [
+        f"{name}: must be between 0 and 1, exclusive, got {describe(value)}"
+        for name, value in (("probability", probability), ("confidence", confidence))
+        if not np.all((np.asarray(value) > 0.0) & (np.asarray(value) < 1.0))
+    ]
     if problems:
         raise InputError(problems)
     n = ordered.size

@@ -21,11 +21,12 @@ from stiction.errors import InputError
 from stiction.jit import jit
 from stiction.model import Count, Number, Numbers, brief, checked
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField, too_many_samples
+from stiction.random.random_field import RandomField
 from stiction.statistics.moments import stationary
 
 LEVELS = 1024
 BATCH = 256
+FEWEST_PROFILES, MOST_PROFILES = 16, 10**7
 TRUSTED_PROBABILITY = 0.1
 FEWEST_CROSSINGS = 10
 MOST_BELOW = 0.04
@@ -53,16 +54,12 @@ class RiceDistribution:
     relative_error : (m,) array
         Sampling error of the crossing rate, one over the root of the crossings that were seen.
     trusted : (m,) array of bool
-        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings were
-        seen, and `1 - point_survival` is at most 4 % of P. A profile that is below the level at
-        its start is counted for that, and on a circle, unless it is below everywhere, once more
-        for the crossing that brought it there; so P is too high by up to (1 - point_survival)/P.
-        That matters where xi_0 is not short against the interface: +9 to +17 % at L/h_n = 10,
-        xi_0/L = 0.3 and 0.5 with a mean mode. Above P = 0.1 without a mean mode it is too
-        low instead, by 4 to 9 % at the median: profiles of equal mean cross more evenly than
-        a Poisson process does. On a plane: P <= 0.1, at least 10 dips were seen, and there are no
-        more than 1.1 of them for each sample that has any, since dips that come together, as with
-        a mean mode and a long correlation, make P too high by as much.
+        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings or dips
+        were seen, and on a line `1 - point_survival` is at most 4 % of P: a profile that is below
+        the level at its start is counted for that and for the crossing that brought it there, so P
+        is too high by up to (1 - point_survival)/P where xi_0 is not short against the interface.
+        On a plane there are at most 1.1 dips for each sample that has any: dips that come together
+        make P too high by as much. Above P = 0.1 P is too low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
@@ -113,13 +110,10 @@ def rice_distribution(
     crossings of the level x come as a Poisson process at the rate nu (Rice, 1945; Cramer and
     Leadbetter, 1967). S and nu are pooled from sampled profiles of the nucleation stress, every
     position of which counts; so a few hundred profiles tell as much of the lower tail as many more
-    minima would. With a Gaussian tau_n of the right moments the same formula would be useless: the
-    lower tail of tau_n is bounded.
+    minima would.
 
     On a plane P(tau_cr > x) ~ exp(-chi(x)), with chi the expected Euler characteristic of what lies
-    below x in the nucleation stress, that is the number of dips; tau_n is the least over the shapes
-    of `LocalCriterion`. Samples that fail can be counted as well, and at small P both see the same
-    events: nothing is gained in the tail, for which there is `failure_probability`.
+    below x in the nucleation stress, that is the number of dips.
 
     Parameters
     ----------
@@ -155,15 +149,14 @@ def rice_distribution(
     True
     """
     unit, load, initial = stationary(problem, strength)
-    problems = [f"profiles: must be at least 16, got {profiles}"] if profiles < 16 else []
-    if stress is not None and (
-        stress.ndim != 1 or stress.size == 0 or not np.all(np.diff(stress) > 0.0)
+    if not FEWEST_PROFILES <= profiles <= MOST_PROFILES:
+        raise InputError(
+            f"profiles: must be from {FEWEST_PROFILES} to {MOST_PROFILES:.0e}, got {profiles}"
+        )
+    if stress is not None and not (
+        stress.ndim == 1 and stress.size and (np.diff(stress) > 0).all()
     ):
-        problems.append("stress: must be a (m,) array of rising levels, Pa")
-    problems += [t.replace("samples", "profiles", 1) for t in too_many_samples(profiles, 0)]
-    if problems:
-        raise InputError(problems)
-
+        raise InputError("stress: must be a (m,) array of rising levels, Pa")
     interface, plane = problem.interface, problem.interface.is_plane
     # A dip that only just reaches down between two nodes is a crossing as well. The onset of a
     # plane is at a node.
@@ -220,16 +213,11 @@ def _count_dips(
     below: NDArray[np.int64],
     reached: NDArray[np.int64],
 ) -> None:
-    """Steps whose cumulative sums say of each level what of some planes is below it.
+    """Steps whose cumulative sums count what of some planes is at or below each level.
 
-    Parameters
-    ----------
-    level : (samples, nx, ny) array
-        Number of the first level at or above the value of each node.
-    dips : (levels + 1,) array
-        Euler characteristic: nodes less edges plus faces of the periodic grid.
-    below, reached : (levels + 1,) arrays
-        Nodes, and samples with a node, at or below each level.
+    `level` is the number of the first level at or above the value of each node. `dips` is the Euler
+    characteristic, nodes less edges plus faces of the periodic grid; `below` and `reached` are
+    nodes, and samples with a node.
     """
     samples, nx, ny = level.shape
     for sample in range(samples):
