@@ -414,7 +414,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
-    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
     bare = cls.__repr__ in (object.__repr__, brief)  # its own, if it has one, stays
     wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
     validated_init = wrapped.__init__
@@ -569,7 +569,9 @@ def to_plain(value: Any) -> Any:
         If something in it exists in Python only, such as a function.
     """
     try:
-        return pydantic.TypeAdapter(type(value)).dump_python(value, mode="json", exclude_none=True)
+        return pydantic.TypeAdapter(type(value)).dump_python(
+            value, mode="json", exclude_none=True, by_alias=True
+        )
     except pydantic_core.PydanticSerializationError as error:
         reason = str(error).removeprefix("Error calling function ").split(": ", 1)[-1]
         raise InputError(f"{type(value).__name__}: cannot be written down: {reason}") from None

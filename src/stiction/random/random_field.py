@@ -5,15 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from pydantic import Field
 from scipy.optimize import brentq
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import Flag, Number, Numbers, Positive, check_memory, checked, describe, model
+from stiction.random.conditioning import Conditioning, Conditions, Measured, basis
 from stiction.random.mapping import (
     correlation_of_mapped,
     from_normal,
@@ -56,6 +58,8 @@ class RandomField:
     of : {"friction_coefficient"}, optional
         The field holds friction coefficients: times the normal pressure at a point they are the
         strength there (or another stress, where the field stands for one).
+    conditions : Conditions, optional
+        What was measured of it, as `given` enters it; in a study file the table ``given``.
 
     Raises
     ------
@@ -88,6 +92,7 @@ class RandomField:
     mean_mode: Flag = False
     anisotropy: Positive | None = None
     of: Literal["friction_coefficient"] | None = None
+    conditions: Annotated[Conditions | None, Field(alias="given")] = None
 
     @property
     def mean(self) -> float:
@@ -164,7 +169,61 @@ class RandomField:
         -------
         (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
         """
+        if self.conditions is not None:
+            draws = conditioning(self, interface).draws(draws)
+        return self.mapped(interface, draws)
+
+    def mapped(self, interface: Interface, draws: Array) -> Array:
+        """Map draws to profiles, whatever was measured."""
         return from_normal(self.marginal, self.gaussian(interface, draws))
+
+    @checked
+    def given(self, profile: Any, *, noise: Positive) -> RandomField:
+        """Return the field given what was measured of it: fixed there, random elsewhere.
+
+        Parameters
+        ----------
+        profile : xarray.DataArray over x (m), on a plane over x and y
+            Measured values, in the unit of the field, at any places, such as
+            ``st.read_profile("scan.csv")``; NaN where nothing was measured.
+        noise : float
+            Standard deviation of the error of a value, in the same unit, positive.
+
+        Returns
+        -------
+        RandomField
+            Like any other, for one interface: the one that was measured. Its samples have the
+            draws of those of this field, and tend to them as the noise grows.
+
+        Notes
+        -----
+        Gaussian regression of the draws on the values of z that were measured, whose errors are
+        ``noise`` over the slope of the map from z to the marginal, to first order.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> import xarray as xr
+        >>> problem = st.paper.problem(nodes=256)
+        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+        >>> scan = xr.DataArray([0.8e6, 0.9e6], {"x": [0.01, 0.02]}, "x")
+        >>> given = strength.given(scan, noise=10e3)
+        >>> tau_p = given.sample(problem.interface, samples=200, seed=0)
+        >>> bool(abs(tau_p.mean(axis=0)[26] - 0.8e6) < 50e3)
+        True
+        """
+        return dataclasses.replace(self, conditions={"profile": profile, "noise": noise})
+
+    def measured(self, interface: Interface, factor: Any = None) -> Measured:
+        """Return what was measured, with its places as functions of the draws.
+
+        `factor` is the marginal of a factor between specimens.
+        """
+        given = self.conditions
+        assert given is not None
+        given.check(self.marginal, interface, factor)
+        phi = basis(_modes(self, interface), self.mean_mode, interface.lengths, given.places)
+        return Measured(given, self.marginal, phi, factor)
 
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0,
@@ -199,6 +258,8 @@ class RandomField:
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
+        if self.conditions is not None:
+            conditioning(self, interface).warn()
         modes = self.modes(interface)
         lost = modes.unresolved(interface)
         if lost > LOST:
@@ -301,6 +362,12 @@ def _modes(field: RandomField, interface: Interface) -> Modes:
             f" {field.anisotropy:g}, leave it out"
         )
     return make_modes(field.spectrum, field.mean_mode, field.anisotropy or 1.0, interface)
+
+
+@lru_cache(maxsize=16)
+def conditioning(field: RandomField, interface: Interface) -> Conditioning:
+    """Return how the draws of a field alone are conditioned on what was measured of it."""
+    return Conditioning([field.measured(interface)])
 
 
 @lru_cache(maxsize=64)

@@ -17,12 +17,17 @@ from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.model import Number, check_memory, checked, describe, is_real, model
 from stiction.problem import PROFILES
+from stiction.random.conditioning import Conditioning
+from stiction.random.mapping import from_normal
+from stiction.random.marginals import AnyMarginal
 from stiction.random.random_field import RandomField
 from stiction.random.synthesis import block_of, standard_normal
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
 """What may be given as friction coefficients."""
+BETWEEN = 1000
+"""Number of the stream of draws of the first property's factor between specimens."""
 DEFINITE = 1e-12
 """Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
 
@@ -118,6 +123,9 @@ class RandomInterface:
         ``{("strength", "residual_strength"): 0.8}``, in a study file
         ``correlation.strength.residual_strength = 0.8``. Pairs that are not named are independent.
         With 1 and the same spectrum one field is a function of the other.
+    between : mapping, optional
+        Marginals of factors that differ from specimen to specimen and are constant along each,
+        by property: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. Positive, with mean 1.
 
     Raises
     ------
@@ -158,6 +166,7 @@ class RandomInterface:
     fracture_energy: RandomField | None = None
     normal_pressure: RandomField | None = None
     correlation: Correlation | None = None
+    between: dict[str, AnyMarginal] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
@@ -175,6 +184,7 @@ class RandomInterface:
                 for name in (one, *others)
                 if name not in self.properties
             ]
+        problems += _wrong_factors(self.between or {}, self.names)
         if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
@@ -207,7 +217,8 @@ class RandomInterface:
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        return max(stream.columns.stop for stream in _layout(self, interface).values())
+        last = max(stream.columns.stop for stream in _layout(self, interface).values())
+        return last + len(self.between or ())
 
     @checked
     def draws(
@@ -232,17 +243,35 @@ class RandomInterface:
             )
             for stream in _layout(self, interface).values()
         ]  # fmt: skip
+        parts += [
+            standard_normal(
+                seed, samples, np.arange(0), first=first, mean_mode=True,
+                stream=BETWEEN + NAMES.index(name),
+            )
+            for name in self.between or ()
+        ]  # fmt: skip
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
         layout = _layout(self, interface)
+        last = self.dimension(interface) - len(self.between or ())
+        specimen = dict(zip(self.between or (), draws[:, last:].T, strict=True))
+        for name, columns, known in _conditioned(self, interface):
+            u = known.specimen(specimen[name]) if name else None
+            if u is not None:
+                specimen[name] = u
+            draws = draws.copy()
+            draws[:, columns] = known.draws(draws[:, columns], u)
         independent = [draws[:, stream.columns] for stream in layout.values()]
         found = {}
         for name, row in zip(layout, lower_factor(self.matrix), strict=True):
             mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
             own = np.ascontiguousarray(mixed[:, layout[name].own])
-            found[name] = self.properties[name].profiles(interface, own)
+            found[name] = self.properties[name].mapped(interface, own)
+        for name, u in specimen.items():
+            factor = from_normal(self.between[name], u)  # type: ignore[index]
+            found[name] *= factor.reshape(-1, *(1 for _ in interface.shape))
         return found
 
     def profiles(
@@ -257,6 +286,14 @@ class RandomInterface:
             Sample i depends on (seed, i) only.
         """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
+
+    def support(self, name: str) -> tuple[float, float]:
+        """Return the bounds of a property, in its unit, with its factor between specimens."""
+        low, high = self.properties[name].marginal.distribution.support()
+        factor = (self.between or {}).get(name)
+        ends = (1.0, 1.0) if factor is None else factor.distribution.support()
+        products = [0.0 if a == 0.0 or b == 0.0 else a * b for a in (low, high) for b in ends]
+        return min(products), max(products)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of fields that the grid or the interface cannot do justice to."""
@@ -286,7 +323,60 @@ def _layout(random: RandomInterface, interface: Interface) -> dict[str, Stream]:
     return found
 
 
-assert {field.name for field in fields(RandomInterface)} == {*NAMES, "correlation"}
+@lru_cache(maxsize=16)
+def _conditioned(
+    random: RandomInterface, interface: Interface
+) -> list[tuple[str, NDArray[np.int64], Conditioning]]:
+    """What was measured, for each group of correlated properties.
+
+    Each with the property whose factor between specimens it tells of ('' if none), and the columns
+    of the draws.
+    """
+    layout, factor = _layout(random, interface), lower_factor(random.matrix)
+    names, fields = random.names, random.properties
+    linked = np.linalg.matrix_power(random.matrix != 0.0, len(names))
+    found = []
+    for group in np.unique(linked, axis=0):
+        members = np.flatnonzero(group)
+        known = [i for i in members if fields[names[i]].conditions is not None]
+        if not known:
+            continue
+        spans = [layout[names[j]].columns for j in members]
+        columns = np.concatenate([np.arange(span.start, span.stop) for span in spans])
+        measured = []
+        for i in known:
+            one = fields[names[i]].measured(interface, (random.between or {}).get(names[i]))
+            phi = np.zeros((one.phi.shape[0], random.dimension(interface)))
+            for j in np.flatnonzero(factor[i]):
+                start, stop = layout[names[j]].columns.start, layout[names[j]].columns.stop
+                phi[:, np.arange(start, stop)[layout[names[i]].own]] = factor[i, j] * one.phi
+            measured.append(one._replace(phi=np.ascontiguousarray(phi[:, columns])))
+        factors = [names[i] for i, one in zip(known, measured, strict=True) if one.factor]
+        if len(factors) > 1:
+            raise InputError(
+                f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
+                " at most one of them may have one"
+            )
+        found.append((factors[0] if factors else "", columns, Conditioning(measured)))
+    return found
+
+
+def _wrong_factors(between: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
+    """What is wrong with factors between specimens."""
+    problems = []
+    for name, marginal in between.items():
+        law = marginal.distribution
+        if name not in names:
+            problems.append(f"between: {name!r} is not random here (valid: {', '.join(names)})")
+        if law.support()[0] < 0.0 or abs(float(law.mean()) - 1.0) > 1e-6:
+            problems.append(
+                f"between.{name}: a factor must be positive with mean 1, got mean"
+                f" {float(law.mean()):g} and lower bound {law.support()[0]:g}"
+            )
+    return problems
+
+
+assert {f.name for f in fields(RandomInterface)} == {*NAMES, "correlation", "between"}
 
 
 def as_random_interface(given: Any) -> RandomInterface:
