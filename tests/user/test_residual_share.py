@@ -29,14 +29,14 @@ def test_strength_below_the_residual_strength_is_said_before_computing(solid, ma
         with pytest.raises(st.InputError, match="most of the interface would not weaken"):
             compute(problem(1.0e6))
     with pytest.warns(st.AccuracyWarning, match=text):
-        check_residual(problem(0.73e6), {"strength": strength})
+        check_residual(problem(0.73e6), st.RandomInterface(strength=strength))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_residual(problem(0.66e6), {"strength": strength})
+        check_residual(problem(0.66e6), st.RandomInterface(strength=strength))
         residual = st.RandomField(
             marginal=st.Beta(alpha=2, beta=2, low=0.0, high=0.66e6), spectrum=strength.spectrum
         )
-        check_residual(problem(0.0), {"strength": strength, "residual_strength": residual})
+        check_residual(problem(0.0), st.RandomInterface(strength=strength, residual_strength=residual))
 
 
 def test_share_below_a_random_residual_strength(problem, make_strength):
@@ -44,5 +44,5 @@ def test_share_below_a_random_residual_strength(problem, make_strength):
     spectrum = make_strength().spectrum
     strength = st.RandomField(marginal=scipy.stats.uniform(3e5, 4e5), spectrum=spectrum)
     residual = st.RandomField(marginal=scipy.stats.uniform(0.0, 4e5), spectrum=spectrum)
-    share = share_below_residual(problem, {"strength": strength, "residual_strength": residual})
+    share = share_below_residual(problem, st.RandomInterface(strength=strength, residual_strength=residual))
     assert share == pytest.approx(1.0 / 32.0, rel=1e-5)

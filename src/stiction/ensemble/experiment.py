@@ -152,7 +152,7 @@ class Experiment:
 
     def support(self, name: str) -> tuple[float, float]:
         """Return the bounds of a random property; those of a coefficient as a stress, Pa."""
-        return support_in_stress(self.problem, self.random.properties, name)
+        return support_in_stress(self.problem, self.random, name)
 
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units.
@@ -164,7 +164,7 @@ class Experiment:
         """
         self.random.warn_if_inaccurate(self.problem.interface)
         self.problem.warn_of_units(self.mean("strength"))
-        check_residual(self.problem, self.random.properties)
+        check_residual(self.problem, self.random)
 
     def draws(self, seed: int, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.

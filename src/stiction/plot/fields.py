@@ -12,8 +12,9 @@ from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.plot import maps
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
-from stiction.plot.style import INK, PAGE, series
+from stiction.plot.style import INK, PAGE, color, series
 from stiction.problem import PROFILES, Problem
+from stiction.random.random_field import RandomField
 
 MOST_LINES = 6
 _SYMBOLS = {
@@ -26,14 +27,15 @@ _SYMBOLS = {
 def field(
     where: Problem | Interface, profile: Any, *, quantity: str = "strength", ax: Axes | None = None
 ) -> Axes:
-    """Draw a random or measured profile: lines along x, on a plane a map.
+    """Draw a profile, or a field of which a part was measured: lines along x, on a plane a map.
 
     Parameters
     ----------
     where : Problem or Interface
-    profile : array
+    profile : array or RandomField
         Of shape (nodes,) or (samples, nodes), of which the first six are drawn; on a plane (nx,
-        ny) or (samples, nx, ny), of which the first is drawn.
+        ny) or (samples, nx, ny), of which the first is drawn. Of a field its median, on a line the
+        band that holds it with 90 %, and what was measured (`RandomField.given`).
     quantity : str
         Name of the property, as `RandomInterface` uses it; 'strength' (Pa) by default.
     ax : matplotlib.axes.Axes, optional
@@ -61,7 +63,8 @@ def field(
         raise InputError(f"where: must be a Problem or an Interface, got {type(where).__name__}")
     if quantity not in PROFILES:
         raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
-    rows = rows_of(interface, profile)
+    of_field = isinstance(profile, RandomField)
+    rows = rows_of(interface, profile.quantile(interface, 0.5) if of_field else profile)
     factor, unit = unit_for(PROFILES[quantity].units, rows)
     name = " ".join(filter(None, (quantity.replace("_", " "), _SYMBOLS.get(quantity))))
     text = with_unit(name, unit)
@@ -70,12 +73,23 @@ def field(
             bar = maps.image(axes, interface, rows[0] * factor, cmap="cividis")
             axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
             maps.label(axes, interface)
+            if of_field and profile.conditions is not None:
+                near = unit_for("m", interface.lengths)[0] * profile.conditions.places
+                axes.plot(*near, ".", color="w", markersize=2.0)
         return axes
     with on_axes(ax, width=PAGE, height=2.4) as axes:
         x = places(interface)
         for number, row in enumerate(rows[:MOST_LINES]):
             style = {"color": INK} if rows.shape[0] == 1 else series(number)
             axes.plot(x, row * factor, linewidth=0.9, label=str(number), **style)
+        if of_field:
+            low, high = (profile.quantile(interface, share) * factor for share in (0.05, 0.95))
+            axes.fill_between(x, low, high, color=INK, alpha=0.15, linewidth=0.0, label="90 %")
+        if of_field and profile.conditions is not None:
+            place = unit_for("m", interface.lengths)[0] * profile.conditions.places[0]
+            axes.plot(
+                place, profile.conditions.values * factor, ".", markersize=3.0, color=color(1)
+            )
         finish_line(axes, interface, text)
         if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
             add_friction_scale(axes, where, "y", factor)

@@ -7,8 +7,8 @@ standard normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, w
 
 and mu + P^(1/2) a with the symmetric root turns the usual draws into conditioned ones, without
 others. It is the same distribution as by Matheron's rule (Journel and Huijbregts, 1978; Doucet,
-2010). From the singular values s of Psi = U s V^T: P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V^T, which
-is well conditioned however densely a smooth field was measured.
+2010). With the singular values of Psi = U s V^T, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V^T is well
+conditioned however densely a smooth field was measured.
 """
 
 from __future__ import annotations
@@ -35,10 +35,12 @@ NEGLIGIBLE = 1e-8
 """Singular values below which a direction of the draws stays as it is, to round-off."""
 DOUBTFUL = 5.0
 """Standard deviations of chi-square beyond which measured values do not suit a field."""
+IMPOSSIBLE = 4.0
+"""Errors beyond a bound of the marginal that no measured value has."""
 NODES, PASSES = 65, 4
 """Of the posterior of the factor between specimens, and how often its range is narrowed."""
 CURVED, OFTEN = 0.25, 0.05
-"""Curvature of the map over one error, relative to the error, and a share of values: worth saying."""
+"""Curvature of the map over an error, relative to it, and a share of values: worth a warning."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
@@ -107,23 +109,23 @@ class Conditions:
         """The measured values, (points,)."""
         return self.profile[-1]
 
-    def normal(self, marginal: Any, factor: float = 1.0) -> tuple[Array, Array, float]:
-        """Return measured values of z and their errors, to first order, (points,) each.
+    def normal(self, marginal: Any, factors: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return measured values of z and their errors, to first order, (factors, points) each.
 
-        Values within an error of a bound of the marginal, or beyond, are taken as one error
-        inside; the third number is the sum of the squares of these moves, over the errors.
-        `factor` multiplies the marginal.
+        `factors`, of which there is one by default, multiply the marginal. Values within an error
+        of a bound, or beyond, are taken as one error inside; the third array, (factors,), is the
+        sum of the squares of these moves, over the errors.
         """
         law = marginal.distribution
         low, high = law.support()
-        noise = self.noise / factor
-        edge = min(noise, 0.25 * (high - low))
-        given = self.values / factor
+        factors = np.ones((1, 1)) if factors is None else factors[:, None]
+        noise, given = self.noise / factors, self.values / factors
+        edge = np.minimum(noise, 0.25 * (high - low))
         value = np.clip(given, low + edge, high - edge)
         below = law.cdf(value)
         z = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(value)))
         slope = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi) / law.pdf(value)
-        return z, noise / slope, float((((value - given) / noise) ** 2).sum())
+        return z, noise / slope, (((value - given) / noise) ** 2).sum(axis=1)
 
     def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
@@ -137,12 +139,15 @@ class Conditions:
         ]
         low, high = marginal.distribution.support()
         away = np.maximum(low - self.values, self.values - high)
-        if factor is None and away.max() > self.noise:
-            worst = int(away.argmax())
-            at = ", ".join(f"{name} = {row[worst]:g} m" for name, row in zip("xy", self.places))
+        if factor is None and away.max() > IMPOSSIBLE * self.noise:
+            worst, names = int(away.argmax()), "xy"[: len(self.places)]
+            at = ", ".join(
+                f"{name} = {row[worst]:g} m" for name, row in zip(names, self.places, strict=True)
+            )
             problems.append(
                 f"given.profile: {self.values[worst]:g} at {at} lies outside the marginal, which"
-                f" reaches from {low:g} to {high:g}, by more than its error of {self.noise:g}"
+                f" reaches from {low:g} to {high:g}, by more than {IMPOSSIBLE:g} times its error of"
+                f" {self.noise:g}"
             )
         if problems:
             raise InputError(problems)
@@ -153,8 +158,9 @@ class Conditions:
         near = (self.values < low + self.noise) | (self.values > high - self.noise)
         if near.any():
             warn_accuracy(
-                f"given.profile: {near.sum()} of {near.size} values lie within an error of a bound of"
-                f" the marginal ({low:g} to {high:g}), or beyond, and are taken as one error inside"
+                f"given.profile: {near.sum()} of {near.size} values lie within an error of a bound"
+                f" of the marginal ({low:g} to {high:g}), or beyond, and are taken as one error"
+                " inside"
             )
         z, error, _ = self.normal(marginal)
         ends = [quantile_of_normal(marginal.distribution, z + shift) for shift in (-error, error)]
@@ -162,9 +168,9 @@ class Conditions:
         bend = np.abs(ends[0] + ends[1] - 2.0 * middle) / (2.0 * self.noise)
         if np.mean(bend > CURVED) > OFTEN:
             warn_accuracy(
-                f"given.noise: {self.noise:g} is so large that the map from the Gaussian field to"
-                f" the marginal is not straight over it at {100.0 * np.mean(bend > CURVED):.0f} % of"
-                " the values: errors are taken to first order"
+                f"given.noise: over {self.noise:g} the map from the Gaussian field to the marginal"
+                f" bends at {100.0 * np.mean(bend > CURVED):.0f} % of the values, and errors are"
+                " taken to first order"
             )
 
 
@@ -203,11 +209,12 @@ class Measured(NamedTuple):
     phi: Array
     factor: Any = None
 
-    def normal(self, u: float) -> tuple[Array, Array, float]:
-        """Return measured z and their errors if the factor between specimens has the draw u."""
-        known = self.factor is None
-        factor = 1.0 if known else float(quantile_of_normal(self.factor.distribution, u))
-        return self.conditions.normal(self.marginal, factor)
+    def normal(self, u: Array) -> tuple[Array, Array, Array]:
+        """Return measured z and their errors for draws u of the factor between specimens."""
+        factors = np.ones(u.size)
+        if self.factor is not None:
+            factors = quantile_of_normal(self.factor.distribution, u)
+        return self.conditions.normal(self.marginal, factors)
 
 
 class Conditioning:
@@ -250,18 +257,18 @@ class Conditioning:
 
     def _regress(self, grid: Array) -> None:
         """Regress on the values at the middle of a grid of u, and reduce those at all of it."""
-        normal = [_joined(self.measured, u) for u in grid]
-        self.error = normal[grid.size // 2][1]
+        z, error, moved = zip(*(one.normal(grid) for one in self.measured), strict=True)
+        z, error = np.concatenate(z, axis=1), np.concatenate(error, axis=1)
+        own = error[grid.size // 2]
         phi = np.concatenate([one.phi for one in self.measured])
         check_memory("given.profile", 24.0 * phi.size, "give fewer places")
-        left, values, right = svd(phi / self.error[:, None], full_matrices=False)
+        left, values, right = svd(phi / own[:, None], full_matrices=False)
         kept = values > NEGLIGIBLE
         self.values, self.right = values[kept], np.ascontiguousarray(right[kept].T)
-        scaled = np.array([z / self.error for z, _, _ in normal])
-        self.data = scaled @ left[:, kept]  # (nodes of u, r)
-        self.total = (scaled**2).sum(axis=1)
-        self.moved = np.array([moved for _, _, moved in normal])
-        self.ratio = np.array([np.exp(np.log(error / self.error).mean()) for _, error, _ in normal])
+        self.data = (z / own) @ left[:, kept]  # (nodes of u, r)
+        self.total, self.moved = ((z / own) ** 2).sum(axis=1), sum(moved)
+        self.ratio = np.exp(np.log(error / own).mean(axis=1))
+        self.points = own.size
 
     def chi_square(self) -> Array:
         """Return chi^2 at each u of the grid; as many as values, if they suit the field."""
@@ -306,18 +313,13 @@ class Conditioning:
         """Warn of measured values that do not suit the field."""
         for one in self.measured:
             one.conditions.warn(one.marginal)
-        chi_square, points = float(self.chi_square().min()), self.error.size
+        chi_square, points = float(self.chi_square().min()), self.points
         if chi_square > points + DOUBTFUL * np.sqrt(2.0 * points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
                 f" {chi_square:.4g} for {points} values): check its marginal, its correlation"
                 " length and the noise"
             )
-
-
-def _joined(measured: Sequence[Measured], u: float) -> tuple[Array, Array, float]:
-    z, error, moved = zip(*(one.normal(u) for one in measured), strict=True)
-    return np.concatenate(z), np.concatenate(error), sum(moved)
 
 
 @jit

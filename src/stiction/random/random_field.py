@@ -10,11 +10,22 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import Field
 from scipy.optimize import brentq
+from scipy.special import ndtri
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import Flag, Number, Numbers, Positive, check_memory, checked, describe, model
+from stiction.model import (
+    Flag,
+    Number,
+    Numbers,
+    Positive,
+    Real,
+    check_memory,
+    checked,
+    describe,
+    model,
+)
 from stiction.random.conditioning import Conditioning, Conditions, Measured, basis
 from stiction.random.mapping import (
     correlation_of_mapped,
@@ -35,6 +46,7 @@ LOST, FALLEN = 1e-4, 0.02
 MOST_SAMPLES = 10**10
 LAST_SAMPLE = 2**62
 
+Probability: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 Of: TypeAlias = Literal["strength", "z"]
 
 
@@ -213,6 +225,19 @@ class RandomField:
         True
         """
         return dataclasses.replace(self, conditions={"profile": profile, "noise": noise})
+
+    @checked
+    def quantile(self, interface: Interface, probability: Probability) -> Array:
+        """Return the quantile of the field at each node, given what was measured, (*shape)."""
+        score = float(ndtri(probability))
+        mean, deviation = np.zeros(interface.size), np.ones(interface.size)
+        if self.conditions is not None:
+            grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+            places = np.array([row.ravel() for row in grid])
+            phi = basis(_modes(self, interface), self.mean_mode, interface.lengths, places)
+            mean, deviation = conditioning(self, interface).moments(phi)
+        found = from_normal(self.marginal, mean + score * deviation)
+        return found.reshape(interface.shape)
 
     def measured(self, interface: Interface, factor: Any = None) -> Measured:
         """Return what was measured, with its places as functions of the draws.

@@ -44,9 +44,13 @@ def profiles_in_stress(
     return found
 
 
+def _equally_likely(count: int) -> Array:
+    return (np.arange(count) + 0.5) / count
+
+
 def _quantiles(field: RandomField, count: int) -> Array:
     """Values of a field at a point, equally likely."""
-    found: Array = field.marginal.distribution.ppf((np.arange(count) + 0.5) / count)
+    found: Array = field.marginal.distribution.ppf(_equally_likely(count))
     return found
 
 
@@ -58,16 +62,14 @@ def _pressures(problem: Problem, fields: Mapping[str, RandomField]) -> Array:
     return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
 
-def support_in_stress(
-    problem: Problem, fields: Mapping[str, RandomField], name: str
-) -> tuple[float, float]:
+def support_in_stress(problem: Problem, random: RandomInterface, name: str) -> tuple[float, float]:
     """Return the values between which a property lies, Pa."""
-    low, high = (float(end) for end in fields[name].marginal.distribution.support())
-    if fields[name].of is None:
+    low, high = random.support(name)
+    if random.properties[name].of is None:
         return low, high
     ends = problem.load.normal_pressure
-    if "normal_pressure" in fields:
-        ends = fields["normal_pressure"].marginal.distribution.support()
+    if "normal_pressure" in random.names:
+        ends = random.support("normal_pressure")
     pair = float(np.min(ends)), float(np.max(ends))
     corners = [0.0 if a == 0.0 or b == 0.0 else a * b for a in (low, high) for b in pair]
     return min(corners), max(corners)
@@ -79,25 +81,29 @@ def mean_in_stress(problem: Problem, fields: Mapping[str, RandomField], name: st
     return field.mean * (1.0 if field.of is None else float(_pressures(problem, fields).mean()))
 
 
-def share_below_residual(problem: Problem, fields: Mapping[str, RandomField]) -> float:
+def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """Return the probability that the strength at a point is not above the residual strength.
 
     Parameters
     ----------
     problem : Problem
-    fields : mapping
-        'strength', and 'residual_strength' where that is random; they are taken as independent.
+    random : RandomInterface
+        Its properties are taken as independent.
     """
+    fields = random.properties
     residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
         residual = _quantiles(fields["residual_strength"], QUANTILES)
     strength = fields["strength"]
     if strength.of is not None:
         residual = np.ravel(residual)[:, None] / _pressures(problem, fields)
+    if "strength" in (random.between or {}):
+        factors = random.between["strength"].distribution.ppf(_equally_likely(PRESSURES))
+        residual = np.ravel(residual)[:, None] / factors
     return float(np.mean(strength.marginal.distribution.cdf(residual)))
 
 
-def check_residual(problem: Problem, fields: Mapping[str, RandomField]) -> None:
+def check_residual(problem: Problem, random: RandomInterface) -> None:
     """Warn of the share of the strength that does not exceed the residual strength.
 
     A node whose strength does not exceed its residual strength does not weaken. A few of those
@@ -107,13 +113,12 @@ def check_residual(problem: Problem, fields: Mapping[str, RandomField]) -> None:
     Parameters
     ----------
     problem : Problem
-    fields : mapping
-        What is random, by name; 'strength' among it.
+    random : RandomInterface
     """
-    share = share_below_residual(problem, fields)
+    share = share_below_residual(problem, random)
     if share <= WORTH_SAYING:
         return
-    low, high = support_in_stress(problem, fields, "strength")
+    low, high = support_in_stress(problem, random, "strength")
     said = (
         f"strength: {100.0 * share:.3g} % of its marginal, which reaches from {low:g} to"
         f" {high:g} Pa, lies at or below the residual strength"

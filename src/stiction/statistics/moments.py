@@ -129,6 +129,8 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
         )
         if np.ptp(value) > 0.0
     ]
+    if strength.conditions is not None:
+        problems.append(f"strength: was measured in places, {sampled}")
     if problem.uniform_rate is None:
         problems.append(f"friction.weakening_rate: varies or follows from the strength, {sampled}")
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
