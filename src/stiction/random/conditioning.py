@@ -244,21 +244,21 @@ class Conditioning:
             return
         middle, spread = 0.0, 1.0
         for _ in range(PASSES):
-            self.grid = np.clip(middle + spread * np.linspace(-8.0, 8.0, NODES), -37.0, 37.0)
-            self._regress(self.grid)
-            weight = self._posterior_weights()
-            middle = float(weight @ self.grid)
-            spread = max(float(weight @ (self.grid - middle) ** 2) ** 0.5, 8.0 * spread / NODES)
+            grid = np.clip(middle + spread * np.linspace(-8.0, 8.0, NODES), -37.0, 37.0)
+            self._regress(grid)
+            weight = self._posterior_weights(grid)
+            middle = float(weight @ grid)
+            spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, 8.0 * spread / NODES)
         mass = 0.5 * (weight[1:] + weight[:-1])
         below, above = np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1]
         score = np.where(below < 0.5, ndtri(below), -ndtri(above))
         usable = np.isfinite(score)
-        self.score, self.quantile = score[usable], self.grid[1:-1][usable]
+        self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
 
     def _regress(self, grid: Array) -> None:
         """Regress on the values at the middle of a grid of u, and reduce those at all of it."""
-        z, error, moved = zip(*(one.normal(grid) for one in self.measured), strict=True)
-        z, error = np.concatenate(z, axis=1), np.concatenate(error, axis=1)
+        parts = [one.normal(grid) for one in self.measured]
+        z, error = (np.concatenate([part[i] for part in parts], axis=1) for i in (0, 1))
         own = error[grid.size // 2]
         phi = np.concatenate([one.phi for one in self.measured])
         check_memory("given.profile", 24.0 * phi.size, "give fewer places")
@@ -266,7 +266,7 @@ class Conditioning:
         kept = values > NEGLIGIBLE
         self.values, self.right = values[kept], np.ascontiguousarray(right[kept].T)
         self.data = (z / own) @ left[:, kept]  # (nodes of u, r)
-        self.total, self.moved = ((z / own) ** 2).sum(axis=1), sum(moved)
+        self.total, self.moved = ((z / own) ** 2).sum(axis=1), sum(part[2] for part in parts)
         self.ratio = np.exp(np.log(error / own).mean(axis=1))
         self.points = own.size
 
@@ -276,12 +276,11 @@ class Conditioning:
         found: Array = self.total - (power / (1.0 + power) * self.data**2).sum(axis=1)
         return found / self.ratio**2 + self.moved
 
-    def _posterior_weights(self) -> Array:
-        assert self.grid is not None
+    def _posterior_weights(self, grid: Array) -> Array:
         volume = np.log1p((self.values / self.ratio[:, None]) ** 2).sum(axis=1)
-        density = -0.5 * (self.grid**2 + self.chi_square() + volume)
+        density = -0.5 * (grid**2 + self.chi_square() + volume)
         weight = np.exp(density - density.max())
-        return weight / weight.sum()
+        return weight / float(weight.sum())
 
     def specimen(self, u: Array) -> Array:
         """Return the draws of the factor between specimens, conditioned."""

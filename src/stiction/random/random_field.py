@@ -224,7 +224,8 @@ class RandomField:
         >>> bool(abs(tau_p.mean(axis=0)[26] - 0.8e6) < 50e3)
         True
         """
-        return dataclasses.replace(self, conditions={"profile": profile, "noise": noise})
+        known: Any = {"profile": profile, "noise": noise}
+        return dataclasses.replace(self, conditions=known)
 
     @checked
     def quantile(self, interface: Interface, probability: Probability) -> Array:

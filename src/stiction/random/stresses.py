@@ -97,9 +97,9 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     strength = fields["strength"]
     if strength.of is not None:
         residual = np.ravel(residual)[:, None] / _pressures(problem, fields)
-    if "strength" in (random.between or {}):
-        factors = random.between["strength"].distribution.ppf(_equally_likely(PRESSURES))
-        residual = np.ravel(residual)[:, None] / factors
+    factor = (random.between or {}).get("strength")
+    if factor is not None:
+        residual = np.ravel(residual)[:, None] / factor.distribution.ppf(_equally_likely(PRESSURES))
     return float(np.mean(strength.marginal.distribution.cdf(residual)))
 
 
