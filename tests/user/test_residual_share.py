@@ -36,7 +36,9 @@ def test_strength_below_the_residual_strength_is_said_before_computing(solid, ma
         residual = st.RandomField(
             marginal=st.Beta(alpha=2, beta=2, low=0.0, high=0.66e6), spectrum=strength.spectrum
         )
-        check_residual(problem(0.0), st.RandomInterface(strength=strength, residual_strength=residual))
+        check_residual(
+            problem(0.0), st.RandomInterface(strength=strength, residual_strength=residual)
+        )
 
 
 def test_share_below_a_random_residual_strength(problem, make_strength):
@@ -44,5 +46,7 @@ def test_share_below_a_random_residual_strength(problem, make_strength):
     spectrum = make_strength().spectrum
     strength = st.RandomField(marginal=scipy.stats.uniform(3e5, 4e5), spectrum=spectrum)
     residual = st.RandomField(marginal=scipy.stats.uniform(0.0, 4e5), spectrum=spectrum)
-    share = share_below_residual(problem, st.RandomInterface(strength=strength, residual_strength=residual))
+    share = share_below_residual(
+        problem, st.RandomInterface(strength=strength, residual_strength=residual)
+    )
     assert share == pytest.approx(1.0 / 32.0, rel=1e-5)
