@@ -17,7 +17,6 @@ import numpy as np
 import stiction as st
 from stiction.criterion.local import LocalCriterion
 from stiction.equilibrium.method import Equilibrium
-from stiction.reliability.failure import failure_probability
 
 MILLION = 1_000_000
 REPEATS = 50
@@ -33,7 +32,7 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
     """Mean ratio, observed and reported error, coverage and time of repeated runs."""
     start = time.perf_counter()
     found = [
-        failure_probability(
+        st.failure_probability(
             problem,
             field,
             stress,
@@ -74,7 +73,7 @@ def main():
         repetition(problem, field, stress, chance, local, "subset", 0.1)
     stress = 661.6e3
     for method in (local, exact):
-        precise = failure_probability(
+        precise = st.failure_probability(
             problem, field, stress, method=method, algorithm="subset", target_cv=0.03, seed=99
         )
         print(f"{method.type}: {precise}")
@@ -90,7 +89,7 @@ def main():
         stress = float(np.quantile(counts[0], chance))
         counted = float(np.mean(counts[1] < stress))
         rule = -math.expm1(4.0 * math.log1p(-chance))
-        found = failure_probability(
+        found = st.failure_probability(
             long, field, stress, method=local, algorithm="subset", target_cv=0.05, workers=1
         )
         share = math.log1p(-rule) / math.log1p(-counted)

@@ -2,8 +2,8 @@
 Failure probability over decades
 ================================
 
-The probability that the interface slides below a stress, by subset simulation, with plain Monte
-Carlo and Rice's formula beside it; and what failing interfaces have in common.
+The probability that the interface slides below a stress, by subset simulation; and what failing
+interfaces have in common.
 """
 
 import stiction as st

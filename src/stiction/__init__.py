@@ -40,7 +40,7 @@ _HOMES = {
     "monte_carlo": "ensemble.monte_carlo",
     "fit_field": "inference.fit",
     "failure_probability": "reliability.failure",
-    "design_stress": "reliability.design",
+    "design_stress": "reliability.failure",
     "failure_curve": "reliability.curve",
     "read_peaks": "inference.peaks",
     "infer": "inference.infer",

@@ -66,7 +66,7 @@ from stiction.random.spectra import (
     SquaredExponentialSpectrum as SquaredExponentialSpectrum,
 )
 from stiction.reliability.curve import failure_curve as failure_curve
-from stiction.reliability.design import (
+from stiction.reliability.failure import (
     design_stress as design_stress,
 )
 from stiction.reliability.failure import failure_probability as failure_probability

@@ -143,10 +143,10 @@ def accepted(method: Method) -> tuple[str, ...]:
     return getattr(method, "accepts", ())
 
 
-def study_attributes(problem: Problem, method: Method) -> dict[str, Any]:
-    """The problem and the method in plain form, or why they have none."""
+def study_attributes(**parts: Any) -> dict[str, Any]:
+    """Return the problem, the method, ... by name in plain form, or why they have none."""
     try:
-        return {"study": {"problem": to_plain(problem), "method": to_plain(method)}}
+        return {"study": {name: to_plain(part) for name, part in parts.items()}}
     except InputError as error:
         return {"study_incomplete": str(error)}
 
@@ -295,7 +295,7 @@ def onset(
     """
     if refused := refusals(problem, method):
         raise InputError(refused)
-    attributes = study_attributes(problem, method)
+    attributes = study_attributes(problem=problem, method=method)
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)

@@ -12,10 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
 """True shows progress once work takes long; a callable gets (done, total); False is silent."""
@@ -40,23 +37,6 @@ def duration(seconds: float) -> str:
     if seconds < 48 * 3600.0:
         return f"{seconds / 3600.0:.3g} h"
     return f"{seconds / 86400.0:.3g} days"
-
-
-class TimeUp(Exception):
-    """The time allowed is over.
-
-    Attributes
-    ----------
-    values : array
-        What was computed of what was asked for last, from its beginning.
-    spent : int
-        Samples computed since whoever catches it was asked.
-    """
-
-    def __init__(self, values: Any = (), spent: int | None = None) -> None:
-        super().__init__("the time allowed is over")
-        self.values: NDArray[Any] = np.asarray(values, dtype=np.float64)
-        self.spent = self.values.size if spent is None else spent
 
 
 class Meter:

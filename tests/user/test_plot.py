@@ -114,7 +114,7 @@ def test_sweeps(system):
 def test_failure_curve_and_weak_spots(system):
     problem, strength, _ = system
     method = st.LocalCriterion()
-    curve = st.failure_curve(problem, strength, method=method, smallest=1e-3, plain_samples=200)
+    curve = st.failure_curve(problem, strength, method=method, smallest=1e-3)
     axes = st.plot.failure_curve(curve)
     assert axes.get_yscale() == "log"
     axes.figure.canvas.draw()

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiction.cli.common import StudyFile, TimeLimit, Workers, echo, writable_folder
+from stiction.cli.common import StudyFile, Workers, echo, writable_folder
 from stiction.errors import InputError
 
 
@@ -30,21 +30,21 @@ def reliability(
         float, typer.Option(help="Coefficient of variation at the smallest probability.")
     ] = 0.3,
     workers: Workers = None,
-    time_limit: TimeLimit = None,
+    max_evaluations: Annotated[
+        int | None, typer.Option(help="Most samples to solve for the curve, and for each answer.")
+    ] = None,
 ) -> None:
     """Failure probability of a study's interface, decade by decade.
 
     Problem, strength, method and seed come from the study file; its number of samples does not
     matter here. Prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a figure
     (PNG and PDF) into a folder. The stress is the mean shear stress on the interface, and failure
-    means that the interface as a whole slides below it. The time limit holds for the curve and
-    for each answer.
+    means that the interface as a whole slides below it.
     """
     from stiction import plot
     from stiction.plot.style import save_figure
     from stiction.reliability.curve import failure_curve
-    from stiction.reliability.design import design_stress
-    from stiction.reliability.failure import failure_probability
+    from stiction.reliability.failure import design_stress, failure_probability
     from stiction.study.export import write_result
     from stiction.study.study import Study
 
@@ -65,7 +65,7 @@ def reliability(
         "method": loaded.method,
         "seed": loaded.ensemble.seed,
         "workers": workers,
-        "time_limit": time_limit,
+        "max_evaluations": max_evaluations,
     }
     curve = failure_curve(*given, smallest=smallest, target_cv=target_cv, **options)
     write_result(curve, out / "failure_curve.nc")

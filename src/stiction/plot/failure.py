@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from stiction.errors import InputError
 from stiction.plot.axes import add_friction_scale, need, on_axes, problem_of, unit_for
-from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, series
+from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET
 from stiction.problem import Problem
 from stiction.reliability.answer import FailureProbability, bounded
 
@@ -22,7 +22,7 @@ NEAR_ON_A_PLANE = 2.0
 
 
 def failure_curve(curve: xr.Dataset, *, above_bound: bool = False, ax: Axes | None = None) -> Axes:
-    """Draw P(onset < s) over decades, with its interval, Rice's formula and plain Monte Carlo.
+    """Draw P(onset < s) over decades, with its interval.
 
     Parameters
     ----------
@@ -68,17 +68,6 @@ def failure_curve(curve: xr.Dataset, *, above_bound: bool = False, ax: Axes | No
         text = f"subset simulation, {percent:g} % interval"
         style: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 0.9}
         axes.plot(x, curve["probability"].values, color=INK, label=text, **style)
-        if "rice_probability" in curve:
-            rice = curve["rice_probability"].values
-            axes.plot(x, rice, **series(2), label="Rice's formula (local)")
-        if "plain_probability" in curve:
-            middle = curve["plain_probability"].values
-            ends = np.stack([curve["plain_low"].values, curve["plain_high"].values])
-            text = f"plain Monte Carlo, {int(curve.attrs['plain_samples']):,} samples"
-            axes.errorbar(
-                x, middle, yerr=np.abs(ends - middle), linestyle="none", elinewidth=0.8,
-                color=series(1)["color"], marker="s", markersize=3.0, label=text, zorder=3,
-            )  # fmt: skip
         axes.set_yscale("log")
         axes.set_ylim(0.5 * float(curve["probability"].min()), 1.0)
         axes.set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.progress import TimeUp
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.uncertainty import binomial_interval
 
@@ -74,21 +73,10 @@ class Count:
 def tally(values: Array, stress: float, first: int = 0) -> Count:
     """Count among samples first, first + 1, ... of these stresses at onset."""
     failed = np.flatnonzero(values < stress)
-    near, stresses = _near(values, failed, first)
-    return Count(failed.size, values.size, first + failed[:SHOWN], False, near, stresses)
-
-
-def _near(values: Array, failed: NDArray[np.int64], first: int) -> tuple[NDArray[np.int64], Array]:
-    """Return numbers and stresses of samples on both sides of the stress; see `Count.near`."""
     some = failed[: SHOWN // 2]
     seen = values[: some[-1] + 1] if some.size else values[:0]
     near = np.argsort(seen, kind="stable")[: 2 * some.size]
-    return first + near, seen[near]
-
-
-def failures_wanted(target_cv: float) -> int:
-    """Return how many failures make the error small enough: it falls like 1/sqrt(r - 1)."""
-    return 2 + math.ceil(1.0 / (target_cv * target_cv))
+    return Count(failed.size, values.size, first + failed[:SHOWN], False, first + near, seen[near])
 
 
 def count_failures(
@@ -101,58 +89,34 @@ def count_failures(
     max_evaluations: int,
     start: int = 0,
 ) -> tuple[Count, int]:
-    """Count until there are enough failures, among at least `least` samples.
+    """Count until there are enough failures, among at least `least` samples from `start` on.
 
     Stopping when the estimate looks precise enough would favour counts that saw many failures
     early. So the number of failures is fixed beforehand, and what was computed beyond the last of
     them does not count.
-
-    Parameters
-    ----------
-    state : LimitState
-        If its time is over, what was counted until then is the answer.
-    seed : int
-        Sample i is that of `stiction.monte_carlo` with the same seed.
-    stress, target_cv : float
-    least, max_evaluations : int
-    start : int
-        Number of the first sample.
 
     Returns
     -------
     count : Count
     evaluations : int
         Those that do not count included.
-
-    Raises
-    ------
-    TimeUp
-        If its time is over before the first sample.
     """
-    wanted = failures_wanted(target_cv)
+    wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)
     parts: list[Array] = []
     done = failures = 0
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
         if size <= 0:
-            rest = max_evaluations - done
-            size = math.ceil((wanted - failures) * done / failures) if failures else rest
-            size = min(size, rest)
-        try:
-            values = state(state.draws(seed, start + done, min(size, BATCH)))
-        except TimeUp as up:
-            values = up.values
-        parts.append(values)
-        done, failures = done + values.size, failures + int(np.sum(values < stress))
+            size = math.ceil((wanted - failures) * done / failures) if failures else BATCH
+        size = min(size, BATCH, max_evaluations - done)
+        parts.append(state(state.draws(seed, start + done, size)))
+        done, failures = done + size, failures + int(np.sum(parts[-1] < stress))
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
-        if state.meter.over:
-            break
-    if not done:
-        raise TimeUp
-    count = tally(np.concatenate(parts), stress, start)
+    values = np.concatenate(parts)
+    count = tally(values, stress, start)
     if failures >= wanted:
-        last = int(np.flatnonzero(np.concatenate(parts) < stress)[wanted - 1])
+        last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
             count = replace(count, failures=wanted, samples=last + 1, until_failure=True)
     return count, done

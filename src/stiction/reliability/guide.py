@@ -7,12 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.errors import collect_warnings
 from stiction.methods import methods
-from stiction.progress import TimeUp
 from stiction.reliability.limit_state import LimitState, no_single_length
 
 SECONDS = 100.0
@@ -24,8 +24,6 @@ PATIENCE = 900.0
 """Seconds on one core beyond which such a chain is begun only if `max_evaluations` allows it."""
 ALIKE = 0.9
 """Share of the weakest plain samples that a guide must pick to lead to the rarest."""
-POOR = 0.02
-"""Of the samples that a guide leads to, those that fail: fewer, and it is no guide."""
 CHECKED = (8, 64)
 """Fewest and most samples that are solved exactly to check those of the local criterion."""
 
@@ -38,7 +36,7 @@ def _seconds(state: LimitState) -> float:
 def budget_of(state: LimitState, max_evaluations: int | None) -> int:
     """Return the evaluations allowed."""
     if max_evaluations is not None:
-        return int(max_evaluations)
+        return max_evaluations
     return int(min(MOST, max(FEWEST, SECONDS / _seconds(state))))
 
 
@@ -64,10 +62,9 @@ def first_stage(state: LimitState) -> Any:
 
 def two_levels_refused(state: LimitState) -> str | None:
     """Return why two levels are not possible, or None if they are."""
-    if first_stage(state) is None:
-        method = state.experiment.method
-        return f"{method.type!r} names no less expensive method as its first stage"
     experiment = state.experiment
+    if first_stage(state) is None:
+        return f"{experiment.method.type!r} names no less expensive method as its first stage"
     reason = no_single_length(experiment.problem, experiment.random)
     return None if reason is None else f"the local criterion does not hold: {reason}"
 
@@ -93,34 +90,35 @@ def resembles(state: LimitState, draws: Array, values: Array) -> tuple[bool, str
     return share >= ALIKE, text
 
 
+def distinct(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return up to `count` positions with different values, in random order."""
+    _, first = np.unique(values, return_index=True)  # chains repeat states
+    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
+    return chosen
+
+
 def exact_doubts(
-    state: LimitState, draws: Array, values: Array, stress: float, probability: float
+    state: LimitState, near: tuple[Array, Array], stress: float, probability: float
 ) -> list[str]:
     """Solve some samples of the local criterion exactly; return a warning if they fail otherwise.
 
     Parameters
     ----------
-    state : LimitState
-    draws, values : arrays
-        Samples about the stress, such as those of the last level.
+    near : (draws, stresses)
+        Samples on both sides of the stress, the lowest there are.
     stress, probability : float
         Pa, and the estimate of P(onset < stress).
     """
-    exact = exact_counterpart(state.experiment)
+    exact, (draws, values) = exact_counterpart(state.experiment), near
     if exact is None or draws.shape[0] == 0:
         return []
     few, most = CHECKED
     cost = exact.method.seconds_per_sample(exact.problem)
     count = int(min(max(few, 10.0 / cost), most))
-    _, first = np.unique(values, return_index=True)  # chains repeat states
-    chosen = np.random.default_rng(0).permutation(first)[:count]
+    chosen = distinct(values, count, np.random.default_rng(0))
     state.meter.note = "checking by equilibrium"
     with collect_warnings():
-        try:
-            stresses = replace(state, experiment=exact)(draws[chosen])
-        except TimeUp as up:  # the answer is known: it is checked as far as the time goes
-            stresses = up.values
-    chosen, below = chosen[: stresses.size], stresses < stress
+        below = replace(state, experiment=exact)(draws[chosen]) < stress
     failed = values[chosen] < stress
     discordant = int(np.sum(below != failed))
     if abs(int(below.sum()) - int(failed.sum())) <= 2.0 * math.sqrt(max(discordant, 1)):

@@ -18,10 +18,9 @@ from stiction.errors import InputError
 from stiction.friction import SCALES
 from stiction.model import Count, checked, real_array
 from stiction.problem import Problem
-from stiction.progress import SILENT, Meter, Portions, TimeUp
+from stiction.progress import SILENT, Meter, Portions
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.random.stresses import coefficients_of
 
 Event = Literal["critical_stress", "first_instability"]
 
@@ -44,7 +43,7 @@ class LimitState:
     workers : int
         Threads. A sample does not depend on its batch, so the numbers do not depend on this.
     meter : Meter
-        Counts the samples, and limits the time.
+        Counts the samples.
     """
 
     experiment: Experiment
@@ -93,22 +92,16 @@ class LimitState:
         return result
 
     def __call__(self, draws: Array) -> Array:
-        """Return the stress at onset, Pa.
+        """Return the stress at onset, Pa: (samples,) or a number.
 
         Parameters
         ----------
         draws : (samples, dimension) or (dimension,) array
 
-        Returns
-        -------
-        (samples,) array, or a number
-
         Raises
         ------
         InputError
             If the draws are not finite numbers of this shape.
-        TimeUp
-            With the stresses of the first draws, if the time allowed is over before the last.
         """
         try:
             draws = real_array(draws)
@@ -120,15 +113,12 @@ class LimitState:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        if draws.ndim == 1:
-            return self(draws[None, :])[0]
-        found = np.empty(draws.shape[0])
-        for rows in self._portions(draws.shape[0]):
-            if self.meter.over:
-                raise TimeUp(found[: rows.start])
-            found[rows] = self._in_threads(draws[rows])
-            self.meter.advance(rows.stop - rows.start)
-        return found
+        rows = np.atleast_2d(draws)
+        found = np.empty(rows.shape[0])
+        for some in self._portions(rows.shape[0]):
+            found[some] = self._in_threads(rows[some])
+            self.meter.advance(some.stop - some.start)
+        return found if draws.ndim == 2 else found[0]
 
     def _in_threads(self, draws: Array) -> Array:
         fewest = 1 if self._portions.slow else FEWEST
@@ -180,20 +170,6 @@ def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
     except InputError:
         return "a critical patch does not fit on the interface"
     return None
-
-
-def alike_everywhere(experiment: Experiment) -> bool:
-    """Return whether a shifted sample slides at the same stress, by the local criterion."""
-    problem, random = experiment.problem, experiment.random
-    load, friction = problem.load, problem.friction
-    values = [
-        problem.load_profile, load.initial_stress, friction.residual_strength,
-        friction.residual_ratio, friction.weakening_rate,
-    ]  # fmt: skip
-    if coefficients_of(random):
-        values.append(load.normal_pressure)
-    uniform = all(value is None or np.ptp(value) == 0.0 for value in values)
-    return len(random.names) == 1 and uniform and no_single_length(problem, random) is None
 
 
 @checked

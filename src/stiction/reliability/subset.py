@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.model import check_memory
-from stiction.reliability.uncertainty import ancestral_variance, chain_correlation
+from stiction.reliability.uncertainty import ancestral_variance
 
 Integers = NDArray[np.int64]
 Function = Callable[[Array], Array]
 
+LEVEL_PROBABILITY = 0.1
+"""Share of a level's samples that go on."""
 ACCEPTANCE = 0.37
 """Share of steps to accept; from 0.25 to 0.44 the efficiency is the same within a tenth."""
 FIRST_STEP = 0.7
@@ -29,34 +31,6 @@ KEEP = 3
 """How many of the last populations keep their draws."""
 COPIES = KEEP + 2  # the states of the chains and their noise
 ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
-
-
-@dataclass(frozen=True)
-class Level:
-    """One level of a subset simulation.
-
-    Attributes
-    ----------
-    threshold : float
-        The next level holds the samples below it (the last level: the failures).
-    probability : float
-        Estimated share of this level that lies there.
-    acceptance : float
-        Share of Metropolis steps accepted; 1 at the first level, whose samples are independent.
-    step : float
-        b when the level was complete.
-    correlation : float
-        gamma of Au and Beck (2001).
-    ancestors : int
-        Distinct first-level ancestors among the samples that go on.
-    """
-
-    threshold: float
-    probability: float
-    acceptance: float
-    step: float
-    correlation: float
-    ancestors: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +44,24 @@ class Population:
         Logarithm of the estimated probability of the level.
     values : (samples,) array
     ancestors : (samples,) int array
-    chains : int
-        Sample i belongs to chain i modulo this.
-    draws : (about samples, dimension) array
+        The sample of the first level that each descends from.
+    draws : (samples, dimension) array
         Empty for early levels.
+    acceptance, step : float
+        Share of Metropolis steps accepted, and b at the end; the first level has none.
     """
 
     ceiling: float
     log_probability: float
     values: Array
     ancestors: Integers
-    chains: int
     draws: Array = field(repr=False)
+    acceptance: float = 1.0
+    step: float = FIRST_STEP
+
+    def without_draws(self) -> Population:
+        """Return the same without draws, which take nearly all of the memory."""
+        return replace(self, draws=np.empty((0, self.draws.shape[1])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +73,8 @@ class Descent:
     samples : int
         N, samples of the first level and, within a few, of each other.
     populations : tuple of Population
-    levels : tuple of Level
+    threshold : float
+        Below it lies the share of the last population that would go on; the failures, if complete.
     evaluations : int
         Calls of the function, counted by samples.
     complete : bool
@@ -102,7 +83,7 @@ class Descent:
 
     samples: int
     populations: tuple[Population, ...]
-    levels: tuple[Level, ...]
+    threshold: float
     evaluations: int
     complete: bool
 
@@ -112,16 +93,11 @@ class Descent:
         return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
 
     def light(self) -> Descent:
-        """The same without draws, which take nearly all of the memory."""
-        none = np.empty((0, 0))
-        populations = tuple(replace(population, draws=none) for population in self.populations)
-        return replace(self, populations=populations)
-
-    def population(self, value: float) -> Population:
-        """Return the rarest population that holds a value, with its draws if they are kept."""
-        return self._below(value)[0]
+        """Return the same without draws."""
+        return replace(self, populations=tuple(one.without_draws() for one in self.populations))
 
     def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
+        """Return the rarest population that holds a value, and which of its samples lie below."""
         holder = self.populations[0]
         for population in self.populations[1:]:
             if population.ceiling < value:
@@ -139,13 +115,23 @@ class Descent:
         population, below = self._below(value)
         return ancestral_variance(population.ancestors[below], self.samples)
 
-    def ancestors(self, value: float) -> Integers:
-        """First-level ancestors of the samples below a value."""
-        population, below = self._below(value)
-        return population.ancestors[below]
+    def around(self, value: float) -> tuple[Array, Array]:
+        """Return draws and values of samples on both sides of a value, in their true shares.
+
+        The lowest of a population, twice as many as lie below the value. A population of which
+        more than half does would show next to nothing of the other side.
+        """
+        holder, below = self._below(value)
+        for population in reversed(self.populations[: self.populations.index(holder)]):
+            if 2 * below.sum() <= below.size or not population.draws.size:
+                break
+            holder, below = population, population.values < value
+        count = min(2 * int(below.sum()), holder.draws.shape[0])
+        lowest = np.argsort(holder.values, kind="stable")[:count]
+        return holder.draws[lowest], holder.values[lowest]
 
 
-def _grow(
+def grow(
     function: Function,
     draws: Array,
     values: Array,
@@ -154,7 +140,7 @@ def _grow(
     step: float,
     rng: np.random.Generator,
 ) -> tuple[Array, Array, float, float]:
-    """Chains of `steps` states from given seeds; states, values, acceptance, last step size.
+    """Chains of `steps` states, the given ones first; states, values, acceptance, last step size.
 
     All chains move together, one call of the function a step; the step size follows the
     acceptance over all chains, ever more slowly.
@@ -175,23 +161,7 @@ def _grow(
         share = float(taken.mean())
         accepted += share
         step = min(1.0, step * math.exp((share - ACCEPTANCE) / math.sqrt(t)))
-    acceptance = accepted / (steps - 1) if steps > 1 else 1.0
-    return states.reshape(-1, dimension), found.ravel(), acceptance, step
-
-
-def conditional_chains(
-    function: Function,
-    draws: Array,
-    values: Array,
-    ceiling: float,
-    steps: int,
-    step: float,
-    rng: np.random.Generator,
-) -> tuple[Array, Array, float, float]:
-    """The same with the seeds left out: shape (steps * chains, ...), step after step."""
-    chains = draws.shape[0]
-    states, found, acceptance, step = _grow(function, draws, values, ceiling, steps + 1, step, rng)
-    return states[chains:], found[chains:], acceptance, step
+    return states.reshape(-1, dimension), found.ravel(), accepted / (steps - 1), step
 
 
 def descend(
@@ -203,8 +173,7 @@ def descend(
     threshold: float = -math.inf,
     probability: float = 0.0,
     floor: float = -math.inf,
-    level_probability: float = 0.1,
-    max_evaluations: int | None = None,
+    max_evaluations: float = math.inf,
 ) -> Descent:
     """Subset simulation down to a threshold or a probability, whichever comes first.
 
@@ -212,25 +181,16 @@ def descend(
     ----------
     function : callable
         From draws (k, dimension) to values (k,), whose low values are rare.
-    dimension : int
-    rng : numpy Generator
     samples : int
-        N of each level; ``samples * level_probability`` chains walk side by side.
+        N of each level; a tenth as many chains walk side by side.
     threshold : float
         Failure is a value below it; levels stop there.
     probability : float
         Or stop when a level's lowest share reaches this probability.
     floor : float
-        No value is below it. Where the lowest share of a level lies on it, it is complete:
-        there is nothing further down.
-    level_probability : float
-        Share p_0 of samples that go on.
+        No value is below it: a level whose lowest share lies on it is the last.
     max_evaluations : int, optional
         No level is begun that would exceed it.
-
-    Returns
-    -------
-    Descent
 
     Notes
     -----
@@ -243,22 +203,17 @@ def descend(
     that goes on as the threshold, each level would add one part in N p_0 to the estimate. Where
     the lowest values are all equal, none is strictly below: the next higher value is the threshold.
     """
-    count = max(2, round(samples * level_probability))
+    count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))
     check_memory("algorithm 'subset'", COPIES * 8.0 * samples * dimension, ADVICE)
     draws = rng.standard_normal((samples, dimension))
-    values = function(draws)
-    ancestors, chains = np.arange(samples), samples
-    ceiling, log_probability = math.inf, 0.0
-    step, acceptance, evaluations = FIRST_STEP, 1.0, samples
-    populations: list[Population] = []
-    levels: list[Level] = []
-    complete = False
+    populations = [Population(math.inf, 0.0, function(draws), np.arange(samples), draws)]
+    evaluations = samples
     while True:
-        populations.append(Population(ceiling, log_probability, values, ancestors, chains, draws))
+        here = populations[-1]
+        values = here.values
         if len(populations) > KEEP:
-            old = populations[-KEEP - 1]
-            populations[-KEEP - 1] = replace(old, draws=np.empty((0, dimension)))
+            populations[-KEEP - 1] = populations[-KEEP - 1].without_draws()
         lowest = float(np.partition(values, count)[count])
         final, bottom = lowest < threshold, lowest <= floor
         if final:
@@ -270,33 +225,18 @@ def descend(
         # States repeat along chains: with ties at the threshold a few fewer go on.
         chosen = values < lowest
         share = float(chosen.mean())
-        shaped = chosen.reshape(-1, chains)
-        levels.append(
-            Level(
-                threshold=lowest,
-                probability=share,
-                acceptance=acceptance,
-                step=step,
-                correlation=chain_correlation(shaped) if len(levels) else 0.0,
-                ancestors=int(np.unique(ancestors[chosen]).size),
-            )
-        )
-        stuck = share == 0.0 or len(levels) >= MOST_LEVELS
-        if share > 0.0:
-            reached = log_probability + math.log(share)
-            complete = final or bottom or reached <= math.log(max(probability, 1e-300))
+        reached = here.log_probability + math.log(share) if share else -math.inf
+        enough = reached <= math.log(max(probability, 1e-300))
+        complete = share > 0.0 and (final or bottom or enough)
         seeds = rng.permutation(np.flatnonzero(chosen))
         steps = max(2, round(samples / max(seeds.size, 1)))
         cost = seeds.size * (steps - 1)
-        over = max_evaluations is not None and evaluations + cost > max_evaluations
-        if complete or stuck or over:
-            break
-        log_probability += math.log(share)
-        ceiling = lowest
-        family = ancestors[seeds]
-        draws, values, acceptance, step = _grow(
-            function, draws[seeds], values[seeds], ceiling, steps, step, rng
+        stuck = share == 0.0 or len(populations) >= MOST_LEVELS
+        if complete or stuck or evaluations + cost > max_evaluations:
+            return Descent(samples, tuple(populations), lowest, evaluations, complete)
+        states, found, acceptance, step = grow(
+            function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )
-        ancestors, chains = np.tile(family, steps), seeds.size
+        family = np.tile(here.ancestors[seeds], steps)
+        populations.append(Population(lowest, reached, found, family, states, acceptance, step))
         evaluations += cost
-    return Descent(samples, tuple(populations), tuple(levels), evaluations, complete)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.progress import SILENT, Meter, TimeUp
-from stiction.reliability.guide import POOR, first_stage, resembles, two_levels_refused
+from stiction.progress import SILENT, Meter
+from stiction.reliability.counting import Count, tally
+from stiction.reliability.guide import first_stage, resembles, two_levels_refused
 from stiction.reliability.limit_state import LimitState
-from stiction.reliability.subset import descend
+from stiction.reliability.subset import MOST_LEVELS, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
@@ -27,38 +28,8 @@ DEEPER = 0.3
 """Repetitions go on to this share of a probability, to know the lower end of the interval."""
 PILOT = 500
 """Plain samples that tell whether a less expensive method is a guide."""
-
-
-class Repetition(Protocol):
-    """One independent estimate of a stretch of the lower tail."""
-
-    @property
-    def samples(self) -> int:
-        """Size; the variance falls like one over it."""
-
-    @property
-    def evaluations(self) -> int:
-        """Samples that the method was asked for."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether it came to an estimate."""
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress seen, Pa."""
-
-    def light(self) -> Any:
-        """Return the same without what only the last repetition is asked for."""
-
-    def probability(self, value: float) -> float:
-        """Return the estimate of P(onset < value)."""
-
-    def relative_variance(self, value: float) -> float:
-        """Return the squared coefficient of variation of it."""
-
-
-AnyRepetition = TypeVar("AnyRepetition", bound=Repetition)
+POOR = 0.02
+"""Of the samples that a guide leads to, those that fail: fewer, and it is no guide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +38,7 @@ class Tail:
 
     Attributes
     ----------
-    repetitions : sequence
+    repetitions : sequence of Descent or of Bridge
     algorithm, reason : str
         'subset' or 'two_level', and why.
     spent : int
@@ -85,10 +56,27 @@ class Tail:
         return bool(self.repetitions[0].complete)
 
     @property
+    def reached(self) -> float:
+        """Pa; of the last level of a subset simulation that is not complete."""
+        return float(np.nextafter(self.repetitions[0].threshold, math.inf))
+
+    def short_of(self, goal: str) -> str:
+        """Return in words that it does not reach as far down as asked for."""
+        text = f"{self.spent} evaluations do not reach {goal}"
+        if self.algorithm == "two_level":
+            return f"{text}: raise max_evaluations"
+        deep = len(self.repetitions[0].populations) >= MOST_LEVELS
+        return (
+            f"{text}: they have come down to {self.reached:.7g} Pa"
+            f" (P = {self.probability(self.reached):.2g});"
+            + (f" it stops after {MOST_LEVELS} levels" if deep else " raise max_evaluations")
+        )
+
+    @property
     def extent(self) -> tuple[float, float]:
         """Lowest and highest stress seen, Pa."""
-        lows, highs = zip(*(one.extent for one in self.repetitions), strict=True)
-        return min(lows), max(highs)
+        extents = [one.extent for one in self.repetitions]
+        return min(low for low, _ in extents), max(high for _, high in extents)
 
     @property
     def first_stage_evaluations(self) -> int:
@@ -118,6 +106,16 @@ class Tail:
                 variance += part * part * one.relative_variance(stress)
         return math.sqrt(variance) / whole
 
+    def counted(self, stress: float) -> Count | None:
+        """Return a count where failure is so likely that no repetition had a second level.
+
+        All samples are independent then.
+        """
+        populations: list[Any] = [getattr(one, "populations", ()) for one in self.repetitions]
+        if not self.complete or any(len(each) != 1 for each in populations):
+            return None
+        return tally(np.concatenate([each[0].values for each in populations]), stress)
+
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability."""
         low, high = self.extent
@@ -144,17 +142,19 @@ class Tail:
 
 
 def repeat_until_precise(
-    make: Callable[[int, int, int], AnyRepetition],
-    judge: Callable[[Sequence[AnyRepetition]], float],
+    make: Callable[[int, int, int], Any],
+    judge: Callable[[Sequence[Any]], float],
     *,
     target_cv: float,
     first: int,
     largest: int,
     max_evaluations: int,
     meter: Meter = SILENT,
-    enough: Callable[[AnyRepetition], bool] = lambda one: False,
-) -> list[AnyRepetition]:
+    enough: Callable[[Any], bool] = lambda one: False,
+) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
+
+    All of them are complete, or it is a single incomplete one.
 
     Parameters
     ----------
@@ -162,34 +162,15 @@ def repeat_until_precise(
         (samples, number of the repetition, evaluations left) to a repetition.
     judge : callable
         Coefficient of variation of some repetitions together.
-    target_cv : float
     first, largest : int
         Size of the first repetition and of the largest; many of moderate size bound the memory.
-    max_evaluations : int
-    meter : Meter
-        If its time is over, no repetition is begun, and one that is not finished does not count.
     enough : callable
         Whether the first repetition is such that no more are wanted.
-
-    Returns
-    -------
-    list of repetitions
-        All complete, or a single incomplete one.
-
-    Raises
-    ------
-    TimeUp
-        If the time is over before the first repetition is finished.
     """
-    done: list[AnyRepetition] = []
+    done: list[Any] = []
     spent, size = 0, first
     while True:
-        try:
-            one = make(size, len(done), max_evaluations - spent)
-        except TimeUp:
-            if not done:
-                raise
-            return done
+        one = make(size, len(done), max_evaluations - spent)
         spent += one.evaluations
         if not one.complete:
             return done or [one]
@@ -203,7 +184,7 @@ def repeat_until_precise(
         wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
-        if size < first or meter.over:
+        if size < first:
             return done
 
 
@@ -223,30 +204,18 @@ def sample_tail(
 
     Parameters
     ----------
-    state : LimitState
     algorithm : {"auto", "subset", "two_level"}
         'auto' takes two levels where a less expensive method is a guide to the weakest samples:
         where it picks the same ones among some plain samples, and the first repetition finds
         failures among the samples that it leads to.
     target_cv : float
         Of the probability at the stress, or at its own quantile.
-    seed, budget : int
-        The budget counts evaluations of the method.
-    stress : float, optional
-        Pa.
-    probability : float
-        Where no stress is given.
-    reason : str
-        Why the tail is sampled.
+    budget : int
+        Evaluations of the method, those of the pilot included.
     pilot : (draws, stresses), optional
-        Plain samples that are there already, and are not counted here.
-
-    Raises
-    ------
-    TimeUp
-        If the time is over before there is an estimate.
+        Plain samples that are there already.
     """
-    spent = 0
+    spent = 0 if pilot is None else pilot[1].size
     auto = algorithm == "auto"
     if auto:
         algorithm = "subset"
@@ -260,10 +229,10 @@ def sample_tail(
     def make(samples: int, number: int, left: int) -> Any:
         rng = generator(seed, 3 if algorithm == "two_level" else 1, number)
         if algorithm == "two_level":
-            guide = state.by(first_stage(state))
             return bridge(
-                guide, state, state.dimension, samples=samples, rng=rng, max_evaluations=left,
-                threshold=stress, probability=probability, floor=state.bounds[0],
+                state.by(first_stage(state)), state, state.dimension, samples=samples, rng=rng,
+                max_evaluations=left, threshold=stress, probability=probability,
+                floor=state.bounds[0],
             )  # fmt: skip
         return descend(
             state, state.dimension, samples=samples, rng=rng, max_evaluations=left,
@@ -275,24 +244,20 @@ def sample_tail(
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(probability) if stress is None else stress)
 
+    def is_poor(one: Any) -> bool:
+        return auto and algorithm == "two_level" and bool(one.complete and one.share < POOR)
+
     def repeated() -> list[Any]:
-        usual, largest = (
-            (BRIDGE, BRIDGE_MOST) if algorithm == "two_level" else (SUBSET, SUBSET_MOST)
-        )
+        both = (BRIDGE, BRIDGE_MOST) if algorithm == "two_level" else (SUBSET, SUBSET_MOST)
+        # Fewer than usual where the budget would not even hold four levels.
+        first = min(both[0], max((budget - spent) // 4, 20))
         return repeat_until_precise(
-            make,
-            judge,
-            target_cv=target_cv,
-            # Fewer than usual where the budget would not even hold four levels.
-            first=min(usual, max((budget - spent) // 4, 20)),
-            largest=largest,
-            max_evaluations=budget - spent,
-            meter=state.meter,
-            enough=lambda one: auto and algorithm == "two_level" and one.share < POOR,
-        )
+            make, judge, target_cv=target_cv, first=first, largest=both[1],
+            max_evaluations=budget - spent, meter=state.meter, enough=is_poor,
+        )  # fmt: skip
 
     found = repeated()
-    if auto and algorithm == "two_level" and found[0].complete and found[0].share < POOR:
+    if is_poor(found[0]):
         spent += sum(one.evaluations for one in found)
         label = first_stage(state).label
         reason += f"; of what fails by the {label} {found[0].share:.1%} fails: a poor guide"

@@ -15,19 +15,13 @@ known from elsewhere (`stiction.reliability.guide`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.reliability.subset import (
-    Descent,
-    Function,
-    Population,
-    conditional_chains,
-    descend,
-)
+from stiction.reliability.subset import Descent, Function, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
@@ -49,47 +43,42 @@ class Bridge:
     ----------
     samples : int
         Exact evaluations meant for the middle factor.
-    log_probability : float
-        Logarithm of the estimate of P(L < b).
+    descent : Descent
+        Of the guide, without draws.
+    evaluations, first_stage_evaluations : int
+        Of the exact limit state and of the guide.
+    complete : bool
+        Whether the exact limit state was asked. If it found no failure, the estimate is zero:
+        leaving it out of a mean would favour repetitions that found one.
+    ceiling, log_probability : float
+        b, Pa, and the logarithm of the estimate of P(L < b).
     values, ancestors : (samples,) arrays
         Exact stress of samples with L < b, and the guide's first samples they descend from.
     share : float
         Share of them that fails.
     last, last_variance : float
         P(L < b | E < s), and the squared coefficient of variation of its estimate.
-    evaluations, first_stage_evaluations : int
-        Of the exact limit state and of the guide.
-    ceiling : float
-        b, Pa.
-    descent : Descent
-        Of the guide, without draws.
     failing, failing_values : arrays
         Draws and exact stress of failing samples.
-    acceptance : float
-        Share of steps accepted by the walks in the failure set.
-    complete : bool
-        Whether the exact limit state was asked. If it found no failure, the estimate is zero:
-        leaving it out of a mean would favour repetitions that found one.
     """
 
     samples: int
-    log_probability: float
-    values: Array
-    ancestors: NDArray[np.int64]
-    share: float
-    last: float
-    last_variance: float
+    descent: Descent
     evaluations: int
     first_stage_evaluations: int
-    ceiling: float
-    descent: Descent
-    failing: Array
-    failing_values: Array
-    acceptance: float
-    complete: bool
+    complete: bool = False
+    ceiling: float = -math.inf
+    log_probability: float = -math.inf
+    values: Array = field(default_factory=lambda: np.zeros(0))
+    ancestors: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    share: float = 0.0
+    last: float = 1.0
+    last_variance: float = 0.0
+    failing: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    failing_values: Array = field(default_factory=lambda: np.zeros(0))
 
     def light(self) -> Bridge:
-        """The same; nothing in it is large."""
+        """Return the same; nothing in it is large."""
         return self
 
     @property
@@ -108,12 +97,6 @@ class Bridge:
         """Squared coefficient of variation of `probability(value)`."""
         family = self.ancestors[self.values < value]
         return ancestral_variance(family, self.values.size) + self.last_variance
-
-
-def _threshold(population: Population, values: Array, probability: float) -> float:
-    """Where the exact tail has this probability, as far as this population tells."""
-    share = probability / math.exp(population.log_probability)
-    return float(np.quantile(values, share)) if share < 1.0 else -math.inf
 
 
 def _covered(
@@ -149,14 +132,10 @@ def bridge(
     ----------
     guide, exact : callable
         From draws (k, dimension) to values (k,).
-    dimension : int
     samples : int
         Exact evaluations for the middle factor; as many again walk in the failure set.
-    rng : numpy Generator
     max_evaluations : int
         Of the exact limit state.
-    threshold : float, optional
-    probability : float
     floor : float
         No stress is below it.
     """
@@ -169,7 +148,7 @@ def bridge(
         probability=MARGIN * probability,
         floor=floor,
     )
-    first_stage, spent = descent.evaluations, 0
+    guided, spent = descent.evaluations, 0
     best: Bridge | None = None
     for population in reversed(descent.populations):
         if population.draws.shape[0] == 0 or spent + samples + STEPS > max_evaluations:
@@ -181,7 +160,8 @@ def bridge(
         if threshold is not None:
             limit = threshold
         else:
-            limit = _threshold(population, values, probability)
+            share = probability / math.exp(population.log_probability)
+            limit = float(np.quantile(values, share)) if share < 1.0 else -math.inf
             if limit == floor:  # so many lie on it that the probability asked for does, too
                 limit = math.nextafter(floor, math.inf)
         failed = values < limit
@@ -190,62 +170,39 @@ def bridge(
                 break
             if threshold is None:  # this level is rarer than the probability asked for
                 continue
-        last, last_variance, acceptance = 1.0, 0.0, 1.0
-        kept, kept_values = draws[failed], values[failed]
+        last, last_variance = 1.0, 0.0
+        failing, failing_values = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
-            walkers = min(kept_values.size, max(16, samples // STEPS), room)
-            states, found, acceptance, _ = conditional_chains(
-                exact,
-                kept[:walkers],
-                kept_values[:walkers],
-                limit,
-                STEPS,
-                descent.levels[-1].step,
-                rng,
-            )
-            spent += states.shape[0]
-            later = states[walkers * FORGOTTEN :]
+            walkers = min(failing_values.size, max(16, samples // STEPS), room)
+            # The seeds themselves come first, and do not count.
+            states, found, *_ = grow(
+                exact, failing[:walkers], failing_values[:walkers], limit, STEPS + 1,
+                descent.populations[-1].step, rng,
+            )  # fmt: skip
+            spent += walkers * STEPS
+            later = states[walkers * (1 + FORGOTTEN) :]
             last, last_variance = _covered(
                 later, guide, population.ceiling, families[failed][:walkers], samples
             )
-            first_stage += later.shape[0]
-            kept, kept_values = states[-walkers:], found[-walkers:]
+            guided += later.shape[0]
+            failing, failing_values = states[-walkers:], found[-walkers:]
         best = Bridge(
             samples=samples,
+            descent=descent.light(),
+            evaluations=spent,
+            first_stage_evaluations=guided,
+            complete=True,
+            ceiling=population.ceiling,
             log_probability=population.log_probability,
             values=values,
             ancestors=families,
             share=float(failed.mean()),
             last=last,
             last_variance=last_variance,
-            evaluations=spent,
-            first_stage_evaluations=first_stage,
-            ceiling=population.ceiling,
-            descent=descent.light(),
-            failing=kept,
-            failing_values=kept_values,
-            acceptance=acceptance,
-            complete=True,
+            failing=failing,
+            failing_values=failing_values,
         )
         if last >= COVERED:
             break
-    if best is not None:
-        return best
-    return Bridge(
-        samples=samples,
-        log_probability=-math.inf,
-        values=np.zeros(0),
-        ancestors=np.zeros(0, dtype=np.int64),
-        share=0.0,
-        last=1.0,
-        last_variance=0.0,
-        evaluations=spent,
-        first_stage_evaluations=first_stage,
-        ceiling=-math.inf,
-        descent=descent.light(),
-        failing=np.empty((0, dimension)),
-        failing_values=np.zeros(0),
-        acceptance=0.0,
-        complete=False,
-    )
+    return best or Bridge(samples, descent.light(), spent, guided)

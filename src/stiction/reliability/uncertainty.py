@@ -23,17 +23,8 @@ def log_width(cv: float, confidence: float) -> float:
 def lognormal_interval(probability: float, cv: float, confidence: float) -> tuple[float, float]:
     """Interval of an estimate whose logarithm is about normal, within [0, 1].
 
-    The coefficient of variation is itself estimated, from about 1/cv^2 independent families or
-    weights that matter, so Student's distribution takes the place of the normal one.
-
-    Parameters
-    ----------
-    probability : float
-        Estimate.
-    cv : float
-        Its coefficient of variation.
-    confidence : float
-        Such as 0.95.
+    The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
+    so Student's distribution takes the place of the normal one.
     """
     if not math.isfinite(cv):
         return 0.0, 1.0
@@ -58,6 +49,8 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
     correlation along chains, between chains of one ancestor and from level to level: the sum of
     (share - 1/N)^2 over the N first samples. With k families of equal size that is 1/k, where the
     variance of a mean of k calls for 1/(k - 1): hence a last division by one minus the sum.
+    The genealogy estimator of sequential Monte Carlo, after Chan and Lai (2013) and Lee and
+    Whiteley (2018).
 
     Parameters
     ----------
@@ -65,11 +58,6 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
         For each failing sample of the last level, the first-level sample it descends from.
     samples : int
         N.
-
-    Notes
-    -----
-    The genealogy estimator of sequential Monte Carlo, after Chan and Lai (2013) and Lee and
-    Whiteley (2018).
     """
     if ancestors.size == 0:
         return math.inf
@@ -77,33 +65,6 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
     shares = sizes / ancestors.size
     found = max(0.0, float(np.sum(shares * shares)) - 1.0 / samples)
     return found / (1.0 - found) if found < 1.0 else math.inf
-
-
-def chain_correlation(failed: NDArray[np.bool_]) -> float:
-    """gamma of Au and Beck (2001): by how much correlated steps inflate the variance.
-
-    Parameters
-    ----------
-    failed : (steps, chains) bool array
-        Whether each state of each chain fails.
-
-    Returns
-    -------
-    float
-        The variance of the mean is p (1 - p)(1 + gamma)/(steps * chains), were the chains
-        independent of each other.
-    """
-    indicator = failed.astype(np.float64)
-    mean = float(indicator.mean())
-    variance = mean * (1.0 - mean)
-    if variance == 0.0:
-        return 0.0
-    steps = indicator.shape[0]
-    total = 0.0
-    for lag in range(1, steps):
-        covariance = float(np.mean(indicator[:-lag] * indicator[lag:])) - mean * mean
-        total += 2.0 * (1.0 - lag / steps) * covariance / variance
-    return max(0.0, total)
 
 
 def generator(seed: int, *key: int) -> np.random.Generator:
