@@ -64,6 +64,15 @@ def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
     return f"{what}: unknown {shown}{hint} (valid: {', '.join(names)})"
 
 
+@contextmanager
+def prefixed(name: str) -> Iterator[None]:
+    """Let the mistakes that are found meanwhile begin with a name."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([f"{name}: {text}" for text in error.problems]) from None
+
+
 def warn_accuracy(message: str) -> None:
     """Issue an `AccuracyWarning` that points at the caller's own line, outside this package."""
     warn_user(message, AccuracyWarning)

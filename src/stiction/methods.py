@@ -7,17 +7,17 @@ from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import WrapValidator
 
 from stiction.errors import InputError
-from stiction.gaps import gather, with_gaps, without_gaps
 from stiction.model import Progress, checked, describe, to_plain
-from stiction.placing import Gaps
+from stiction.placing import with_gaps
 from stiction.problem import Problem, Sample, named_profiles, refusals
+from stiction.profiles import gather
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
     DIRECTION,
@@ -241,7 +241,7 @@ def onset(
     profiles: Any,
     *,
     method: MethodObject,
-    gaps: Gaps = "refuse",
+    gaps: Literal["refuse", "fill"] = "refuse",
     progress: Progress = True,
 ) -> xr.Dataset:
     """Compute at which load, and where, interfaces of given strength begin to slide.
@@ -258,9 +258,8 @@ def onset(
         see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         The method; there is no default.
-    gaps : {"refuse", "fill", "skip"}
-        Whether to refuse missing values (NaN), fill them with straight lines between their ends,
-        or drop the samples that contain any (the others keep their index).
+    gaps : {"refuse", "fill"}
+        Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
 
@@ -299,14 +298,9 @@ def onset(
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
-    numbers = None
-    if gaps == "skip" and measured is not None:
-        profiles, numbers = without_gaps(profiles, measured)
-        measured = None
     sample = problem.sample(profiles, accept=accepted(method))
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
     warn_of(problem, method, sample, values)
-    numbers = np.arange(sample.samples) if numbers is None else numbers
-    result = label(problem, method, values, numbers, attributes)
-    return result if measured is None else with_gaps(problem, result, measured)
+    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    return with_gaps(problem, result, measured)

@@ -1,13 +1,14 @@
-"""From points to nodes: coordinates decide where a value belongs, and no gap is closed unseen.
+"""Values put on the nodes of a line or a plane, and their gaps.
 
-All of it is the same on a line and on a plane. The nodes are x_i = i L/n in each direction,
-periodically: points may come in any order and begin anywhere.
+The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
+anywhere. What is missing stays NaN until somebody asks for it to be filled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,24 @@ from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Gaps = Literal["refuse", "fill", "skip"]
+Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
 SHOWN = 3
+IN_GAP, GAPS = "in_gap", "gaps"
+"""Variable and attribute of a result."""
+OF_A_PLANE = (
+    "; a map over x and y is read with the plane it belongs to,"
+    " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
+)
+"""What to do with two dimensions where a line was expected."""
 
 
 class Points(NamedTuple):
@@ -31,7 +43,7 @@ class Points(NamedTuple):
     Attributes
     ----------
     values : (..., points) array
-        Or (..., *shape) in the order of the nodes.
+        Or (..., *shape) in the order of the nodes. NaN where there is no value.
     places : dict of (points,) arrays
         m, along each direction; empty if the values come in the order of the nodes.
     measured : array of bool or None
@@ -40,235 +52,201 @@ class Points(NamedTuple):
 
     values: Array
     places: dict[str, Array]
-    measured: NDArray[np.bool_] | None = None
+    measured: Mask | None = None
 
 
-class AtNodes(NamedTuple):
-    """Values at the nodes.
+def place(
+    points: Points, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
+) -> tuple[Array, Mask | None]:
+    """Put values on the nodes of an interface.
 
-    Attributes
-    ----------
+    Returns
+    -------
     values : (..., *shape) array
     measured : (..., *shape) array of bool or None
         False where there was no value, be it filled in or left out; None if nothing is missing.
     """
-
-    values: Array
-    measured: NDArray[np.bool_] | None
-
-
-def place(
-    points: Points, interface: Interface, *, interpolate: bool = False, gaps: Gaps = "refuse"
-) -> AtNodes:
-    """Put values on the nodes of an interface.
-
-    Parameters
-    ----------
-    points : Points
-        NaN where there is no value.
-    interface : Interface
-    interpolate : bool
-        Whether points of a line may lie elsewhere than the nodes; then linearly and periodically.
-    gaps : {"refuse", "fill", "skip"}
-
-    Raises
-    ------
-    InputError
-        If points repeat, reach beyond a period or lie elsewhere than the nodes, or values are
-        missing and may not be filled in.
-    """
-    values, measured = points.values, points.measured
-    if not points.places:
+    values, places, measured = points
+    if not places:
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
             raise InputError(_other_shape(shape, interface))
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
-    problems: list[str] = []
-    put = _put(points.places, values, interface, interpolate, problems)
-    if problems and np.isnan(values).any() and gaps == "refuse":
-        problems.append(
-            f"{int(np.isnan(values).sum())} of {values.size} points have no value (NaN); fill such"
-            " gaps with gaps='fill'"
+    offsets = [_offset(dim, places[dim], interface) for dim in interface.dims]
+    between = None in offsets
+    if between and not interpolate:
+        raise InputError(_elsewhere(points, offsets, interface, gaps))
+    # Between the nodes, places differ if they are a millionth of the spacing apart.
+    shape = tuple(10**6 * n for n in interface.shape) if between else interface.shape
+    index = []
+    for dim, n, length, offset in zip(
+        interface.dims, shape, interface.lengths, offsets, strict=True
+    ):
+        step = np.round(places[dim] / (length / n) - (offset if offset and not between else 0.0))
+        index.append(np.mod(step, n).astype(np.int64))
+    node, first, twins = np.unique(
+        np.ravel_multi_index(index, shape), return_index=True, return_inverse=True
+    )
+    _check_repeats(points, first[twins], interface)
+
+    def put(rows: Array) -> Array:
+        if between:
+            return _interpolated(places["x"][first], rows[..., first], interface)
+        full = np.full((*rows.shape[:-1], interface.size), np.nan)
+        full[..., node] = rows[..., first]
+        return full.reshape(*rows.shape[:-1], *interface.shape)
+
+    if between:
+        warn_accuracy(
+            f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
+            f" {interface.spacing:.3g} m apart"
         )
-    if problems:
-        raise InputError(problems)
     if measured is not None:
         measured = put(measured * 1.0) > 0.999
     return close_gaps(put(values), measured, interface, gaps)
 
 
+def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
+    """What to say of a shape of a plane if its axes have changed places."""
+    if len(shape) == 2 and given == shape[::-1]:
+        return "; x and y have changed places: the first axis of a profile is x"
+    return ""
+
+
 def _other_shape(shape: tuple[int, ...], interface: Interface) -> str:
     if interface.is_plane:
-        turned = shape == interface.shape[::-1] != interface.shape
-        hint = "; x and y have changed places: the first axis of a profile is x" * turned
+        hint = turned(shape, interface.shape)
         return f"must have shape {interface.shape}, got shape {shape}{hint}"
     return (
-        f"has {shape[-1] if shape else 1} values, the interface has {interface.size} nodes"
-        " (interface.size); give a value for each node, or x beside the values (x=... names its"
-        " column), with interpolate=True where points lie elsewhere than the nodes"
+        f"has {shape[-1] if shape else 1} values, the interface has {interface.size} nodes; give a"
+        " value for each node, or x beside the values (x=... names its column), with"
+        " interpolate=True where points lie elsewhere than the nodes"
     )
 
 
-def _put(
-    places: dict[str, Array], values: Array, interface: Interface, interpolate: bool,
-    problems: list[str],
-) -> Callable[[Array], Array]:  # fmt: skip
-    """A function that puts values (..., points) on the nodes, NaN where there are none."""
-    kept: Any = slice(None)
-    at = []
-    for axis, dim in enumerate(interface.dims):
-        n, spacing, length = (
-            interface.shape[axis],
-            interface.spacings[axis],
-            interface.lengths[axis],
-        )
-        x, which = np.unique(places[dim], return_inverse=True)
-        if not np.all(np.isfinite(x)):
-            entry = int(np.argmin(np.isfinite(places[dim])))
-            raise InputError(f"{dim} must be finite; entry {entry} is not")
-        if x[-1] - x[0] > length + TOLERANCE * spacing:
-            raise InputError(_too_long(dim, x, length))
-        if abs(x[-1] - x[0] - length) <= TOLERANCE * spacing:
-            kept = _without_closing_points(dim, which, x, values, interface)
-        again = np.flatnonzero(np.diff(x) <= 1e-6 * spacing)
-        if again.size or (len(places) == 1 and x.size < which.size):
-            first = int(again[0]) if again.size else int(np.argmax(np.bincount(which) > 1))
-            last = min(first + 1, x.size - 1) if again.size else first
-            raise InputError(f"{dim} repeats: {x[first]:.9g} and {x[last]:.9g} m are one place")
-        offset = _offset(x, n, spacing, length, coarse=interface.is_plane)
-        if offset is None and not interpolate:
-            problems.append(_elsewhere(dim, x, n, spacing))
-            continue
-        if offset is None:
-            return lambda rows: _interpolated(places[dim][kept], rows[..., kept], interface)
-        if abs(offset) > TOLERANCE:
-            warn_accuracy(
-                f"{dim} lies {offset:.2g} of a spacing beside the nodes {dim}_i = i L/n, as at the"
-                f" centres of cells: node i stands for {dim}_i {offset * spacing:+.4g} m, to be"
-                " added to positions in the result"
-            )
-        at.append(np.round(x / spacing - offset).astype(np.int64)[which] % n)
-    if problems:
-        return lambda rows: rows
-    flat = np.ravel_multi_index([index[kept] for index in at], interface.shape)
-    if np.unique(flat).size < flat.size:
-        raise InputError(f"{' and '.join(interface.dims)} repeat: two points lie at one node")
-
-    def put(rows: Array) -> Array:
-        full = np.full((*rows.shape[:-1], interface.size), np.nan)
-        full[..., flat] = rows[..., kept]
-        return full.reshape(*rows.shape[:-1], *interface.shape)
-
-    return put
-
-
-def _too_long(dim: str, x: Array, length: float) -> str:
-    hint = (
-        f"crop the record, as profile.sel({dim}=slice(0, ...)) does, or make interface.length"
-        f" {float(x[-1] - x[0]):.6g} m"
-    )
-    for unit, factor in (("mm", 1e-3), ("um", 1e-6)):
-        if 0.3 * length < factor * (x[-1] - x[0]) <= 1.001 * length:
-            hint = f"if x is in {unit}, say so: units of x in the file, or x_unit={unit!r}"
-    return (
-        f"{dim} reaches from {x[0]:g} to {x[-1]:g} m, the interface is {length:g} m long"
-        f" (interface.extent); {hint}"
-    )
-
-
-def _without_closing_points(
-    dim: str, which: NDArray[np.int64], x: Array, values: Array, interface: Interface
-) -> NDArray[np.bool_]:
-    """All points but the last, which are the first ones again, a period later."""
-    first, last = which == 0, which == x.size - 1
-    if not np.array_equal(values[..., first], values[..., last], equal_nan=True):
-        raise InputError(
-            f"{dim} = {x[0]:g} and {x[-1]:g} m are one place of an interface with the period"
-            f" {interface.length} m (interface.extent), with two values; leave out one end, as"
-            " np.linspace(0, L, n, endpoint=False) does"
-        )
-    return ~last
-
-
-def _offset(x: Array, n: int, spacing: float, length: float, *, coarse: bool) -> float | None:
+def _offset(dim: str, x: Array, interface: Interface) -> float | None:
     """By how many spacings, in (-0.5, 0.5], all points lie beside nodes; None if by no one number.
 
-    On a line, a grid that is coarser than the nodes does not count, even if its points are nodes.
+    On a line, a grid that is coarser than the nodes is to be interpolated, even if its points are
+    nodes.
     """
-    if abs(x[-1] - x[0] - length) <= TOLERANCE * spacing:
-        x = x[:-1]
-    at = x / spacing
-    if at.size < 2 or (not coarse and np.median(np.diff(at)) > 1.5):
-        return 0.0 if coarse and abs(at[0] - round(at[0])) <= TOLERANCE else None
+    axis = interface.dims.index(dim)
+    spacing, length = interface.spacings[axis], interface.lengths[axis]
+    if not np.all(np.isfinite(x)):
+        raise InputError(f"{dim} must be finite; entry {int(np.argmin(np.isfinite(x)))} is not")
+    at = np.unique(x) / spacing
+    if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
+        raise InputError(
+            f"{dim} reaches from {x.min():g} to {x.max():g} m, the interface is {length:g} m long:"
+            f" check the unit of {dim}, crop the record, or make interface.length {np.ptp(x):.6g}"
+        )
+    if not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5):
+        return None
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
     deviation = at - first - np.round(at - first)
-    return float(first + deviation.mean()) if np.abs(deviation).max() <= TOLERANCE else None
+    if np.abs(deviation).max() > TOLERANCE:
+        return None
+    offset = float(first + deviation.mean())
+    if abs(offset) > TOLERANCE:
+        warn_accuracy(
+            f"{dim} lies {offset:.2g} of a spacing beside the nodes {dim}_i = i L/n, as at the"
+            f" centres of cells: node i stands for {dim}_i {offset * spacing:+.4g} m, to be"
+            " added to positions in the result"
+        )
+    return offset
 
 
-def _elsewhere(dim: str, x: Array, n: int, spacing: float) -> str:
-    step = float(np.median(np.diff(x))) if x.size > 1 else 0.0
-    fit = f", or interface.length = {x.size * step:.6g}" if x.size == n else ""
-    hint = ""
-    for unit, factor in (("mm", 1e-3), ("um", 1e-6), ("km", 1e3)):
-        if abs(factor * step / spacing - 1.0) < 1e-3:
-            hint = f"; if x is in {unit}, say so: units of x in the file, or x_unit={unit!r}"
-    return (
-        f"{dim} lies elsewhere than the {n} nodes {dim}_i = i L/n: {x.size} points from"
-        f" {x[0]:.6g} to {x[-1]:.6g} m, {step:.6g} m apart, the nodes {spacing:.6g} m"
-        f" (interface.extent / interface.size); give values at the nodes{fit}, or ask for linear"
-        f" interpolation with interpolate=True{hint}"
-    )
+def _elsewhere(
+    points: Points, offsets: list[float | None], interface: Interface, gaps: Gaps
+) -> list[str]:
+    """Why points cannot be put on the nodes as they are, and all that is to be decided."""
+    problems = []
+    advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
+    for dim, n, h, offset in zip(
+        interface.dims, interface.shape, interface.spacings, offsets, strict=True
+    ):
+        if offset is None:
+            x = np.unique(points.places[dim])
+            step = np.ptp(x) / max(x.size - 1, 1)
+            problems.append(
+                f"{dim} lies elsewhere than the {n} nodes {dim}_i = i L/n, which are {h:.6g} m"
+                f" apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m, {step:.6g} m apart;"
+                f" check the unit of {dim}, give values at the nodes, as np.linspace(0, L, n,"
+                f" endpoint=False) does{advice}"
+            )
+    missing = int(np.isnan(points.values).sum())
+    if missing and gaps == "refuse":
+        problems.append(f"{missing} points have no value (NaN); fill such gaps with gaps='fill'")
+    return problems
+
+
+def _check_repeats(points: Points, twins: NDArray[np.int64], interface: Interface) -> None:
+    """Refuse two points at one place, unless they have the same value a period apart."""
+    others = np.flatnonzero(twins != np.arange(twins.size))
+    if not others.size:
+        return
+    pairs = np.stack([twins[others], others])
+    first, second = np.moveaxis(points.values[..., pairs], -2, 0)
+    same = ((first == second) | (np.isnan(first) & np.isnan(second))).reshape(-1, others.size)
+    apart = [
+        np.ptp(points.places[dim][pairs], axis=0) > 0.5 * length
+        for dim, length in zip(interface.dims, interface.lengths, strict=True)
+    ]
+    wrong = ~(same.all(axis=0) & np.any(apart, axis=0))
+    if wrong.any():
+        two = pairs[:, int(np.argmax(wrong))]
+        where = [f"{dim} = {a:.9g} and {b:.9g} m" for dim, (a, b) in
+                 ((dim, x[two]) for dim, x in points.places.items())]  # fmt: skip
+        raise InputError(
+            f"{', '.join(where)} are one place of an interface with the period {interface.length}"
+            f" m; keep one of the two values{OF_A_PLANE * (not interface.is_plane)}"
+        )
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     """Linear between points, and NaN in intervals that are gaps."""
     length, nodes = interface.extent, interface.x
-    order = np.argsort(x, kind="stable")
+    margin = TOLERANCE * interface.spacing
+    x = np.mod(x, length)
+    order = np.argsort(x)
     x, rows = x[order], values.reshape(-1, x.size)[:, order]
-    found = np.empty((rows.shape[0], nodes.size))
     typical = float(np.median(np.diff(x))) if x.size > 1 else length
-    widest = 0.0
+    widest = WIDE * max(typical, interface.spacing)
+    found = np.empty((rows.shape[0], nodes.size))
     for row, target in zip(rows, found, strict=True):
         known = np.flatnonzero(~np.isnan(row))
         if known.size == 0:
             raise InputError("has no value at all")
         begin = x[known]
+        width = np.diff(begin, append=begin[0] + length)
+        is_gap = (width > widest) | (np.diff(known, append=known[0] + x.size) > 1)
+        interval = np.searchsorted(begin, nodes, side="right") - 1
+        into = np.mod(nodes - begin[interval], length)
+        inside = (into > margin) & (into < width[interval] - margin)
         target[:] = np.interp(nodes, begin, row[known], period=length)
-        end = np.append(begin[1:], begin[0] + length)
-        left_out = np.append(np.diff(known) > 1, known[-1] - known[0] < x.size - 1)
-        wide = (end - begin > WIDE * max(typical, interface.spacing)) | left_out
-        widest = max(widest, float(np.max((end - begin)[~wide], initial=0.0)))
-        margin = TOLERANCE * interface.spacing
-        for a, b in zip(begin[wide], end[wide], strict=True):
-            into = np.mod(nodes - a, length)
-            target[(into > margin) & (into < b - a - margin)] = np.nan
-    warn_accuracy(
-        f"{x.size} points are interpolated linearly to {nodes.size} nodes; the widest distance"
-        f" between them is {widest:.3g} m, {widest / interface.spacing:.3g} times the spacing of"
-        " nodes"
-    )
+        target[inside & is_gap[interval]] = np.nan
     return found.reshape(*values.shape[:-1], nodes.size)
 
 
 def close_gaps(
-    values: Array, measured: NDArray[np.bool_] | None, interface: Interface, gaps: Gaps
-) -> AtNodes:
+    values: Array, measured: Mask | None, interface: Interface, gaps: Gaps
+) -> tuple[Array, Mask | None]:
     """Values (..., *shape) with NaN where nothing was measured, refused, left or filled."""
     missing = np.isnan(values)
     if not missing.any():
-        return AtNodes(values, measured)
+        return values, measured
     text = describe_gaps(missing, interface)
     how = "smoothly from around them" if interface.is_plane else "with straight lines"
     if gaps == "refuse":
         raise InputError(
-            f"must be finite: there {text}; give what was measured, or fill gaps {how}, which the"
-            f" result then remembers: gaps='fill'{_much_missing(missing, interface)}"
+            f"must be finite: there {text}; give what was measured, make interface.length that of"
+            f" the record, or fill gaps {how}, which the result then remembers: gaps='fill'"
         )
     whole = ~missing if measured is None else ~missing & measured
     if gaps == "skip":
-        return AtNodes(values, whole)
+        return values, whole
     filled = values.reshape(-1, *interface.shape).copy()
     for one, hole in zip(filled, missing.reshape(filled.shape), strict=True):
         if hole.all():
@@ -276,24 +254,10 @@ def close_gaps(
         if hole.any():
             _fill(one, hole, interface.spacings)
     warn_accuracy(f"there {text}; filled {how}")
-    return AtNodes(filled.reshape(values.shape), whole)
+    return filled.reshape(values.shape), whole
 
 
-def _much_missing(missing: NDArray[np.bool_], interface: Interface) -> str:
-    """What to do where a record is much shorter than the interface."""
-    if interface.is_plane or missing.ndim > 1:
-        return ""
-    gap = max((b - a) % interface.extent for a, b in gaps_of(missing, interface))
-    if gap < 0.25 * interface.extent:
-        return ""
-    length = interface.extent - gap - interface.spacing
-    return (
-        f". The record covers {length:.4g} m of the interface; if it holds no more, make"
-        f" interface.length {length:.6g}"
-    )
-
-
-def _fill(values: Array, hole: NDArray[np.bool_], spacings: tuple[float, ...]) -> None:
+def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
     """Solve Laplace's equation of the nodes in the hole, periodically.
 
     The measured nodes around it are its rim: on a line that is the straight line between the ends,
@@ -325,7 +289,7 @@ def _fill(values: Array, hole: NDArray[np.bool_], spacings: tuple[float, ...]) -
     values[hole] = spsolve(matrix.tocsc(), right)
 
 
-def gaps_of(missing: NDArray[np.bool_], interface: Interface) -> list[tuple[float, float]]:
+def gaps_of(missing: Mask, interface: Interface) -> list[tuple[float, float]]:
     """Return where nodes of a line lack a value: first and last, m; first > last across x = 0."""
     if missing.all():
         return [(0.0, float(interface.x[-1]))]
@@ -337,19 +301,67 @@ def gaps_of(missing: NDArray[np.bool_], interface: Interface) -> list[tuple[floa
     return [(float(x[a]), float(x[b])) for a, b in zip(starts, ends, strict=True)]
 
 
-def describe_gaps(missing: NDArray[np.bool_], interface: Interface) -> str:
+def describe_gaps(missing: Mask, interface: Interface) -> str:
     """Say 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
     maps = missing.reshape(-1, *interface.shape)
-    with_gaps = maps.reshape(len(maps), -1).any(axis=1)
-    row = int(np.argmax(with_gaps))
-    count = f"{int(maps[row].sum())} of {interface.size} nodes"
-    which = f" in sample {row}" if len(maps) > 1 else ""
-    others = int(with_gaps.sum()) - 1
-    which += f", and in {others} more samples" if others else ""
+    gaps = maps.reshape(len(maps), -1).sum(axis=1)
+    row = int(np.argmax(gaps > 0))
+    count = f"{gaps[row]} of {interface.size} nodes"
+    if len(maps) > 1:
+        count += f" of sample {row}; {(gaps > 0).sum()} of {len(maps)} samples have gaps"
     if interface.is_plane:
         first = interface.describe_node(int(np.argmax(maps[row])))
-        return f"are no values (NaN) at {count}, the first at {first}{which}"
+        return f"are no values (NaN) at {count}, the first at {first}"
     spans = gaps_of(maps[row], interface)
     at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in spans[:SHOWN])
     more = f" and {len(spans) - SHOWN} more gaps" if len(spans) > SHOWN else ""
-    return f"are no values (NaN) at x = {at}{more} ({count}{which})"
+    return f"are no values (NaN) at x = {at}{more} ({count})"
+
+
+def with_gaps(problem: Any, result: xr.Dataset, measured: Mask | None) -> xr.Dataset:
+    """Return a result that says where its profiles have gaps, and which onsets lie in one."""
+    if measured is None:
+        return result
+    interface = problem.interface
+    position = result["critical_position"]
+    places = np.reshape(position.values, (-1, len(interface.shape)))
+    inside = _missing_near(interface, places, measured, interface.spacings)
+    rate = problem.uniform_rate
+    patch = interface.spacings if rate is None else problem.nucleation_lengths(rate)
+    near = _missing_near(interface, places, measured, [0.5 * h for h in patch]) & ~inside
+    for where, what in (
+        (inside, "the onset at {} lies in"),
+        (near, "the critical patch at {} reaches into"),
+    ):
+        if where.any():
+            first = places[int(np.argmax(where))]
+            at = ", ".join(f"{d} = {v:.6g} m" for d, v in zip(interface.dims, first, strict=True))
+            warn_accuracy(
+                f"{what.format(at)} a gap of the profile ({where.sum()} of {where.size} samples):"
+                " the strength there was filled in, not measured"
+            )
+    dims = tuple(dim for dim in position.dims if dim != "direction")
+    attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
+    result[IN_GAP] = (dims, inside.reshape([position.sizes[dim] for dim in dims]), attributes)
+    if not interface.is_plane and np.all(measured == measured[:1]):
+        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], interface))
+    return result
+
+
+def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[float]) -> Mask:
+    """Whether nodes nearer than `reach` (m, in each direction) to places (k, D) are missing."""
+    found = np.zeros(len(places), dtype=np.bool_)
+    maps = np.broadcast_to(measured, (len(places), *interface.shape))
+    for i in np.flatnonzero(np.isfinite(places).all(axis=1)):
+        missing = ~maps[i]
+        for axis, nodes in enumerate(interface.coordinates.values()):
+            length = interface.lengths[axis]
+            apart = np.abs(np.mod(nodes - places[i, axis] + 0.5 * length, length) - 0.5 * length)
+            missing = np.compress(apart < (1.0 - 1e-9) * reach[axis], missing, axis=axis)
+        found[i] = missing.any()
+    return found
+
+
+def stored_gaps(result: xr.Dataset) -> list[tuple[float, float]]:
+    """Return the gaps that all profiles have: first and last node without a value, m."""
+    return [(float(a), float(b)) for a, b in json.loads(result.attrs.get(GAPS, "[]"))]

@@ -16,7 +16,7 @@ from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, Names, check, describe, is_unplaced, model, real_array
-from stiction.placing import describe_gaps
+from stiction.placing import describe_gaps, turned
 from stiction.profiles import at_nodes, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
@@ -195,7 +195,7 @@ class Problem:
                 if isinstance(value, np.ndarray) and value.shape != shape:
                     problems.append(
                         f"{part}.{field.name}: must have one entry for each of the {nodes} nodes,"
-                        f" got {describe(value)}{_turned(value.shape, shape)}"
+                        f" got {describe(value)}{turned(value.shape, shape)}"
                     )
         if isinstance(load.profile, LoadShape):
             load.profile.on(self.interface)  # refuses one that is not positive
@@ -513,7 +513,7 @@ def profiles_of(
     if samples is not None:
         valid += f", ({samples}, 1) or a number"
     try:
-        array = real_array(at_nodes(name, value, name, interface).values)
+        array = real_array(at_nodes(name, value, name, interface)[0])
     except TypeError as error:
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
     if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
@@ -525,8 +525,8 @@ def profiles_of(
             array = array.reshape(column)
         allowed |= {(), (samples, *shape), column}
     if array.shape not in allowed and not (samples is None and array.shape[1:] == shape):
-        turned = _turned(array.shape[-2:], shape)
-        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{turned}")
+        hint = turned(array.shape[-2:], shape)
+        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{hint}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
     _check_finite(name, array, interface, infinite)
@@ -564,12 +564,6 @@ def named_profiles(given: Any) -> dict[str, Any]:
             raise InputError([unknown_name("profiles", name, PROFILES) for name in unknown])
         return {name: given[name] for name in names if name in PROFILES}
     return {"strength": given}
-
-
-def _turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    if len(shape) == 2 and given == shape[::-1]:
-        return "; x and y have changed places: the first axis of a profile is x"
-    return ""
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

@@ -6,15 +6,15 @@ import csv
 import io
 import os
 import re
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
+from stiction.placing import OF_A_PLANE
 from stiction.units import parse
 
 if TYPE_CHECKING:
@@ -23,71 +23,44 @@ if TYPE_CHECKING:
 TEXT, NETCDF = (".csv", ".txt", ".dat", ".tsv"), (".nc", ".nc4")
 LARGEST = 2**30
 """Bytes; a profile is one line of numbers, and what is larger than this is something else."""
-OF_A_PLANE = (
-    "; a map over x and y is read with the plane it belongs to,"
-    " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
-)
-"""What to do with two dimensions where a line was expected."""
+
+_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
+_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
+_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*$")
+_WHOLE = re.compile(r"[+-]?\d+$")
 
 
-def load(path: Path, value: Any, dims: tuple[str, ...]) -> xr.Dataset:
-    """The variables of a file; those of a table are along 'row'."""
+def load(path: Path, dims: tuple[str, ...]) -> xr.Dataset | xr.DataArray:
+    """Read a file: its variables, those of a table along 'row', or the one array of an .npy."""
     import xarray as xr
 
     ending = path.suffix.lower()
     if ending in TEXT:
-        return _dataset(read_table(path))
+        return read_table(path)
     if ending in NETCDF:
         _content(path, read=False)
         try:
             # Times are not decoded: a variable in seconds is refused by its unit, like any other.
             with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
                 kept = [
-                    name for name, one in opened.data_vars.items()
-                    if one.dtype.kind in "fiu" and one.nbytes <= LARGEST
-                    and sum(size != 1 for size in one.shape) == len(dims)
-                ]  # fmt: skip
+                    name
+                    for name, one in opened.data_vars.items()
+                    if one.dtype.kind in "fiu" and one.squeeze().ndim == len(dims)
+                ]
                 return opened[kept].squeeze(drop=True).load()
         except (OSError, ValueError, RuntimeError, KeyError, AttributeError, TypeError) as error:
             raise InputError(f"is no NetCDF file of numbers: {error}") from None
     if ending != ".npy":
         raise InputError(
-            f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r}; files"
-            " of instruments: give what SurfaceTopography.read_topography(path) returns"
+            f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r};"
+            " export text from the instrument's software, or give a DataArray"
         )
     array = read_npy(path)
-    if len(dims) == 2:
-        if value is not None:
-            raise InputError(
-                "value: a .npy file of a plane holds one array, without names; got"
-                f" {describe(value)}"
-            )
-        if array.ndim != 2:
-            raise InputError(f"must have shape (nx, ny), got shape {array.shape}")
-        return xr.Dataset({"0": (dims, array, {"unnamed": True})})
-    if array.ndim == 1 and array.size:
-        return _dataset(Table([None], [None], [None], array[np.newaxis]))
-    if array.ndim == 2 and array.size and value is not None:
-        blank: list[None] = [None] * array.shape[1]
-        return _dataset(Table(blank, blank, blank, array.T))
-    hint = f"; of an array of columns say which: x=0, value=1{OF_A_PLANE}" * (array.ndim == 2)
-    raise InputError(f"must hold one profile, shape (nodes,), got shape {array.shape}{hint}")
-
-
-def _dataset(table: Table) -> xr.Dataset:
-    """The columns as variables along 'row'."""
-    import xarray as xr
-
-    variables: dict[str, Any] = {}
-    for number, (name, unit, heading, column) in enumerate(zip(*table, strict=True)):
-        attributes: dict[str, Any] = {"units": unit} if unit else {}
-        attributes["number"] = number
-        attributes |= {"unnamed": True} if name is None else {"heading": heading}
-        key = str(number) if name is None else name
-        if key in variables:
-            key = str(heading) if heading not in variables else f"{key} {number}"
-        variables[key] = ("row", column, attributes)
-    return xr.Dataset(variables)
+    if array.ndim != len(dims) or array.size == 0:
+        hint = f"; save columns as text{OF_A_PLANE}" * (array.ndim == 2)
+        valid = "(nodes,)" if len(dims) == 1 else "(nx, ny)"
+        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
+    return xr.DataArray(array, dims=dims)
 
 
 def _content(path: Path, *, read: bool = True) -> bytes:
@@ -104,10 +77,9 @@ def _content(path: Path, *, read: bool = True) -> bytes:
 
 
 def read_npy(path: Path) -> Array:
+    data = _content(path)
     try:
-        array = np.load(io.BytesIO(_content(path)), allow_pickle=False)
-    except InputError:
-        raise
+        array = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as error:  # numpy lets through whatever Python's own parser raises
         text = str(error).splitlines()[0] if str(error) else "its header cannot be read"
         raise InputError(f"is not a .npy file of numbers: {text}") from None
@@ -116,29 +88,7 @@ def read_npy(path: Path) -> Array:
     return np.squeeze(array.astype(np.float64))
 
 
-_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
-_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
-_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*$")
-
-
-class Table(NamedTuple):
-    """Columns of numbers.
-
-    Attributes
-    ----------
-    names, units, headings : sequences of str or None
-        One entry for each column; None where the file says nothing.
-    columns : (columns, lines) array
-        NaN where a cell is empty.
-    """
-
-    names: Sequence[str | None]
-    units: Sequence[str | None]
-    headings: Sequence[str | None]
-    columns: Array
-
-
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> xr.Dataset:
     """Read a table of numbers from a text file.
 
     Columns are separated by semicolons, tabs, commas or blanks, in this order of preference; the
@@ -146,14 +96,23 @@ def read_table(path: Path) -> Table:
     the last one before the numbers names the columns if no other line does. Names may have a line
     of units below them, and lines of another number of cells above them.
 
+    Returns
+    -------
+    xarray.Dataset
+        The columns, along 'row', NaN where a cell is empty, with `units`, `heading` and `number`
+        (from 0) as attributes. Columns without names are called by their numbers, and have no
+        `heading`.
+
     Raises
     ------
     InputError
         Naming the line that does not fit.
     """
-    lines: list[Any] = []
+    import xarray as xr
+
+    lines: list[tuple[int, str]] = []
     comment = ""
-    for number, line in enumerate(_decoded(path).splitlines(), 1):
+    for number, line in enumerate(_text(path).splitlines(), 1):
         if line.lstrip().startswith("#"):
             comment = comment if lines else line.strip().lstrip("#").strip()
         elif line.strip():
@@ -165,13 +124,9 @@ def read_table(path: Path) -> Table:
         header.append(rows.pop(0))
     if not rows:
         raise InputError("holds no numbers")
-    if len(rows) == 1 and len(rows[0][1]) > 3:  # one line of values
-        rows = [(rows[0][0], [cell]) for cell in rows[0][1]]
     width = len(rows[0][1])
-    whole = re.compile(r"[+-]?\d+$")
-    if separator == "," and not header and width == 2 and all(
-        whole.match(cell) for _, cells in rows for cell in cells
-    ):  # fmt: skip
+    pairs = separator == "," and not header and width == 2
+    if pairs and all(_WHOLE.match(cell) for _, cells in rows for cell in cells):
         raise InputError(
             f"line {rows[0][0]}: {','.join(rows[0][1])!r} may be one number or two; separate"
             " columns with ';', or write decimal points"
@@ -188,23 +143,28 @@ def read_table(path: Path) -> Table:
                 raise InputError(f"line {number}: {describe(cell)} is no number")
             columns[column, place] = np.nan if value is None else value
     if not header and comment:
-        cells = _split(comment, separator)
-        header = [(0, cells)] if len(cells) == width else [(0, [comment])] if width == 1 else []
-    return Table(*_headings(header, width), columns)
+        cells = [comment] if width == 1 else _split(comment, separator)
+        header = [(0, cells)] if len(cells) == width else []
+    variables: dict[str, Any] = {}
+    for number, (name, attributes) in enumerate(_headings(header, width)):
+        if name in variables:
+            heading = attributes["heading"]
+            name = heading if heading not in variables else f"{name} {number}"
+        variables[name] = ("row", columns[number], {"number": number} | attributes)
+    return xr.Dataset(variables)
 
 
-def _decoded(path: Path) -> str:
-    """The text of a file: UTF-8 or UTF-16 with a mark, or else Windows' western code page."""
+def _text(path: Path) -> str:
+    """The text of a file: UTF-8, UTF-16 with a mark, or else Windows' western code page."""
     data = _content(path)
-    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
-        try:
-            text = data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        if "\0" not in text:
-            return text
-    raise InputError("is not a text file")
+    try:
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    if "\0" in text:
+        raise InputError("is not a text file")
+    return text
 
 
 def _separator(lines: list[str]) -> str:
@@ -236,31 +196,27 @@ def _number(cell: str, separator: str) -> float | None:
         return None
 
 
-def _headings(
-    header: list[tuple[int, list[str]]], width: int
-) -> tuple[list[str | None], list[str | None], list[str | None]]:
+def _headings(header: list[tuple[int, list[str]]], width: int) -> list[tuple[str, dict[str, str]]]:
+    """Name and attributes of each column."""
+    if not header:
+        return [(str(number), {}) for number in range(width)]
     rows = [(number, cells) for number, cells in header if len(cells) == width]
-    if header and not rows:
+    if not rows:
         number, cells = header[-1]
         raise InputError(
             f"line {number} names {len(cells)} columns, the numbers below it have {width}; begin"
             " lines that are no names with '#'"
         )
-    if not rows:
-        return [None] * width, [None] * width, [None] * width
-    pairs = [name_and_unit(cell) for cell in rows[0][1]]
-    names: list[str | None] = [name for name, _ in pairs]
-    units = [unit for _, unit in pairs]
-    for number, cells in rows[1:]:
-        for column, cell in enumerate(cells):
-            inner = _BRACKETS.match(cell)
-            stated = inner["unit"] if inner and not inner["name"] else cell
-            if not stated:
-                continue
-            if units[column] is not None or number != rows[1][0]:
-                raise InputError(f"line {number}: {describe(cell)} is neither a number nor a unit")
-            units[column] = stated
-    return names, units, list(rows[0][1])
+    found = []
+    for column, heading in enumerate(rows[0][1]):
+        name, unit = name_and_unit(heading)
+        for number, cells in rows[1:]:
+            below = cells[column].strip("()[]{} ")
+            if below and unit:
+                raise InputError(f"line {number}: {describe(below)} is neither a number nor a unit")
+            unit = unit or below
+        found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
+    return found
 
 
 def name_and_unit(text: str) -> tuple[str, str | None]:

@@ -15,14 +15,15 @@ class Unit(NamedTuple):
     dimension: tuple[int, int, int]
 
 
+_NUMBER, _LENGTH, _STRESS = (0, 0, 0), (0, 1, 0), (1, -1, -2)
 _BASE = {
-    "m": Unit(1.0, (0, 1, 0)),
+    "m": Unit(1.0, _LENGTH),
     "s": Unit(1.0, (0, 0, 1)),
     "g": Unit(1e-3, (1, 0, 0)),
     "N": Unit(1.0, (1, 1, -2)),
     "J": Unit(1.0, (1, 2, -2)),
-    "Pa": Unit(1.0, (1, -1, -2)),
-    "bar": Unit(1e5, (1, -1, -2)),
+    "Pa": Unit(1.0, _STRESS),
+    "bar": Unit(1e5, _STRESS),
 }
 _WORDS = {"meter": "m", "metre": "m", "second": "s", "newton": "N", "joule": "J", "pascal": "Pa"}
 _PREFIXES = {
@@ -32,16 +33,12 @@ _PREFIXES = {
     "n": ("nano", 1e-9),
 }  # fmt: skip
 _UNITS = {
-    "%": Unit(0.01, (0, 0, 0)),
-    "1": Unit(1.0, (0, 0, 0)),
-    "-": Unit(1.0, (0, 0, 0)),
-    "dimensionless": Unit(1.0, (0, 0, 0)),
-    "in": Unit(0.0254, (0, 1, 0)),
-    "inch": Unit(0.0254, (0, 1, 0)),
-    "micron": Unit(1e-6, (0, 1, 0)),
-    "microns": Unit(1e-6, (0, 1, 0)),
-    "psi": Unit(6894.757293168, (1, -1, -2)),
-    "ksi": Unit(6894757.293168, (1, -1, -2)),
+    **dict.fromkeys(("1", "-", "dimensionless"), Unit(1.0, _NUMBER)),
+    **dict.fromkeys(("in", "inch"), Unit(0.0254, _LENGTH)),
+    **dict.fromkeys(("micron", "microns"), Unit(1e-6, _LENGTH)),
+    "%": Unit(0.01, _NUMBER),
+    "psi": Unit(6894.757293168, _STRESS),
+    "ksi": Unit(6894757.293168, _STRESS),
 }
 for _short, (_long, _scale) in _PREFIXES.items():
     for _name, _unit in _BASE.items():
@@ -66,7 +63,7 @@ def parse(text: str) -> Unit | None:
         return whole
     plain = re.sub(r"[⁻⁰¹²³⁴]+", lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text)
     plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^"))
-    factor, dimension = 1.0, (0, 0, 0)
+    factor, dimension = 1.0, _NUMBER
     for place, part in enumerate(plain.split("/")):
         words = part.split()
         if not words:
@@ -103,10 +100,9 @@ def factor_to(si: str, text: str) -> float:
         near = [name for name in _KNOWN.split(", ") if name.lower() == text.strip().lower()]
         hint = f"; did you mean {near[0]}?" if near else ""
         raise InputError(
-            f"unknown unit {text!r}{hint} (known: {_KNOWN}, products and quotients of them such as"
-            " MPa/mm)"
+            f"unknown unit {text!r}{hint} (known: {_KNOWN}, products and quotients such as MPa/mm)"
         )
     if given.dimension != wanted.dimension:
-        raise InputError(f"is in {text}, which is no unit of {_MEANING.get(si, si)}; give it in"
-                         f" {si}")  # fmt: skip
+        what = _MEANING.get(si, si)
+        raise InputError(f"is in {text}, which is no unit of {what}; give it in {si}")
     return given.factor / wanted.factor

@@ -330,6 +330,18 @@ CASES = {
         lambda: st.onset(make_problem(), np.full(256, 1e308), method=st.LocalCriterion()),
         ["strength", "finite", "1e+100"],
     ),
+    "moments whose square overflows": (
+        lambda: st.Lognormal(mean=1e308, cv=1e308),
+        ["mean and cv", "finite squares", "1e+308"],
+    ),
+    "arrest that is no flag": (
+        lambda: st.theory.griffith_length(make_problem(), 1e6, 1.0, arrest="no"),
+        ["arrest", "True or False", "'no'"],
+    ),
+    "whole that is no flag": (
+        lambda: st.plot.rupture(None, whole=1),
+        ["whole", "True or False", "got 1"],
+    ),
     "length whose square vanishes": (
         lambda: st.PowerLawSpectrum(correlation_length=5e-324),
         ["correlation_length", "1e-100"],

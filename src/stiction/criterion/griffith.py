@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import check, describe, is_finite, real_array
+from stiction.model import Flag, check, describe, is_finite, real_array
 from stiction.problem import Problem
 
 POINTS = 512
@@ -123,6 +123,7 @@ def griffith_length(
     if not (is_finite(fracture_energy) and fracture_energy > 0.0):
         given = describe(fracture_energy)
         raise InputError(f"fracture_energy: must be a positive number (J/m²), got {given}")
+    check("arrest", arrest, Flag)
     loads = _numbers("load", load)
     if loads.ndim > 1 or not np.all(np.isfinite(loads)):
         raise InputError(f"load: must be a finite number or an array of them, got {describe(load)}")

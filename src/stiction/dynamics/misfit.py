@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.errors import InputError
+from stiction.errors import InputError, prefixed
 from stiction.model import FilePath, Flag, checked, describe
 from stiction.tables import read_table
 from stiction.units import factor_to
@@ -68,16 +68,15 @@ def read_record(path: FilePath) -> xr.DataArray:
     """
     import xarray as xr
 
-    try:
+    with prefixed(str(path)):
         table = read_table(path)
-    except InputError as error:
-        raise InputError([f"{path}: {text}" for text in error.problems]) from None
-    if not table.names[0] or not table.names[0].lower().startswith(("time", "t")):
+    if not next(iter(table.data_vars)).lower().startswith("t"):
         raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
     columns: list[Array] = []
     places: list[float] = []
     kinds: list[str] = []
-    for name, unit, values in zip(table.names, table.units, table.columns, strict=True):
+    for name, column in table.data_vars.items():
+        unit, values = column.attrs.get("units"), column.values
         if unit is None:
             raise InputError(f"{path}: the unit of {name!r} is not stated; write it in brackets")
         if not columns:

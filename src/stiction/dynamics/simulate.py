@@ -21,10 +21,10 @@ from stiction.dynamics.save import Recorder, Save, open_rupture
 from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, warn_accuracy
-from stiction.gaps import gather, with_gaps
 from stiction.model import Progress, checked, describe, real_array, to_plain
+from stiction.placing import with_gaps
 from stiction.problem import Problem, named_profiles, refusals
-from stiction.profiles import at_nodes
+from stiction.profiles import at_nodes, gather
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
 
@@ -124,7 +124,7 @@ def simulate_rupture(
     recorder.begin(state)
     if save.to is not None and recorder.finished:
         result = open_rupture(save.to, fields=())
-        return result if measured is None else with_gaps(problem, result, measured)
+        return with_gaps(problem, result, measured)
     if state.steps == 0:
         recorder.add(state)
     try:
@@ -142,7 +142,7 @@ def simulate_rupture(
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, problem, method, run, state)
     recorder.finish(result)
-    return result if measured is None else with_gaps(problem, result, measured)
+    return with_gaps(problem, result, measured)
 
 
 def _initial(run: Run, slip: Any, load: float | None) -> State:
@@ -152,7 +152,7 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
         check_start(run, time)
         return run.start(time)
     interface = run.medium.interface
-    slip = at_nodes("initial_slip", slip, "slip", interface).values
+    slip = at_nodes("initial_slip", slip, "slip", interface)[0]
     try:
         start = real_array(slip)
     except TypeError:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.errors import InputError
+from stiction.errors import InputError, prefixed
 from stiction.model import FilePath, Numbers, check, describe, is_finite
 from stiction.tables import read_table
 from stiction.units import factor_to
@@ -185,20 +185,19 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     3 peaks
     """
     path = check("path", path, FilePath)
-    try:
+    with prefixed(str(path)):
         return _from_table(read_table(Path(path)), unit)
-    except InputError as error:
-        raise InputError([f"{path}: {text}" for text in error.problems]) from None
 
 
 def _from_table(table: Any, unit: str | None) -> Peaks:
-    peak = _column(table.names, PEAK, "peak")
-    if peak is None and table.columns.shape[0] == 1:
+    names = list(table.data_vars)
+    peak = _column(names, PEAK, "peak")
+    if peak is None and len(names) == 1:
         peak = 0
     if peak is None:
-        found = ", ".join(str(name) for name in table.names)
-        raise InputError(f"no column is called peak [MPa] or the like; found {found}")
-    stated = table.units[peak] or unit
+        raise InputError(f"no column is called peak [MPa] or the like; found {', '.join(names)}")
+    peaks = table[names[peak]]
+    stated = peaks.attrs.get("units", unit)
     if stated is None:
         raise InputError(
             "the unit of the peaks is not stated; write it into the heading, 'peak [MPa]', or give"
@@ -206,13 +205,13 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
         )
     if unit is not None and unit != stated:
         raise InputError(f"the peaks are in {stated} by the heading, but unit = {unit!r}")
-    values, column = table.columns[peak], _column(table.names, LENGTH, "length")
+    values, column = peaks.values, _column(names, LENGTH, "length")
     if column is None:
         return make_peaks(values, stated)
-    metre = table.units[column]
-    if metre is None:
+    length = table[names[column]]
+    if "units" not in length.attrs:
         raise InputError("the unit of the length is not stated; write 'length [mm]'")
-    lengths = table.columns[column] * factor_to("m", metre)
+    lengths = length.values * factor_to("m", length.attrs["units"])
     if not np.isfinite(lengths).all():
         line = int(np.argmin(np.isfinite(lengths)))
         raise InputError(f"length: missing in row {line}; specimens of unknown length are mixed in")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from stiction.criterion.local import nucleation_stress
 from stiction.equilibrium.patches import critical_patch
 from stiction.errors import InputError
-from stiction.gaps import IN_GAP, listed
 from stiction.interface import Interface
+from stiction.placing import IN_GAP, stored_gaps
 from stiction.plot import maps
 from stiction.plot.axes import (
     add_friction_scale,
@@ -122,7 +122,7 @@ def _draw_line(
     x = places(interface)
     factor, unit = unit_for("Pa", tau_p)
     length, length_unit = unit_for("m", interface.lengths)
-    spans = listed(next(iter(results.values())))
+    spans = stored_gaps(next(iter(results.values())))
     measured = tau_p.copy()
     for begin, end in spans:
         measured[_between(interface, begin, end)] = np.nan

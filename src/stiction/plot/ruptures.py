@@ -11,6 +11,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
+from stiction.model import Flag, check
 from stiction.plot import maps
 from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
 from stiction.plot.fields import finish_line, places
@@ -59,6 +60,7 @@ def rupture(
     InputError
         If a variable was not kept.
     """
+    check("whole", whole, Flag)
     need(run, "onset_time", "critical_position")
     problem = problem_of(run, problem)
     if problem.interface.is_plane:

@@ -106,6 +106,10 @@ class _ByMoments(Marginal):
     def _mean_above_low(self) -> Self:
         if not self.mean > self.low:
             raise InputError(f"mean must be above low, got mean={self.mean:g}, low={self.low:g}")
+        if not max(self.mean, self.mean * self.cv, self._ratio) < 1e150:
+            raise InputError(
+                f"mean and cv: must have finite squares, got mean={self.mean:g}, cv={self.cv:g}"
+            )
         _ = self.distribution  # there may be none with these moments
         return self
 

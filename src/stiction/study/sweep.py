@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction.ensemble.dataset import GridAxis
 from stiction.ensemble.dotted_keys import CORRELATION
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError, prefixed, unknown_name
 from stiction.model import _models_in, describe, is_whole, to_plain
 from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
@@ -121,10 +121,8 @@ def _value(key: str, value: Any, folder: Path | None) -> Any:
         return value.tolist()
     file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
     if file and folder is not None and is_profile(key):
-        try:
+        with prefixed(key):
             found = profile_in_file(value, key, folder)
-        except InputError as error:
-            raise InputError([f"{key}: {text}" for text in error.problems]) from None
         return found if isinstance(found, dict) else found.tolist()
     return value
 
