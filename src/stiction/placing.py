@@ -38,16 +38,10 @@ OF_A_PLANE = (
 
 
 class Points(NamedTuple):
-    """Values of one quantity in SI, and where they belong.
+    """Values (..., points) of one quantity in SI, NaN where there is none, and where they belong.
 
-    Attributes
-    ----------
-    values : (..., points) array
-        Or (..., *shape) in the order of the nodes. NaN where there is no value.
-    places : dict of (points,) arrays
-        m, along each direction; empty if the values come in the order of the nodes.
-    measured : array of bool or None
-        Of the shape of `values`; False where a gap was filled earlier.
+    `places` (m) has an array (points,) for each direction. It is empty if the values come in the
+    order of the nodes, (..., *shape). `measured` is False where a gap was filled earlier.
     """
 
     values: Array
@@ -58,13 +52,10 @@ class Points(NamedTuple):
 def place(
     points: Points, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
 ) -> tuple[Array, Mask | None]:
-    """Put values on the nodes of an interface.
+    """Put values on the nodes of an interface, (..., *shape), and say which were measured.
 
-    Returns
-    -------
-    values : (..., *shape) array
-    measured : (..., *shape) array of bool or None
-        False where there was no value, be it filled in or left out; None if nothing is missing.
+    The mask is False where there was no value, be it filled in or left out; it is None if nothing
+    is missing.
     """
     values, places, measured = points
     if not places:
@@ -129,8 +120,7 @@ def _other_shape(shape: tuple[int, ...], interface: Interface) -> str:
 def _offset(dim: str, x: Array, interface: Interface) -> float | None:
     """By how many spacings, in (-0.5, 0.5], all points lie beside nodes; None if by no one number.
 
-    On a line, a grid that is coarser than the nodes is to be interpolated, even if its points are
-    nodes.
+    A line that is coarser than the nodes is to be interpolated, even if its points are nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
@@ -184,25 +174,20 @@ def _elsewhere(
 
 def _check_repeats(points: Points, twins: NDArray[np.int64], interface: Interface) -> None:
     """Refuse two points at one place, unless they have the same value a period apart."""
-    others = np.flatnonzero(twins != np.arange(twins.size))
-    if not others.size:
-        return
-    pairs = np.stack([twins[others], others])
-    first, second = np.moveaxis(points.values[..., pairs], -2, 0)
-    same = ((first == second) | (np.isnan(first) & np.isnan(second))).reshape(-1, others.size)
-    apart = [
-        np.ptp(points.places[dim][pairs], axis=0) > 0.5 * length
-        for dim, length in zip(interface.dims, interface.lengths, strict=True)
-    ]
-    wrong = ~(same.all(axis=0) & np.any(apart, axis=0))
-    if wrong.any():
-        two = pairs[:, int(np.argmax(wrong))]
-        where = [f"{dim} = {a:.9g} and {b:.9g} m" for dim, (a, b) in
-                 ((dim, x[two]) for dim, x in points.places.items())]  # fmt: skip
-        raise InputError(
-            f"{', '.join(where)} are one place of an interface with the period {interface.length}"
-            f" m; keep one of the two values{OF_A_PLANE * (not interface.is_plane)}"
-        )
+    places = list(points.places.items())
+    for i in np.flatnonzero(twins != np.arange(twins.size)):
+        pair = [twins[i], i]
+        one, other = np.moveaxis(points.values[..., pair], -1, 0)
+        periods = zip(interface.lengths, places, strict=True)
+        apart = max(np.ptp(x[pair]) / length for length, (_, x) in periods)
+        if apart < 0.5 or not np.array_equal(one, other, equal_nan=True):
+            where = [f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places]
+            raise InputError(
+                f"{', '.join(where)} are one place of an interface with the period"
+                f" {interface.length} m; keep one of the two values"
+                + OF_A_PLANE
+                * (not interface.is_plane)
+            )
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
@@ -260,8 +245,7 @@ def close_gaps(
 def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
     """Solve Laplace's equation of the nodes in the hole, periodically.
 
-    The measured nodes around it are its rim: on a line that is the straight line between the ends,
-    and nothing in it is higher or lower than its rim.
+    On a line that is the straight line between its ends; nothing is higher or lower than its rim.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import spsolve

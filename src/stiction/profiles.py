@@ -168,11 +168,7 @@ def is_labelled(value: Any) -> bool:
 
 
 def simplified(value: Any, quantity: str) -> Any:
-    """Return `value` as labelled, or as plain numbers in SI.
-
-    A pandas Series over numbers that are no count is labelled; a quantity of pint or astropy and
-    a labelled number are plain.
-    """
+    """Return `value` as labelled, a pandas Series over positions too, or as numbers in SI."""
     if is_labelled(value):
         plain = not value.dims and not hasattr(value, "data_vars")
         return _values(value, quantity, None, UNITS[quantity]) if plain else value
@@ -200,7 +196,8 @@ def _values(array: Any, what: str, given: str | None, si: str) -> Any:
     try:
         values = real_array(_magnitude(array.data, si))
         factor = factor_to(si, given or stated or si)
-        if given and stated and parse(stated) and factor_to(si, stated) != factor:
+        known = given and stated and parse(stated)
+        if known and not np.isclose(factor_to(si, str(stated)), factor, rtol=1e-12):
             raise InputError(f"is said to be in {given}, the source states {stated}")
     except TypeError as error:
         raise InputError(f"{what} must be numbers; {error}") from None
@@ -227,7 +224,7 @@ def points_of(
     x_unit: str | None = None,
 ) -> Points:
     """Return what `source` says of a quantity, in SI, along the directions `dims`."""
-    data = load(Path(source), dims) if isinstance(source, str | Path) else source
+    data: Any = load(Path(source), dims) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
     if not hasattr(data, "data_vars"):
@@ -383,12 +380,9 @@ def _with_x(array: Any, x: Column) -> Any:
     names = [str(dim) for dim in array.dims]
     if {"x", "y"} <= set(names):
         raise InputError(f"holds values over x and y, not along a line{OF_A_PLANE}")
-    at = [
-        str(name)
-        for name in (*names, *array.coords)
-        if name in array.coords and array[name].ndim == 1
-        if (name == x if x is not None else _plain(name) in PLACES)
-    ]
+    ordered = [str(name) for name in (*names, *array.coords) if name in array.coords]
+    wanted = [x] if x is not None else [name for name in ordered if _plain(name) in PLACES]
+    at = [name for name in ordered if name in wanted and array[name].ndim == 1]
     if x is not None and not at:
         raise InputError(unknown_name("x", str(x), [str(name) for name in array.coords]))
     called = [name for name in names if _plain(name) in PLACES]
@@ -422,7 +416,7 @@ def at_nodes(
     """Return what a caller gave for a quantity, with one value a node, and where it was measured.
 
     Numbers and plain arrays without gaps pass as they are, for whoever checks their shape; the mask
-    is None if nothing is missing. Errors begin with `name`.
+    is None if nothing is missing.
     """
     with prefixed(name):
         value = simplified(value, quantity)
@@ -446,10 +440,7 @@ def gather(
 ) -> tuple[dict[str, Any], Mask | None]:
     """Put what a caller gave on the nodes, and find where all of it was measured.
 
-    Returns
-    -------
-    values : dict
-    measured : (samples, *shape) or (1, *shape) array of bool, or None if nothing is missing
+    The mask has the shape (samples, *shape) or (1, *shape); it is None if nothing is missing.
     """
     problems: list[str] = []
     values: dict[str, Any] = {}
@@ -472,10 +463,7 @@ def gather(
 
 
 def on_nodes(name: str, given: Any, interface: Interface) -> Any:
-    """Return a profile with coordinates or units of its own as a number or an array at the nodes.
-
-    A dict is what `profile_in_file` returns.
-    """
+    """Return what `is_unplaced`, or what `profile_in_file` made of it, at the nodes."""
     options: dict[str, Any] = {}
     if isinstance(given, Mapping):
         import xarray as xr
@@ -489,21 +477,10 @@ def on_nodes(name: str, given: Any, interface: Interface) -> Any:
 
 
 def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
-    """Return the profile that a study file names: an array in the order of nodes, or a table.
+    """Return the profile that a study file names for a parameter, its path relative to `folder`.
 
-    Parameters
-    ----------
-    given : path or dict
-        A dict has `file` and options of `read_profile`.
-    field : str
-        Name of the parameter.
-    folder : path
-        What paths are relative to.
-
-    Returns
-    -------
-    array or dict
-        A dict is a DataArray in plain form, with what `place` is to do among its attributes.
+    A dict has `file` and options of `read_profile`. What is returned is a DataArray in plain form,
+    with options of `place` among its attributes, or the array of an .npy.
     """
     table = given if isinstance(given, Mapping) else {"file": given}
     table = {str(key): value for key, value in table.items()}

@@ -96,17 +96,8 @@ def read_table(path: Path) -> xr.Dataset:
     the last one before the numbers names the columns if no other line does. Names may have a line
     of units below them, and lines of another number of cells above them.
 
-    Returns
-    -------
-    xarray.Dataset
-        The columns, along 'row', NaN where a cell is empty, with `units`, `heading` and `number`
-        (from 0) as attributes. Columns without names are called by their numbers, and have no
-        `heading`.
-
-    Raises
-    ------
-    InputError
-        Naming the line that does not fit.
+    The columns are variables along 'row', NaN where a cell is empty, with `units`, `heading` and
+    `number` (from 0) as attributes; those without names are called by their numbers.
     """
     import xarray as xr
 

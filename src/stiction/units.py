@@ -87,13 +87,7 @@ def is_in(text: str | None, si: str) -> bool:
 
 
 def factor_to(si: str, text: str) -> float:
-    """Return what a value in the unit `text` is multiplied by to be in the SI unit `si`.
-
-    Raises
-    ------
-    InputError
-        If the unit is not known, or measures something else.
-    """
+    """Return what a value in the unit `text` is multiplied by to be in the SI unit `si`."""
     wanted, given = parse(si), parse(text)
     assert wanted is not None
     if given is None:

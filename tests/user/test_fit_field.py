@@ -180,46 +180,6 @@ def test_outliers_are_warned_of():
         st.fit_field(labelled(values), **QUICK)
 
 
-def test_onset_leaves_out_the_samples_with_gaps():
-    problem = st.paper.problem(nodes=256)
-    tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(
-        problem.interface, samples=3, seed=0
-    )
-    whole = st.onset(problem, tau_p, method=st.LocalCriterion())
-    tau_p[1, 20:24] = np.nan
-    with pytest.warns(st.AccuracyWarning, match="1 of 3 samples have gaps and are left out"):
-        found = st.onset(problem, tau_p, method=st.LocalCriterion(), gaps="skip")
-    assert found["sample"].values.tolist() == [0, 2]
-    np.testing.assert_array_equal(found.critical_stress, whole.critical_stress[[0, 2]])
-    tau_p[:, 20] = np.nan
-    with pytest.raises(st.InputError, match="all of 3 samples have gaps"):
-        st.onset(problem, tau_p, method=st.LocalCriterion(), gaps="skip")
-
-
-class LineScan:
-    """Stands in for a line scan of SurfaceTopography: the members that are used, and no more."""
-
-    unit = "um"
-    physical_sizes = (80_000.0,)
-    is_uniform = True
-
-    def heights(self):
-        heights = np.ma.asarray(VALUES * 1e-6)  # um
-        heights[5] = np.ma.masked
-        return heights
-
-
-def test_heights_of_a_topography_need_a_map_and_keep_their_unit():
-    with pytest.raises(st.InputError, match="holds heights, which are no strength"):
-        st.read_profile(LineScan())
-    found = st.read_profile(LineScan(), strength=lambda h: 1e12 * h)  # of heights in m
-    assert found["x"].values[1] == pytest.approx(SPACING)
-    expected = np.where(np.arange(COUNT) == 5, np.nan, VALUES)
-    np.testing.assert_allclose(found, expected)
-    fit = st.fit_field(found, **QUICK)
-    assert fit.field.mean == pytest.approx(np.nanmean(expected), rel=0.02)
-
-
 def bounded(noise):
     """A rough field between bounds, fitted by its bounds and its exponent too."""
     truth = st.RandomField(

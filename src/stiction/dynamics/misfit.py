@@ -69,7 +69,7 @@ def read_record(path: FilePath) -> xr.DataArray:
     import xarray as xr
 
     with prefixed(str(path)):
-        table = read_table(path)
+        table: Any = read_table(path)
     if not next(iter(table.data_vars)).lower().startswith("t"):
         raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
     columns: list[Array] = []
