@@ -94,12 +94,8 @@ def test_harmless_forms_are_taken():
 
 
 def test_a_family_of_distributions_needs_its_parameters():
-    with pytest.raises(st.InputError, match=r"scipy.stats.lognorm\(s=..., loc=..., scale="):
+    with pytest.raises(st.InputError, match="a frozen continuous scipy.stats distribution"):
         st.RandomField(scipy.stats.lognorm, SPECTRUM)
-    counts, edges = np.histogram(np.linspace(1e6, 2e6, 100), bins=10)
-    histogram = scipy.stats.rv_histogram((counts, edges), density=False)
-    taken = st.RandomField(histogram, SPECTRUM)  # has all it needs
-    assert taken.mean == pytest.approx(1.5e6, rel=1e-3)  # of ten bins, 10 % wide
 
 
 def test_representations_fit_on_a_screen(tmp_path):

@@ -127,10 +127,6 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     load = st.Load(profile=labelled(1.0 + x, x, units="Pa"))
     with pytest.raises(st.InputError, match="profile: load_profile is in Pa"):
         st.Problem(system.solid, interface, friction, load)
-    run = st.simulate_rupture(
-        system, labelled(strength[::-1], x[::-1]), method=st.Rupture(loading_rate=1e9, stop="onset")
-    )
-    np.testing.assert_array_equal(run["peak_strength"], strength)
 
 
 MM, INCH, KSI = 1e3, 1.0 / 0.0254, 1.0 / 6894757.293168
@@ -368,9 +364,8 @@ def test_an_onset_in_a_gap_is_called_that(system, strength):
     with pytest.warns(st.AccuracyWarning, match="the critical patch .* reaches into a gap"):
         result = st.onset(system, edge, method=st.LocalCriterion(), gaps="fill")
     assert not bool(result["in_gap"][0])
-    profile = st.read_profile(
-        labelled(holes, system.interface.x), interface=system.interface, gaps="fill"
-    )
+    given = labelled(holes[::-1], system.interface.x[::-1])
+    profile = st.read_profile(given, interface=system.interface, gaps="fill")
     run = st.simulate_rupture(
         system, profile, method=st.Rupture(loading_rate=1e8, stop="onset"), save=st.Save([])
     )
