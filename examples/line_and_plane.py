@@ -98,22 +98,24 @@ def strength(ratio: float) -> st.RandomField:
 
 
 def studies(case: Case, most: int) -> dict[str, st.Study]:
-    """The same samples by equilibrium and by the local criterion."""
+    """The same samples by equilibrium and by the local criterion, and some with their slip."""
     few = min(case.samples, most)
     lengths = [ratio * NUCLEATION_LENGTH for ratio in RATIOS]
     exact = st.Study(
         problem=case.problem,
         random=strength(RATIOS[0]),
-        method=st.Equilibrium(slip=True),
-        ensemble=st.Ensemble(
-            samples=few, seed=case.seed, keep=("slip",), keep_samples=min(few, case.kept)
-        ),
+        method=st.Equilibrium(),
+        ensemble=st.Ensemble(samples=few, seed=case.seed),
         sweep=[{"random.strength.spectrum.correlation_length": lengths}],
         title=case.name,
     )
-    alone = st.Ensemble(samples=few, seed=case.seed)
-    local = dataclasses.replace(exact, method=st.LocalCriterion(), ensemble=alone)
-    return {"exact": exact, "local": local}
+    # Sample i is the same in all of them.
+    some = st.Ensemble(samples=min(few, case.kept), seed=case.seed, keep="slip")
+    return {
+        "exact": exact,
+        "local": dataclasses.replace(exact, method=st.LocalCriterion()),
+        "kept": dataclasses.replace(exact, ensemble=some),
+    }
 
 
 def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str, xr.Dataset]:
@@ -128,7 +130,8 @@ def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str,
             )
             for which, study in pair.items()
         }
-        data = results["exact"].assign(local=results["local"].first_instability)
+        slip = results["kept"].slip.rename(sample="kept_sample")
+        data = results["exact"].assign(local=results["local"].first_instability, slip=slip)
         data = data.assign_coords(ratio=("correlation_length", list(RATIOS)))
         found[case.name] = data.swap_dims(correlation_length="ratio")
     return found

@@ -105,7 +105,7 @@ def make_strength(problem):
 @pytest.fixture
 def command(monkeypatch, capfd):
     """Run a command line in this process: exit code, output, errors."""
-    from stiction.cli import app
+    from stiction import cli
 
     # pytest turns warnings into errors; on the command line they are lines of text.
     monkeypatch.setattr("warnings.showwarning", None, raising=False)
@@ -114,7 +114,7 @@ def command(monkeypatch, capfd):
         monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
         code = 0
         try:
-            app.main()
+            cli.main()
         except SystemExit as ended:
             code = ended.code or 0
         said = capfd.readouterr()

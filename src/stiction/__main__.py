@@ -1,5 +1,5 @@
 """``python -m stiction``."""
 
-from stiction.cli.app import main
+from stiction.cli import main
 
 main()

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from difflib import get_close_matches
 from typing import NamedTuple
 
-_OURS = ("stiction", "pydantic", "dataclasses")
+_OURS = ("stiction", "pydantic", "dataclasses", "functools")
 
 
 class InputError(ValueError):

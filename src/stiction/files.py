@@ -6,9 +6,9 @@ import errno
 import hashlib
 import json
 import os
-import re
 import struct
 import threading
+import uuid
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PART = ".part"
-_UNFINISHED = re.compile(r"(\.\d+-\d+)?\.part")
 
 UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
@@ -53,7 +52,7 @@ def write_atomically(path: Path, content: bytes | Callable[[Path], object]) -> N
     OSError
         If it cannot be written; nothing is left behind.
     """
-    aside = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}{PART}")
+    aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
         if callable(content):
             content(aside)
@@ -67,11 +66,6 @@ def write_atomically(path: Path, content: bytes | Callable[[Path], object]) -> N
             aside.unlink()
         raise
     sync_folder(path.parent)
-
-
-def final_name(name: str) -> str:
-    """Return the name that a file left behind by an interrupted write was to get."""
-    return _UNFINISHED.sub("", name) if name.endswith(PART) else name
 
 
 def sync_folder(folder: Path) -> None:

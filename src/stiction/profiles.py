@@ -50,7 +50,7 @@ NAMES = {
     "height": ("heights", "topography", "z"),
 }
 PLACES = ("x", "position", "pos", "distance", "coordinate")
-SAMPLES = ("sample", "samples", "kept_sample")
+SAMPLES = ("sample", "samples")
 MEASURED = "measured"
 """Coordinate of a profile with gaps: False where there was no value."""
 

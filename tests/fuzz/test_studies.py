@@ -17,7 +17,7 @@ from typing import Any
 import tomli_w
 from harness import trial
 
-from stiction.cli.check import _description
+from stiction.cli import description
 from stiction.study.study import Study
 
 STUDY = """
@@ -60,8 +60,6 @@ samples = 20
 seed = 11
 first = 0
 keep = ["strength"]
-keep_samples = [0, 3]
-keep_limit = 1e8
 [[sweep]]
 "random.strength.spectrum.correlation_length" = [0.02, 0.03]
 [[sweep]]
@@ -138,7 +136,7 @@ def mutation(chance: random.Random) -> tuple[str, bytes]:
 def use(path: Path) -> None:
     """Describe a study, and compute one sample of it if it is not large."""
     study = Study.from_toml(path)
-    _description(study)
+    description(study)
     point = study.experiments[0]
     interface = point.problem.interface
     if max(interface.size, point.dimension) <= 2**15:

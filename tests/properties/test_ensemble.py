@@ -122,17 +122,13 @@ def test_what_else_is_random_is_independent_of_the_strength(arguments, make_stre
     np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
 
 
-def test_chosen_samples_are_kept(arguments):
-    result = st.monte_carlo(
-        **arguments, samples=40, first=10, keep=("strength",), keep_samples=[3, 12, 49]
-    )
-    assert result["strength"].dims == ("kept_sample", "x")
-    np.testing.assert_array_equal(result["kept_sample"], [12, 49])
-    interface = arguments["problem"].interface
-    direct = arguments["random"].sample(interface, first=49)[0]
-    np.testing.assert_array_equal(result["strength"].sel(kept_sample=49), direct)
-    with pytest.raises(st.InputError, match="keep_limit = 0 MiB"):
-        st.monte_carlo(**arguments, samples=40, keep=("strength",), keep_limit=1000.0)
+def test_what_is_kept_does_not_depend_on_the_samples_around_it(arguments):
+    result = st.monte_carlo(**arguments, samples=40, first=10, keep=("strength",))
+    assert result["strength"].dims == ("sample", "x")
+    direct = arguments["random"].sample(arguments["problem"].interface, first=49)[0]
+    np.testing.assert_array_equal(result["strength"].sel(sample=49), direct)
+    one = st.monte_carlo(**arguments, samples=1, first=12, keep=("strength",))
+    np.testing.assert_array_equal(result["strength"].sel(sample=[12]), one["strength"])
 
 
 def test_progress_counts_every_sample_once(arguments):

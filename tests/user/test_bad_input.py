@@ -314,10 +314,6 @@ CASES = {
         lambda: st.theory.rice_distribution(make_problem(), make_strength(), seed="1"),
         ["seed", "whole", "'1'"],
     ),
-    "entry of a list": (
-        lambda: st.Ensemble(samples=3, keep_samples=[1, "x"]),
-        ["keep_samples.1: ", "'x'"],
-    ),
     "accepted by nobody": (
         lambda: make_problem().sample(np.full(256, 1e6), accept=0.5),
         ["accept", "0.5"],
@@ -352,7 +348,6 @@ CASES = {
         lambda: make_study(sweep={"type": ["beta"]}),
         ["sweep", "unknown 'type'", "valid: problem"],
     ),
-    "trusted in text": (lambda: st.Study.from_dict({}, trusted="no"), ["trusted", "'no'"]),
 }
 
 

@@ -74,7 +74,7 @@ samples = 64
 SCRIPT = """\
 import numpy as np, stiction as st
 from weakest import WeakestNode
-from stiction.cli.app import main
+from stiction.cli import main
 
 study = st.Study.from_toml("study.toml")
 assert study.method == WeakestNode(0.5)

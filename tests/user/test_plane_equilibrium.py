@@ -10,7 +10,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import stiction as st
-from stiction.cli.app import app
+from stiction.cli import app
 
 RATE = 0.5e12
 LENGTH = 3.46e-3  # nucleation length h_n along x

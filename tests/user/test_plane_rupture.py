@@ -11,7 +11,7 @@ from small_study import small_study
 from typer.testing import CliRunner
 
 import stiction as st
-from stiction.cli.app import app
+from stiction.cli import app
 from stiction.dynamics.save import open_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")

@@ -12,7 +12,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import stiction as st
-from stiction.cli.reliability import reliability
+from stiction.cli import reliability
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 
@@ -409,8 +409,7 @@ def written(path, system, **more):
 
 def test_command_writes_table_data_and_figure(app, system, tmp_path):
     study, out = written(tmp_path / "study.toml", system), tmp_path / "out"
-    asked = ("--smallest", "1e-4", "--stress", "0.68e6", "--probability", "1e-3")
-    done = app(study, "--out", str(out), *asked)
+    done = app(study, "--out", str(out), "--smallest", "1e-4")
     assert done.exit_code == 0
     assert {"failure_curve.png", "failure_curve.pdf"} <= {path.name for path in out.iterdir()}
     with xr.open_dataset(out / "failure_curve.nc") as curve:
@@ -418,8 +417,7 @@ def test_command_writes_table_data_and_figure(app, system, tmp_path):
         assert curve.attrs["lower_bound"] == 0.66e6
         again = st.failure_curve(*system, method=LOCAL, smallest=1e-4, seed=3)
         np.testing.assert_array_equal(curve["probability"], again["probability"])
-    assert "0.68 MPa" in done.output
-    assert "at P = 0.001" in done.output
+    assert "probability" in done.output
 
 
 def test_command_names_mistakes(app, system, tmp_path):
@@ -429,6 +427,4 @@ def test_command_names_mistakes(app, system, tmp_path):
         app(written(tmp_path / "study.toml", system, sweep=sweep), *out)
     with pytest.raises(st.InputError, match="cannot be read"):
         app(str(tmp_path / "none.toml"))
-    with pytest.raises(st.InputError, match="--probability"):
-        app("examples/reliability.toml", *out, "--probability", "2")
     assert not (tmp_path / "out").exists()

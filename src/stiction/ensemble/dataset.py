@@ -11,14 +11,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.points import differing_in, variables_in
 from stiction.ensemble.table import Failure, Table
 from stiction.errors import warn_accuracy
 from stiction.model import check_memory
 from stiction.results import SAMPLE, Variable, coordinate, to_dataset
 
 FAILED = "failed_samples"
-KEPT_SAMPLE = Variable("1", "number of the sample whose profiles are kept", ("kept_sample",))
 SHOWN = 3
 
 
@@ -40,6 +38,20 @@ class GridAxis:
     coordinates: Mapping[str, tuple[NDArray[Any], Variable]]
 
 
+def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
+    """Return one of the experiments for each combination of these parts, which they share."""
+    found: dict[Any, Experiment] = {}
+    for one in points:
+        found.setdefault(tuple(id(getattr(one, part)) for part in parts), one)
+    return list(found.values())
+
+
+def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
+    """Return all variables of any point, in the order in which the first method names them."""
+    some = distinct(points, "problem", "random", "method")
+    return {name: variable for one in some for name, variable in one.variables.items()}
+
+
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
@@ -56,8 +68,6 @@ class Gathered:
     ----------
     done : (points, samples) array of bool
         Which samples are there.
-    failures : dict of Failure
-        By point and sample.
     """
 
     def __init__(
@@ -67,56 +77,34 @@ class Gathered:
         first: int = 0,
         only: Sequence[str] | None = None,
     ) -> None:
+        if only is None:
+            largest = max(one.sample_bytes for one in distinct(points, "problem", "method"))
+            check_memory("samples", largest * len(points) * samples)
         self.points, self.samples, self.first = points, samples, first
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
-        self.failures: dict[tuple[int, int], Failure] = {}
-        kept = points[0].keep_samples
-        self._kept = None
-        if kept is not None:
-            inside = [sample for sample in kept if first <= sample < first + samples]
-            self._kept = np.array(sorted(inside), dtype=np.int64)
-        self._variables: dict[str, Variable] = {}
-        for name, variable in variables_in(points).items():
-            if only is None or name in only:
-                wide = variable.wide and kept is not None
-                dims = ("kept_sample", *variable.dims[1:]) if wide else variable.dims
-                self._variables[name] = replace(variable, dims=dims)
-        narrow = sum(not variable.wide for variable in self._variables.values())
-        check_memory("samples", 9.0 * len(points) * samples * narrow)
+        self._failures: dict[tuple[int, int], Failure] = {}
+        known = variables_in(points).items()
+        self._variables = {name: v for name, v in known if only is None or name in only}
         self._arrays: dict[str, NDArray[Any]] = {}
         self._seen: dict[str, NDArray[np.bool_]] = {}
 
-    def add(self, table: Table) -> None:
-        """Put the rows of a table in their places."""
-        rows = table.sample - self.first
-        inside = (rows >= 0) & (rows < self.samples)
-        where = table.point[inside], rows[inside]
-        self.done[where] = True
-        for failure in table.failures:
-            self.failures[failure.point, failure.sample] = failure
-        for name, array in table.values.items():
-            self._put(name, where, array[inside], self.samples)
-        rows = table.wide_sample - self.first
-        inside = (rows >= 0) & (rows < self.samples)
-        length = self.samples
-        if self._kept is not None:
-            inside = np.isin(table.wide_sample, self._kept)
-            rows = np.searchsorted(self._kept, table.wide_sample)
-            length = self._kept.size
-        where = table.wide_point[inside], rows[inside]
-        for name, array in table.wide.items():
-            self._put(name, where, array[inside], length)
+    def add(self, tables: Sequence[Table]) -> None:
+        """Put the rows of tables in their places."""
+        for table in tables:
+            rows = table.sample - self.first
+            inside = (rows >= 0) & (rows < self.samples)
+            where = table.point[inside], rows[inside]
+            self.done[where] = True
+            for failure in table.failures:
+                if 0 <= failure.sample - self.first < self.samples:
+                    self._failures[failure.point, failure.sample] = failure
+            for name in self._variables.keys() & table.values.keys():
+                self._put(name, where, table.values[name][inside])
 
-    def save(self, *, now: bool = False) -> None:
-        """Do nothing: everything is in memory."""
-
-    def _put(self, name: str, where: tuple[Any, Any], array: NDArray[Any], length: int) -> None:
-        if name not in self._variables:
-            return
+    def _put(self, name: str, where: tuple[Any, Any], array: NDArray[Any]) -> None:
         if name not in self._arrays:
-            shape = (len(self.points), length)
-            self._arrays[name] = np.zeros((*shape, *array.shape[1:]), dtype=array.dtype)
-            self._seen[name] = np.zeros(shape, dtype=np.bool_)
+            self._arrays[name] = np.zeros(self.done.shape + array.shape[1:], dtype=array.dtype)
+            self._seen[name] = np.zeros(self.done.shape, dtype=np.bool_)
         self._arrays[name][where] = array
         self._seen[name][where] = True
 
@@ -130,15 +118,24 @@ class Gathered:
         return array
 
     @property
+    def dealt_with(self) -> NDArray[np.bool_]:
+        """Which samples are there or have failed, (points, samples)."""
+        found = self.done.copy()
+        for failure in self.failed:
+            found[failure.point, failure.sample - self.first] = True
+        return found
+
+    @property
     def failed(self) -> list[Failure]:
         """Samples that failed and are not there, in the order of points and samples."""
-        found = [self.failures[key] for key in sorted(self.failures)]
+        found = [self._failures[key] for key in sorted(self._failures)]
         return [f for f in found if not self.done[f.point, f.sample - self.first]]
 
     def dataset(self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()) -> xr.Dataset:
         """Return everything as a dataset, in the order in which the method names it.
 
-        Samples that failed are NaN, and listed in the attribute 'failed_samples'.
+        Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
+        missing too, the attribute 'cut_short' says how many are done.
 
         Parameters
         ----------
@@ -159,28 +156,27 @@ class Gathered:
             coordinates |= axis.coordinates
         coordinates["sample"] = (self.first + np.arange(self.samples), SAMPLE)
         used = {dim for variable in variables.values() for dim in variable.dims}
-        if "kept_sample" in used and self._kept is not None:
-            coordinates["kept_sample"] = (self._kept, KEPT_SAMPLE)
         for dim in sorted(used & {"x", "y", "direction"}):
             coordinates |= self._places(dim, dims, shape)
-        failed = self.failed
+        attributes, failed = dict(attributes), self.failed
+        made, total = int(self.done.sum()), self.done.size
         if failed:
-            attributes = {**attributes, FAILED: [list(failure) for failure in failed]}
+            attributes[FAILED] = [list(failure) for failure in failed]
+        if made + len(failed) < total:
+            attributes["cut_short"] = f"{made} of {total} samples are done"
         return to_dataset(values, variables, coordinates, attributes)
 
     def _places(
         self, dim: str, dims: tuple[str, ...], shape: tuple[int, ...]
     ) -> dict[str, tuple[NDArray[Any], Variable]]:
         """Positions along a dimension; if the length is swept, those of each point."""
-        some = differing_in(self.points, "problem.interface")
-        found = [coordinate(point.problem.interface, dim) for point in some]
+        found = [coordinate(point.problem.interface, dim) for point in self.points]
         values, meaning = found[0]
         if all(np.array_equal(places, values) for places, _ in found):
             return {dim: found[0]}
-        each = [coordinate(point.problem.interface, dim)[0] for point in self.points]
         name = "position" if dim == "x" else f"position_{dim}"
         own = replace(meaning, dims=(*dims, dim))
-        return {name: (np.reshape(each, (*shape, -1)), own)}
+        return {name: (np.reshape([places for places, _ in found], (*shape, -1)), own)}
 
 
 def warn_of_failures(failed: Sequence[Failure], samples: int) -> None:

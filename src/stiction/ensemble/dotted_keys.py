@@ -16,7 +16,7 @@ CORRELATION = "correlation"
 
 
 def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a model object with dotted keys replaced, all of them at once.
+    """Return a copy of a model object with dotted keys replaced, all of them at once.
 
     Raises
     ------
@@ -31,24 +31,6 @@ def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
             table = table.setdefault(name, {})
         table[last] = _Leaf(value)
     return _replaced(owner, tree, "")
-
-
-def part_with_values(owner: Any, name: str, values: Mapping[str, Any]) -> Any:
-    """One field of a model object with dotted keys below it (or itself) replaced.
-
-    The other fields are not validated again, and need not fit.
-
-    Raises
-    ------
-    InputError
-    """
-    if name in values:
-        return getattr(with_values(owner, values), name)
-    inner = {key.removeprefix(f"{name}."): value for key, value in values.items()}
-    try:
-        return with_values(getattr(owner, name), inner)
-    except InputError as error:
-        raise InputError([f"{name}.{text}" for text in error.problems]) from None
 
 
 class _Leaf(NamedTuple):

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.methods import Solver, Values, accepted, check_method, prepared, variables_of
-from stiction.model import Count, Names, Number, Positive, describe, model, whole
-from stiction.problem import PROFILES, Problem, Sample, refusals
+from stiction.model import Count, Names, Number, describe, model
+from stiction.problem import PROFILES, Problem, refusals
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.stresses import (
@@ -31,8 +30,6 @@ from stiction.results import Variable, along
 
 AnyRandom: TypeAlias = RandomInterface | RandomField
 
-MOST_KEPT = 10**6
-"""Samples whose profiles may be kept."""
 SLOW = 32
 """Methods that solve fewer samples at once take so long that drawing does not matter."""
 MOST_NODES = 1 << 20
@@ -56,8 +53,6 @@ class Experiment:
     keep : tuple of str
         What is kept along the interface: random properties by name, and what the method adds. An
         option of the method that is needed for it is switched on.
-    keep_samples : tuple of int, optional
-        Samples of which it is kept; all if None.
     seed : int
         Of the ensemble that `results` are samples of.
 
@@ -82,44 +77,41 @@ class Experiment:
     random: Any  # a RandomInterface once it is made
     method: Any
     keep: tuple[str, ...] = ()
-    keep_samples: tuple[int, ...] | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
         check_method(self.method)
         if not isinstance(self.problem, Problem):
-            mistakes = [f"problem: must be a Problem, got {describe(self.problem)}"]
-            try:
-                as_random_interface(self.random)
-            except InputError as error:
-                mistakes += error.problems
-            raise InputError(mistakes)
+            raise InputError(f"problem: must be a Problem, got {describe(self.problem)}")
+        random, method = as_random_interface(self.random), self.method
         problems: list[str] = []
-        names: set[str] = set()
         try:
-            random = as_random_interface(self.random)
             check_pressure(self.problem, random)
         except InputError as error:
             problems += error.problems
-        else:
-            names = set(random.names)
-            object.__setattr__(self, "random", random)
-            for name, field in random.properties.items():
-                try:
-                    field.modes(self.problem.interface)
-                except InputError as error:
-                    problems += [f"{name}: {text}" for text in error.problems]
-        problems += refusals(self.problem, self.method)
-        if names and self.keep:
-            method, mistakes = _keeping(self.problem, self.method, self.keep, names)
-            object.__setattr__(self, "method", method)
+        for name, field in random.properties.items():
+            try:
+                field.modes(self.problem.interface)
+            except InputError as error:
+                problems += [f"{name}: {text}" for text in error.problems]
+        problems += refusals(self.problem, method)
+        if self.keep:
+            method, mistakes = _keeping(self.problem, method, self.keep, random.names)
             problems += mistakes
         if problems:
             raise InputError(problems)
+        object.__setattr__(self, "random", random)
+        object.__setattr__(self, "method", method)
 
     def by(self, method: Any) -> Experiment:
         """Return the same experiment by another method."""
         return dataclasses.replace(self, method=method)
+
+    def with_seed(self, seed: int) -> Experiment:
+        """Return the same experiment with another seed; nothing is checked again."""
+        found = copy.copy(self)
+        object.__setattr__(found, "seed", seed)
+        return found
 
     @property
     def dimension(self) -> int:
@@ -134,9 +126,10 @@ class Experiment:
         return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
 
     @property
-    def wide(self) -> tuple[str, ...]:
-        """Names of the variables that have a number at each node."""
-        return tuple(name for name, variable in self.variables.items() if variable.wide)
+    def sample_bytes(self) -> float:
+        """Bytes of what `results` returns for one sample."""
+        nodes = self.problem.interface.size
+        return 8.0 * sum(nodes if one.wide else 1 for one in self.variables.values())
 
     @property
     def pressure(self) -> float:
@@ -157,10 +150,7 @@ class Experiment:
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units.
 
-        Raises
-        ------
-        InputError
-            If most of the strength lies below the residual strength.
+        Most of the strength below the residual strength is an `InputError`.
         """
         self.random.warn_if_inaccurate(self.problem.interface)
         self.problem.warn_of_units(self.mean("strength"))
@@ -169,14 +159,7 @@ class Experiment:
     def draws(self, seed: int, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.
 
-        Parameters
-        ----------
-        seed, first, count : int
-
-        Returns
-        -------
-        (count, dimension) array
-            Row i depends on (seed, first + i) only.
+        An array of shape (count, dimension), whose row i depends on (seed, first + i) only.
         """
         return self.random.draws(self.problem.interface, count, seed, first)
 
@@ -187,17 +170,6 @@ class Experiment:
         """
         found = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, found)
-
-    def sample(self, profiles: Mapping[str, Array]) -> Sample:
-        """Return profiles as the method takes them, validated.
-
-        Raises
-        ------
-        InputError
-            Naming what is wrong with a sample.
-        """
-        # `check_fields` has warned of nodes of constant strength.
-        return self.problem.sample(profiles, accept=(*accepted(self.method), "constant"))
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles by name, (samples, *shape) each.
@@ -213,7 +185,9 @@ class Experiment:
         InputError
             If a sample does not fit the method.
         """
-        return dict(self.prepare()(self.sample(profiles)))
+        # `check_fields` has warned of nodes of constant strength.
+        accept = (*accepted(self.method), "constant")
+        return dict(self.prepare()(self.problem.sample(profiles, accept=accept)))
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method, which is kept for the next call."""
@@ -241,11 +215,7 @@ class Experiment:
     def batches(self, first: int, count: int, size: int | None = None) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
 
-        Parameters
-        ----------
-        first, count : int
-        size : int, optional
-            Samples of a batch; `batch` if left out.
+        The default of `size` is `batch`.
         """
         size = self.batch if size is None else size
         start, end = first, first + count
@@ -254,12 +224,6 @@ class Experiment:
             yield start, stop - start
             start = stop
 
-    def keeps(self, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which of these samples keep their wide variables."""
-        if self.keep_samples is None:
-            return np.ones(samples.size, dtype=np.bool_)
-        return np.isin(samples, self.keep_samples)
-
 
 @lru_cache(maxsize=8)
 def _solver(problem: Problem, method: Any) -> Solver:
@@ -267,51 +231,18 @@ def _solver(problem: Problem, method: Any) -> Solver:
 
 
 def _keeping(
-    problem: Problem, method: Any, keep: tuple[str, ...], random: set[str]
+    problem: Problem, method: Any, keep: tuple[str, ...], random: tuple[str, ...]
 ) -> tuple[Any, list[str]]:
     """The method with the options switched on that `keep` names, and what cannot be kept."""
-    switches = {
-        field.name
-        for field in dataclasses.fields(method)
-        if isinstance(getattr(method, field.name), bool)
-    }
-
-    def wide(name: str) -> bool:
-        wider = dataclasses.replace(method, **{name: True}) if name in switches else method
-        found = wider.variables(problem)
-        return name in found and found[name].wide
-
-    problems = []
-    for name in keep:
-        known = name in random or name in method.variables(problem)
-        if not known and name in switches and wide(name):
-            method = dataclasses.replace(method, **{name: True})
-        elif not known and name in PROFILES:
-            valid = ", ".join(sorted(random))
-            problems.append(f"keep: {name!r} is not random here (valid: {valid})")
-        elif not known:
-            names = {n for n in switches | set(method.variables(problem)) if wide(n)}
-            problems.append(unknown_name("keep", name, sorted(random | names)))
-    return method, problems
-
-
-def _chosen(value: Any) -> Any:
-    """A number of samples stands for the first ones."""
-    count = whole(value)
-    if count is not None and count > MOST_KEPT:
-        raise InputError(f"must be at most {MOST_KEPT} samples, got {describe(value)}")
-    if count is not None and count > 0:
-        return tuple(range(count))
-    if not isinstance(value, list | tuple):
-        raise InputError(
-            "must be a list of sample numbers, or how many of the first samples to keep;"
-            f" got {describe(value)}"
-        )
-    return tuple(value)
-
-
-Chosen: TypeAlias = Annotated[tuple[Number, ...], BeforeValidator(_chosen)]
-"""Numbers of samples."""
+    names = [field.name for field in dataclasses.fields(method)]
+    options = [name for name in names if isinstance(getattr(method, name), bool)]
+    wider = {name: dataclasses.replace(method, **{name: True}) for name in options}
+    adding = [name for name, one in wider.items() if name in one.variables(problem)]
+    offered = sorted({*random, *adding})
+    unknown = [n for n in keep if n not in offered and n not in method.variables(problem)]
+    if on := {name: True for name in keep if name in adding}:
+        method = dataclasses.replace(method, **on)
+    return method, [unknown_name("keep", name, offered) for name in unknown]
 
 
 @model(kw_only=True)
@@ -329,10 +260,6 @@ class Ensemble:
     keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
         method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
-    keep_samples : tuple of int or int, optional
-        Numbers of the samples for which it is kept, or how many of the first; all if left out.
-    keep_limit : float, optional
-        Bytes that this may take in all; 1 GiB if left out.
 
     Examples
     --------
@@ -345,9 +272,7 @@ class Ensemble:
     seed: Number = 0
     first: Number = 0
     keep: Names = ()
-    keep_samples: Chosen | None = None
-    keep_limit: Positive | None = None
 
     def of(self, problem: Problem, random: Any, method: Any) -> Experiment:
         """Return the experiment whose samples these are."""
-        return Experiment(problem, random, method, self.keep, self.keep_samples, self.seed)
+        return Experiment(problem, random, method, self.keep, self.seed)

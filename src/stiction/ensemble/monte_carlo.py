@@ -2,66 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.batches import AnyExecutor, missing_spans, solve_spans, usable_cores
-from stiction.ensemble.dataset import Gathered, GridAxis, warn_of_failures
-from stiction.ensemble.experiment import AnyRandom, Chosen, Ensemble, Experiment
+from stiction.ensemble.dataset import Gathered, GridAxis, distinct, warn_of_failures
+from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
-from stiction.ensemble.points import differing_in
+from stiction.ensemble.store import Store
 from stiction.ensemble.table import Table
 from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
-from stiction.methods import MethodObject
-from stiction.model import (
-    Count,
-    Flag,
-    Names,
-    Number,
-    Positive,
-    Progress,
-    Seconds,
-    checked,
-    to_plain,
-)
+from stiction.methods import MethodObject, study_attributes
+from stiction.model import Count, Flag, Names, Number, Progress, Seconds, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 from stiction.random.random_field import too_many_samples
 
-KEEP_LIMIT = 2.0**30
 FEW = 4
 HOPELESS = 16
-"""Samples of a point that fail, with none solved, before the whole ensemble is given up."""
-
-
-class Rows(Protocol):
-    """Where the samples of an ensemble go: to memory, or to a folder."""
-
-    def add(self, table: Table) -> None:
-        """Take the rows of a table."""
-
-    def save(self, *, now: bool = False) -> None:
-        """Store them if it is time to, or now."""
+"""Samples that fail, with none solved, before the whole ensemble is given up."""
 
 
 def compute(
     points: Sequence[Experiment],
     done: NDArray[np.bool_],
-    rows: Rows,
+    take: Callable[[list[Table]], None],
     *,
     first: int = 0,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Show = True,
     time_limit: float | None = None,
-    seconds: float = 0.25,
 ) -> None:
     """Compute the samples of some points that are not done.
 
@@ -69,69 +46,46 @@ def compute(
     ----------
     points : sequence of Experiment
     done : (points, samples) array of bool
-    rows : Rows
-        Gets them as they are solved. When the seconds of `time_limit` are over, the rest is left.
+    take : callable
+        Gets tables as samples are solved, and an empty list now and then. When the seconds of
+        `time_limit` are over, the rest is left.
     first : int
         Number of the first sample.
     workers, executor, progress, time_limit
         See `monte_carlo`.
-    seconds : float
-        About how long a piece of work takes.
 
     Raises
     ------
     InputError, RuntimeError
-        If no sample of a point can be solved.
+        If no sample can be solved.
     StoreError, WorkerError
     """
-    spans = missing_spans(done, first)
-    if spans:
-        check_fields(points)
-        if len(points) == 1:
-            points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
-    solved: NDArray[np.bool_] = np.any(done, axis=1)
-    lost = np.zeros(len(points), dtype=np.int64)
-    enough = np.minimum(HOPELESS, (~done).sum(axis=1))
+    if done.all():
+        return
+    check_fields(points)
+    if len(points) == 1:
+        points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
+    solved, lost, total = bool(done.any()), 0, int(done.size - done.sum())
+    label = " and ".join({one.method.label: None for one in distinct(points, "method")})
     workers = usable_cores() if workers is None else workers
-    work = solve_spans(points, spans, executor=executor, workers=workers, seconds=seconds)
-    total = sum(span.samples for span in spans)
-    with (
-        Meter(_method_name(points), total, progress, time_limit=time_limit) as meter,
-        closing(work),
-    ):
-        try:
-            for table in work:
-                if table is not None:
-                    rows.add(table)
-                    meter.advance(table.count)
-                    solved[table.point] = True
-                    for failure in table.failures:
-                        lost[failure.point] += 1
-                        if (
-                            lost[failure.point] >= enough[failure.point]
-                            and not solved[failure.point]
-                        ):
-                            raise failure.exception()
-                rows.save()
-                if meter.over:
-                    break
-        finally:  # also on Ctrl-C, and when workers are lost: what is done is kept
-            rows.save(now=True)
-
-
-def _method_name(points: Sequence[Experiment]) -> str:
-    """The method of some points, for progress."""
-    names = {point.method.label for point in differing_in(points, "method")}
-    return str(names.pop()) if len(names) == 1 else "samples"
+    work = solve_spans(points, missing_spans(done, first), executor=executor, workers=workers)
+    with Meter(label, total, progress, time_limit=time_limit) as meter, closing(work):
+        for tables in work:
+            take(tables)
+            for table in tables:
+                meter.advance(table.count)
+                solved, lost = solved or table.sample.size > 0, lost + len(table.failures)
+                if not solved and lost >= min(HOPELESS, total):
+                    raise table.failures[0].exception()
+            if meter.over:
+                break
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
     """Warn of fields that do not suit the grid, the interface or their units, once each."""
-    some = differing_in(points, "random", "problem")
-    with collect_warnings() as caught, Meter("checking the fields", len(some)) as meter:
-        for point in some:
+    with collect_warnings() as caught:
+        for point in distinct(points, "random", "problem"):
             point.check_fields()
-            meter.advance()
     found = list(dict.fromkeys(caught))
     for text, category in found[:FEW]:
         warn_user(text, category)
@@ -140,74 +94,66 @@ def check_fields(points: Sequence[Experiment]) -> None:
         warn_accuracy(more)
 
 
-def wide_bytes(experiment: Experiment, samples: int, first: int = 0) -> float:
-    """Return the bytes of what is kept along the interface."""
-    kept = samples
-    if experiment.keep_samples is not None:
-        kept = sum(first <= sample < first + samples for sample in experiment.keep_samples)
-    return 8.0 * experiment.problem.interface.size * len(experiment.wide) * kept
-
-
-def check_size(needed: float, limit: float | None) -> None:
-    """Refuse to keep more than the stated size, 1 GiB if it is None."""
-    limit = KEEP_LIMIT if limit is None else limit
-    if needed > limit:
-        raise InputError(
-            f"keep: what is kept along the interface takes {needed / 2**20:,.0f} MiB, more than"
-            f" keep_limit = {limit / 2**20:,.0f} MiB; keep fewer variables, choose samples with"
-            " keep_samples, or raise keep_limit (bytes)"
-        )
-
-
 def gather(
     points: Sequence[Experiment],
     ensemble: Ensemble,
     attributes: Mapping[str, Any],
     axes: Sequence[GridAxis] = (),
     *,
+    store: Store | None = None,
+    retry: bool = False,
+    others: NDArray[np.bool_] | None = None,
     pilot: bool = True,
     **options: Any,
 ) -> xr.Dataset:
-    """Compute an ensemble at every point in memory; `options` are those of `compute`."""
+    """Compute an ensemble at every point, or what is not stored of it.
+
+    Parameters
+    ----------
+    points, axes
+        Of a sweep.
+    ensemble : Ensemble
+    attributes : mapping
+        Of the result.
+    store : Store, optional
+        Where samples are, and where they go as they are done.
+    retry : bool
+        Compute stored samples that failed again.
+    others : (points, samples) array of bool, optional
+        Samples that somebody else computes.
+    pilot : bool
+    **options
+        See `compute`.
+    """
     samples, first = ensemble.samples, ensemble.first
     rows = Gathered(points, samples, first)
-    compute(points, rows.done.copy(), rows, first=first, **options)
-    if pilot:
-        show = options.get("progress", True) is True
-        attributes = {**attributes, **pilot_attributes(points, samples, first, show=show)}
-    result = rows.dataset(attributes, axes)
-    warn_of_failures(rows.failed, rows.done.size)
-    for failure in rows.failed:
-        rows.done[failure.point, failure.sample - first] = True
-    return result if rows.done.all() else _cut_short(result, rows.done)
+    if store is not None:
+        store.load(rows.add)
+    done = rows.done.copy() if retry else rows.dealt_with
+    if others is not None:
+        done |= others
 
+    def take(tables: list[Table]) -> None:
+        rows.add(tables)
+        if store is not None:
+            store.add(tables)
 
-def _cut_short(result: xr.Dataset, done: NDArray[np.bool_]) -> xr.Dataset:
-    """The first samples, up to one that no point has, when the time was over."""
-    count = int(np.argmin(np.append(done.any(axis=0), False)))
-    if not count:
-        raise TimeoutError(
-            "time_limit: not one sample was done in this time; raise time_limit, or give out= to"
-            " keep what is done and go on later"
-        )
-    result = result.isel(sample=slice(0, count))
-    if "kept_sample" in result.dims:
-        there = np.isin(result["kept_sample"].values, result["sample"].values)
-        result = result.isel(kept_sample=there)
-    text = f"{done[:, :count].sum()} of {done.size} samples were done when the time was over"
-    warn_accuracy(text)
-    return result.assign_attrs(cut_short=text)
-
-
-def _attributes(experiment: Experiment, ensemble: Ensemble) -> dict[str, Any]:
-    """All it takes to run an ensemble again, as a study in plain form."""
-    parts = {name: getattr(experiment, name) for name in ("problem", "random", "method")}
-    parts["ensemble"] = replace(ensemble, keep_limit=None)
     try:
-        study = {name: to_plain(part) for name, part in parts.items()}
-    except InputError as error:  # a function of the user's: the result says so and is still one
-        return {"study_incomplete": str(error), "seed": ensemble.seed}
-    return {"study": study, "seed": ensemble.seed}
+        compute(points, done, take, first=first, **options)
+    finally:  # also on Ctrl-C, and when workers are lost: what is done is kept
+        if store is not None:
+            store.close()
+    found = None if store is None else store.pilot()
+    if found is None and pilot:
+        show = options.get("progress", True) is True
+        found = pilot_attributes(points, samples, first, show=show)
+        if store is not None:
+            store.note_pilot(found)
+    result = rows.dataset({**attributes, **(found or {})}, axes)
+    warn_of_failures(rows.failed, rows.done.size)
+    if store is None and "cut_short" in result.attrs:
+        warn_accuracy(f"{result.attrs['cut_short']}; the others are NaN")
+    return result
 
 
 @checked
@@ -220,8 +166,6 @@ def monte_carlo(
     seed: Number = 0,
     first: Number = 0,
     keep: Names = (),
-    keep_samples: Chosen | None = None,
-    keep_limit: Positive | None = None,
     workers: Count | None = None,
     executor: AnyExecutor | None = None,
     progress: Progress = True,
@@ -246,11 +190,8 @@ def monte_carlo(
         Number of the first sample, to continue an ensemble.
     keep : str or tuple of str
         What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"sensitivity"``.
-    keep_samples : sequence of int or int, optional
-        Numbers of the samples for which it is kept, or how many of the first; all if left out.
-    keep_limit : float, optional
-        Bytes that this may take; 1 GiB if left out.
+        method can add, such as ``"sensitivity"``. A few samples are enough for a picture: those of
+        another call with the same seed and fewer samples are the same.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -259,8 +200,8 @@ def monte_carlo(
         True shows how far it is, on standard error, once it takes more than two seconds; a
         callable gets (done, total).
     time_limit : float, optional
-        Seconds. When they are over, the result holds the samples that are done, with the
-        attribute 'cut_short'; they are the first ones, to which `first` adds the rest later.
+        Seconds. When they are over, samples that are not done are NaN, and the attribute
+        'cut_short' says how many are.
     pilot : bool
         Solve the first samples by `Equilibrium` too if the method is the local criterion, 32 on a
         line and 8 on a plane, and say how far the two are apart; the ensemble stays the same.
@@ -280,13 +221,11 @@ def monte_carlo(
         Naming all that does not fit. If no sample at all can be solved, naming one with its seed.
     RuntimeError
         Naming a sample and the seed, if a solver fails on all of them.
-    TimeoutError
-        If not one sample was done within `time_limit`.
 
     Warns
     -----
     AccuracyWarning
-        If the time limit was reached, samples could not be solved, or the pilot differs from the
+        If samples could not be solved or were not done in time, or the pilot differs from the
         local criterion by more than 1 %.
 
     Examples
@@ -301,20 +240,15 @@ def monte_carlo(
     """
     if problems := too_many_samples(samples, first):
         raise InputError(problems)
-    ensemble = Ensemble(
-        samples=samples,
-        seed=seed,
-        first=first,
-        keep=keep,
-        keep_samples=keep_samples,
-        keep_limit=keep_limit,
-    )
+    ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
     experiment = ensemble.of(problem, random, method)
-    check_size(wide_bytes(experiment, samples, first), ensemble.keep_limit)
+    about = study_attributes(
+        problem=problem, random=experiment.random, method=experiment.method, ensemble=ensemble
+    )
     return gather(
         [experiment],
         ensemble,
-        _attributes(experiment, ensemble),
+        about | {"seed": seed},
         workers=workers,
         executor=executor,
         progress=progress,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import Any, NamedTuple
@@ -41,9 +41,9 @@ class Pilot(NamedTuple):
 
 
 def exact_counterpart(experiment: Experiment) -> Experiment | None:
-    """Return the experiment by the method that the given one approximates; None if there is none.
+    """Return the experiment by `Equilibrium` if the given one is by the local criterion.
 
-    The counterpart of the local criterion is `Equilibrium`, unless it cannot take the problem.
+    None for other methods, and if `Equilibrium` cannot take the problem.
     """
     method = Equilibrium()
     if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
@@ -69,19 +69,10 @@ def solved(experiment: Experiment, draws: Array, variable: str = "critical_stres
 def compare(
     experiment: Experiment, draws: Array, variable: str = "critical_stress"
 ) -> Pilot | None:
-    """Solve draws by a method and by its exact counterpart.
+    """Solve draws (samples, dimension) by a method and by its exact counterpart.
 
-    Parameters
-    ----------
-    experiment : Experiment
-    draws : (samples, dimension) array
-    variable : str
-        The stress to compare, `critical_stress` or `first_instability`.
-
-    Returns
-    -------
-    Pilot
-        None if there is no counterpart, or fewer than two samples are solved by both.
+    `variable` is the stress to compare, `critical_stress` or `first_instability`. The result is
+    None if there is no counterpart, or fewer than two samples are solved by both.
     """
     exact = exact_counterpart(experiment)
     if exact is None:
@@ -93,6 +84,12 @@ def compare(
         return None
     difference = (near - true)[both] / abs(float(true[both].mean()))
     return Pilot(int(both.sum()), float(difference.mean()), float(difference.std(ddof=1)))
+
+
+def first_samples(experiment: Experiment, first: int = 0, most: int | None = None) -> Array:
+    """Return the draws of the samples that make a pilot, (samples, dimension)."""
+    size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
+    return experiment.draws(experiment.seed, first, min(size, most or size))
 
 
 def doubt(pilot: Pilot, where: str = "") -> str | None:
@@ -108,7 +105,7 @@ def doubt(pilot: Pilot, where: str = "") -> str | None:
 
 def pilot_attributes(
     points: Sequence[Experiment], samples: int, first: int = 0, *, show: bool = True
-) -> Mapping[str, Any]:
+) -> dict[str, Any]:
     """Compare the first samples of some points, and warn of a difference beyond 1 %.
 
     Parameters
@@ -128,20 +125,15 @@ def pilot_attributes(
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     found: list[Pilot] = []
-    what = "comparing some samples with the exact onset"
-    with Meter(what, len(chosen), show, unit="points" if len(points) > 1 else "ensemble") as meter:
-        for number in chosen:
-            experiment = points[int(number)]
-            size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
-            draws = experiment.draws(experiment.seed, first, min(samples, size))
-            pilot = compare(experiment, draws)
+    with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
+        for number in chosen.tolist():
+            pilot = compare(points[number], first_samples(points[number], first, samples))
             found += [pilot] if pilot else []
             meter.advance()
     if not found:
         return {}
     bias = max((pilot.bias for pilot in found), key=abs)
-    scatter = max(pilot.scatter for pilot in found)
-    worst = Pilot(found[0].samples, bias, scatter)
+    worst = Pilot(found[0].samples, bias, max(pilot.scatter for pilot in found))
     if text := doubt(worst, " at the worst point of the sweep" if len(points) > 1 else ""):
         warn_accuracy(text)
-    return {"pilot_samples": found[0].samples, "pilot_bias": bias, "pilot_scatter": scatter}
+    return {f"pilot_{name}": value for name, value in worst._asdict().items()}

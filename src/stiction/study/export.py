@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
-import math
-import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -20,100 +17,59 @@ from stiction.files import cannot_write, write_atomically, write_dataset
 from stiction.results import DIRECTION
 
 OVERHEAD = 2**16
-NEEDS = {".parquet": "pyarrow", ".zarr": "zarr"}
-SUFFIXES = (".nc", ".csv", ".parquet", ".zarr")
+SUFFIXES = (".nc", ".csv")
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a file name whose suffix does not say what can be written.
-
-    Raises
-    ------
-    InputError
-        Naming the suffixes that can be, or the library that is missing.
-    """
+    """Refuse a file name whose suffix does not say what can be written."""
     if path.suffix not in SUFFIXES:
         raise InputError(
             f"{path}: the suffix says what is written, and must be one of {', '.join(SUFFIXES)};"
             f" got {path.suffix or 'none'!r}"
         )
-    library = NEEDS.get(path.suffix)
-    if library is not None and importlib.util.find_spec(library) is None:
-        raise InputError(
-            f"{path}: {path.suffix} needs {library}, which is not installed: python -m pip install"
-            f" {library}; or write .nc or .csv"
-        )
 
 
-def export(result: xr.Dataset, path: str | Path) -> None:
+def export(result: xr.Dataset, path: Path) -> None:
     """Write a result as its suffix says, whole or not at all.
 
     Parameters
     ----------
     result : Dataset
         From `monte_carlo`, `Study.run` or `open_run(...).dataset()`.
-    path : path
-        ``.nc`` (NetCDF) and ``.zarr`` (needs zarr) hold everything. ``.csv`` and ``.parquet``
-        (needs pyarrow) hold a table: a row a sample, columns named ``name (unit)`` with the unit 1
-        for pure numbers, every number in full, ``nan`` where a sample is missing. Profiles along
-        the interface do not fit into it and are left out with a warning.
+    path : Path
+        ``.nc`` (NetCDF) holds everything. ``.csv`` holds a table: a row a sample, columns named
+        ``name (unit)`` with the unit 1 for pure numbers, every number in full, ``nan`` where a
+        sample is missing. Profiles along the interface are left out with a warning.
 
     Raises
     ------
-    InputError
-        If the suffix is none of these, or its library is not installed.
     StoreError
         If it cannot be written.
     """
-    path = Path(path)
-    check_suffix(path)
     if path.suffix == ".nc":
         write_result(result, path)
         return
+    frame = pd.DataFrame(columns(result))
     try:
-        if path.suffix == ".zarr":
-            _write_zarr(result, path)
-        else:
-            frame = pd.DataFrame(columns(result))
-            plain = result.attrs.items()
-            frame.attrs = {str(k): v.item() if isinstance(v, np.generic) else v for k, v in plain}
-            # Numbers are written as the shortest text that reads back to the same bits.
-            write = {
-                ".csv": lambda aside: frame.to_csv(aside, index=False, na_rep="nan"),
-                ".parquet": lambda aside: frame.to_parquet(aside, index=False),
-            }[path.suffix]
-            write_atomically(path, write)
+        # Numbers are written as the shortest text that reads back to the same bits.
+        write_atomically(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
     except OSError as error:
         raise cannot_write(path, error) from error
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as one NetCDF file with checksums, whole or not at all."""
-    # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
-    if _free_bytes(path.parent) < 1.05 * result.nbytes + OVERHEAD:
-        raise cannot_write(path, OSError(errno.ENOSPC, ""))
     try:
+        # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
+        if shutil.disk_usage(path.parent).free < 1.05 * result.nbytes + OVERHEAD:
+            raise OSError(errno.ENOSPC, "")
         write_dataset(result, path)
     except (OSError, RuntimeError) as error:  # the NetCDF library raises either
         raise cannot_write(path, error) from error
 
 
-def _free_bytes(folder: Path) -> float:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:
-        return math.inf
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
-
-
 def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
-    """One column a variable, one row a sample at each point of the sweep.
+    """Return one column a variable, one row a sample at each point of the sweep.
 
     Parameters
     ----------
@@ -125,7 +81,7 @@ def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
         By ``name (unit)``: what is swept, the sample number, what was found.
     """
     named = {str(name): variable for name, variable in result.data_vars.items()}
-    narrow = {name: v for name, v in named.items() if not {"x", "y", "kept_sample"} & set(v.dims)}
+    narrow = {name: v for name, v in named.items() if not {"x", "y"} & set(v.dims)}
     wide = sorted(named.keys() - narrow.keys())
     if wide:
         warn_accuracy(
@@ -144,15 +100,3 @@ def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
         full = variable.set_dims(sizes).transpose(*dims)
         table[f"{name} ({variable.attrs.get('units', '1')})"] = np.asarray(full.values).ravel()
     return table
-
-
-def _write_zarr(result: xr.Dataset, path: Path) -> None:
-    aside = path.with_name(path.name + ".part")
-    try:
-        _remove(aside)
-        result.to_zarr(aside)
-        _remove(path)
-        os.replace(aside, path)
-    except OSError:
-        _remove(aside)
-        raise

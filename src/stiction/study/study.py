@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -17,12 +17,11 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from stiction.dynamics.save import Save
 from stiction.ensemble.batches import AnyExecutor
-from stiction.ensemble.dataset import GridAxis
-from stiction.ensemble.dotted_keys import part_with_values
+from stiction.ensemble.dataset import GridAxis, variables_in
+from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.monte_carlo import check_size, gather, wide_bytes
-from stiction.ensemble.points import Points, differing_in, variables_in
-from stiction.ensemble.store import Store
+from stiction.ensemble.monte_carlo import gather
+from stiction.ensemble.store import Damaged, Store, read_study
 from stiction.errors import InputError, StoreError, unknown_name
 from stiction.methods import methods
 from stiction.model import (
@@ -39,10 +38,9 @@ from stiction.model import (
     to_plain,
 )
 from stiction.problem import Problem
-from stiction.progress import Meter
 from stiction.random.random_field import RandomField, too_many_samples
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.run import StoredRun, result_of, run_into
+from stiction.study.run import StoredRun, as_part
 from stiction.study.study_file import completed, read_sweep, read_toml, reading
 from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
 
@@ -117,53 +115,16 @@ class Study:
     title: Text = ""
 
     @model_validator(mode="after")
-    def _fits_together(self, info: pydantic.ValidationInfo) -> Study:
-        if (info.context or {}).get("trusted"):
-            return self
-        self._check_points()
-        ensemble = self.ensemble
-        problems = too_many_samples(ensemble.samples, ensemble.first, len(self.experiments))
-        if problems:
+    def _fits_together(self) -> Study:
+        ensemble, points = self.ensemble, self.experiments
+        if problems := too_many_samples(ensemble.samples, ensemble.first, len(points)):
             raise InputError([f"ensemble.{text}" for text in problems])
-        if ensemble.keep:
-            self._check_kept()
-        return self
-
-    def _check_kept(self) -> None:
-        ensemble = self.ensemble
-        some = differing_in(
-            self.experiments, "method", "problem.load", "problem.interface", "random"
-        )
-        nodes = {point.problem.interface.shape for point in some}
-        if len(nodes) > 1 and any(point.wide for point in some):
+        if ensemble.keep and len({point.problem.interface.shape for point in points}) > 1:
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
                 " is swept; make a study of each"
             )
-        size = sum(wide_bytes(point, ensemble.samples, ensemble.first) for point in some)
-        try:
-            check_size(size * len(self.experiments) / len(some), ensemble.keep_limit)
-        except InputError as error:
-            raise InputError(f"ensemble.{error}") from None
-
-    def _check_points(self) -> None:
-        """Make every experiment once; a mistake is reported once, with the points where it is."""
-        problems: dict[str, list[int]] = {}
-        with Meter("checking the sweep", len(self.experiments), unit="points") as meter:
-            for number in range(len(self.experiments)):
-                try:
-                    self.experiments[number]
-                except InputError as error:
-                    for text in error.problems:
-                        problems.setdefault(text, []).append(number)
-                meter.advance()
-        if problems and not self.sweep:
-            raise InputError(problems)
-        if problems:
-            points = self.points
-            raise InputError(
-                [_at_points(text, [points[n] for n in where]) for text, where in problems.items()]
-            )
+        return self
 
     @property
     def points(self) -> list[Point]:
@@ -171,39 +132,55 @@ class Study:
         return points_of(self.sweep)
 
     @cached_property
-    def experiments(self) -> Sequence[Experiment]:
-        """What is to be computed: one `Experiment` a point, made on demand."""
+    def experiments(self) -> list[Experiment]:
+        """What is to be computed at each point; what points share is made once.
+
+        A mistake is reported once, with the points where it is.
+        """
         base = _Parts(**{name: getattr(self, name) for name in _PARTS})
-        keys = [axis.keys for axis in self.sweep]
+        swept = [key for axis in self.sweep for key in axis.keys]
+        below = {name: [key for key in swept if key.split(".")[0] == name] for name in _PARTS}
+        made: dict[Any, Any] = {}
 
-        def part(name: str, steps: tuple[int, ...]) -> Any:
-            values = {
-                key: axis.steps[step][i]
-                for axis, step in zip(self.sweep, steps, strict=True)
-                for i, key in enumerate(axis.keys)
-                if key.split(".")[0] == name
-            }
-            return part_with_values(base, name, values) if values else getattr(base, name)
+        def part(name: str, values: Mapping[str, Any]) -> Any:
+            own = {key: values[key] for key in below[name]}
+            key = name, *map(id, own.values())
+            if key not in made:
+                made[key] = getattr(with_values(base, own), name)
+            return made[key]
 
-        return Points(keys, [len(axis.steps) for axis in self.sweep], _PARTS, part, _experiment)
+        found: list[Experiment] = []
+        problems: dict[str, list[Point]] = {}
+        for point in self.points:
+            try:
+                *parts, ensemble = (part(name, point.values) for name in _PARTS)
+                key = tuple(map(id, parts))
+                if key not in made:
+                    made[key] = self.ensemble.of(*parts)
+                found.append(made[key].with_seed(ensemble.seed))
+            except InputError as error:
+                for text in error.problems:
+                    problems.setdefault(text, []).append(point)
+        if problems and not self.sweep:
+            raise InputError(problems)
+        if problems:
+            raise InputError([_at(points, text) for text, points in problems.items()])
+        return found
 
     @property
     def axes(self) -> list[GridAxis]:
         """The axes of the sweep as dimensions of the result."""
         variables = set(variables_in(self.experiments))
-        return grid_axes(
-            self.sweep, sorted(variables | {"sample", "kept_sample", "x", "y", "position"})
-        )
+        return grid_axes(self.sweep, sorted(variables | {"sample", "x", "y", "position"}))
 
     @property
     def attributes(self) -> dict[str, Any]:
         """What a result says about itself: enough to run it again."""
         try:
-            plain = self.to_dict()
+            found: dict[str, Any] = {"study": self.to_dict(), "seed": self.ensemble.seed}
         except InputError as error:  # a function of the user's: the result says so
             return {"study_incomplete": str(error), "seed": self.ensemble.seed}
-        result: dict[str, Any] = {"study": plain, "seed": self.ensemble.seed}
-        return result | ({"title": self.title} if self.title else {})
+        return found | ({"title": self.title} if self.title else {})
 
     @checked
     def run(
@@ -226,8 +203,7 @@ class Study:
             A folder in which results are stored as they are done. The same call goes on where a
             run was interrupted, and computes only what is new if `samples` was raised.
         workers, executor, progress, time_limit, pilot
-            See `stiction.monte_carlo`. With `out`, what is missing when the time is over is NaN,
-            and the same call goes on.
+            See `stiction.monte_carlo`.
         retry : bool
             Compute stored samples that failed again.
         part : (int, int) or str, optional
@@ -244,23 +220,33 @@ class Study:
         InputError, RuntimeError
             See `stiction.monte_carlo`.
         StoreError
-            If `out` cannot be used, or what was stored is damaged before the end.
+            If `out` cannot be used.
         WorkerError
             If a worker is lost.
         """
-        options: dict[str, Any] = {
-            "workers": workers,
-            "executor": executor,
-            "progress": progress,
-            "time_limit": time_limit,
-            "pilot": pilot,
-        }
-        if out is not None:
-            stored = run_into(self, out, retry=retry, part=part, **options)
-            return result_of(stored, partial=time_limit is not None or part is not None)
+        store = others = None
         if part is not None:
-            raise InputError("part: a part is stored; say where with out=")
-        return gather(self.experiments, self.ensemble, self.attributes, self.axes, **options)
+            mine = as_part(part)
+            if out is None:
+                raise InputError("part: a part is stored; say where with out=")
+            others = ~mine.mask(len(self.experiments), self.ensemble.samples)
+            pilot = pilot and mine.number == 1
+        if out is not None:
+            store = Store.open(out, self.to_dict())
+        return gather(
+            self.experiments,
+            self.ensemble,
+            self.attributes,
+            self.axes,
+            store=store,
+            others=others,
+            retry=retry,
+            workers=workers,
+            executor=executor,
+            progress=progress,
+            time_limit=time_limit,
+            pilot=pilot,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, as in TOML.
@@ -291,28 +277,21 @@ class Study:
             raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
     @classmethod
-    def from_dict(
-        cls, given: dict[str, Any], *, folder: str | Path | None = None, trusted: bool = False
-    ) -> Study:
+    def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
         """A study from plain dictionaries; file names of profiles are relative to `folder`.
 
-        A key that is swept need not have a value of its own. The points of a `trusted` study, one
-        that was valid when it was stored, are not looked at one by one.
+        A key that is swept need not have a value of its own.
         """
         check("study", given, dict)
-        check("trusted", trusted, Flag)
         folder = None if folder is None else check("folder", folder, FilePath)
         sweep, mistakes = read_sweep(given, folder, cls)
-        if sweep:
-            given = completed(given, sweep)
         try:
             study: Study = pydantic.TypeAdapter(cls).validate_python(
-                given, context={**reading(folder), "trusted": trusted}
+                completed(given, sweep), context=reading(folder)
             )
         except pydantic.ValidationError as error:
             texts = explain(error, cls)
-            new = [text for text in mistakes if text not in texts]
-            raise InputError(texts + new) from None
+            raise InputError(dict.fromkeys([*texts, *mistakes])) from None
         return study
 
     @classmethod
@@ -347,12 +326,7 @@ class _Parts:
 _PARTS = tuple(_Parts.__dataclass_fields__)
 
 
-def _experiment(parts: Mapping[str, Any]) -> Experiment:
-    ensemble: Ensemble = parts["ensemble"]
-    return ensemble.of(parts["problem"], parts["random"], parts["method"])
-
-
-def _at_points(text: str, points: list[Point]) -> str:
+def _at(points: list[Point], text: str) -> str:
     more = f" and {len(points) - 1} more" if len(points) > 1 else ""
     return f"{text}, at {name_point(points[0])}{more} of the sweep"
 
@@ -416,5 +390,10 @@ def open_run(path: Any) -> StoredRun:
     place = check("path", path, FilePath)
     if not place.is_dir():
         raise StoreError(f"{place}: there is no run here; a run is a folder")
-    store = Store(place)
-    return StoredRun(store, Study.from_dict(store.study, trusted=True))
+    try:
+        study = read_study(place)
+    except FileNotFoundError:
+        raise StoreError(f"{place}: holds no run") from None
+    except Damaged as error:
+        raise StoreError(f"{error}; running the study again into the folder mends it") from None
+    return StoredRun(Store(place, study), Study.from_dict(study))

@@ -25,11 +25,10 @@ from stiction.results import Variable
 
 MOST_POINTS = 100_000
 _FIXED = (
+    "ensemble",
     "ensemble.samples",
     "ensemble.first",
     "ensemble.keep",
-    "ensemble.keep_samples",
-    "ensemble.keep_limit",
     "title",
     "sweep",
 )

@@ -1,0 +1,704 @@
+"""The command line: parse, call, print. Numerics are imported inside commands: help is quick."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+import logging
+import os
+import re
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from typer.models import OptionInfo
+
+from stiction import __version__
+from stiction.errors import InputError, RunError, collect_warnings, unknown_name
+from stiction.progress import Meter, duration
+
+SHOWN = 12
+"""Points, failures or damaged chunks that are listed."""
+PROBED = 5
+"""Points of a sweep at which samples are timed."""
+BUDGET = 2.0
+"""Seconds that the timing may take, apart from preparation and compilation."""
+RUPTURE = (
+    "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
+)  # fmt: skip
+"""What is printed of a rupture."""
+ONSET = (
+    "critical_stress", "friction_coefficient", "critical_load", "first_instability",
+    "critical_position",
+)  # fmt: skip
+"""What is printed of an onset."""
+
+StudyFile = Annotated[
+    Path, typer.Argument(metavar="STUDY.toml", help="Study file; `stiction schema` describes it.")
+]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
+Workers = Annotated[int | None, typer.Option(help="Threads; all cores by default.", min=1)]
+TimeLimit = Annotated[
+    float | None, typer.Option(help="Seconds; the result is what is done by then, and says so.")
+]
+LoadingRate = Annotated[
+    float, typer.Option(help="Of the dynamic method, Pa/s, unless the study gives one.")
+]
+
+
+# -- what commands share -------------------------------------------------------------------------
+
+
+def echo(text: Any = "", *, err: bool = False) -> None:
+    """Print what may come from a file: nothing in it can steer the terminal.
+
+    Control characters other than line ends and tabs, and what is no valid UTF-8, are written as
+    their escapes.
+    """
+    safe = "".join(
+        char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in str(text)
+    )
+    typer.echo(safe, err=err)
+
+
+def in_options(text: str, command: Callable[..., Any] | None) -> str:
+    """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``.
+
+    Parameters
+    ----------
+    text : str
+        Message of a function of the package, which names its own arguments.
+    command : callable, optional
+        The function of a command, whose options have the names of those arguments.
+    """
+    parameters = {} if command is None else inspect.signature(command, eval_str=True).parameters
+    for name, parameter in parameters.items():
+        extras = getattr(parameter.annotation, "__metadata__", ())
+        if any(isinstance(extra, OptionInfo) for extra in extras):
+            option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
+            text = re.sub(rf"{argument}=(True\b|\.\.\.)", option, text)
+            text = re.sub(rf"{argument}=[\"']?([^\s\"',;)]*)[\"']?", rf"{option} \1", text)
+            text = re.sub(rf"^{name}(?=:| must)", option, text)
+    return text
+
+
+def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
+    for text in texts[:SHOWN]:
+        echo(f"{prefix}{text}", err=err)
+    if len(texts) > SHOWN:
+        echo(f"{prefix}and {len(texts) - SHOWN} more", err=err)
+
+
+def _save_figure(axes: Any, path: Path) -> None:
+    from stiction.plot.style import save_figure
+
+    for suffix in (".png", ".pdf"):
+        save_figure(axes.figure, path.with_suffix(suffix))
+
+
+# -- studies and runs ----------------------------------------------------------------------------
+
+
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Any]:
+    """The executor of a Dask scheduler; None without one."""
+    if scheduler is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+
+        client = Client(scheduler)
+    except ImportError:
+        raise InputError("--scheduler: needs distributed, which is not installed") from None
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"--scheduler: {scheduler} cannot be reached: {error}") from None
+    with client:
+        yield client.get_executor(pure=False)
+
+
+def run(
+    study: StudyFile,
+    out: Annotated[
+        Path,
+        typer.Option(metavar="RUN", help="Folder in which results are stored as they are done."),
+    ],
+    workers: Workers = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://host:8786."),
+    ] = None,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Compute stored samples that failed again.")
+    ] = False,
+    time_limit: TimeLimit = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            metavar="K/N",
+            help="Compute the K-th of N parts only, for jobs that share the folder RUN and do not"
+            " know of each other.",
+        ),
+    ] = None,
+    pilot: Annotated[
+        bool, typer.Option(help="Compare the local criterion with the exact onset.")
+    ] = True,
+) -> None:
+    """Run the study of a file, or what is missing of it.
+
+    The same command goes on where a run was interrupted, however it ended, and computes only the
+    new samples if `samples` was raised in the study. The numbers do not depend on workers,
+    machines or interruptions.
+
+    Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
+    or the command; 3: the time limit was reached; 130: interrupted.
+    """
+    from stiction.study.study import Study, open_run
+
+    loaded = Study.from_toml(study)
+    # A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with _executor(scheduler) as executor:
+            result = loaded.run(
+                out=out,
+                workers=workers,
+                executor=executor,
+                time_limit=time_limit,
+                retry=retry,
+                part=part,
+                pilot=pilot,
+            )
+    except KeyboardInterrupt:
+        try:
+            state = open_run(out).status()
+            done = f"{state.done} of {state.samples} samples are stored in {out}"
+        except RunError:
+            done = "nothing is stored yet"
+        echo(f"interrupted: {done}; the same command goes on", err=True)
+        raise typer.Exit(130) from None
+    dims = [axis.dim for axis in loaded.axes]
+    for name in ("critical_stress", "friction_coefficient"):
+        if name in result:
+            scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
+            values = (result[name] * scale).to_dataframe()[name]
+            table = values.groupby(dims) if dims else values
+            echo(f"{name}{unit}\n{table.describe(percentiles=[0.05, 0.5, 0.95]).to_string()}")
+    state = open_run(out).status()
+    echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
+    if state.failures:
+        echo(f"{len(state.failures)} samples failed; --retry computes them again:", err=True)
+        _show_some(state.failures, "  ", err=True)
+        raise typer.Exit(1)
+    if "cut_short" in result.attrs and part is None:
+        echo(f"{result.attrs['cut_short']}; the same command goes on", err=True)
+        raise typer.Exit(3)
+
+
+def status(run: RunPath) -> None:
+    """Say how far a run is, which samples failed and which chunks are damaged."""
+    from stiction.study.study import open_run
+    from stiction.study.sweep import name_point
+
+    stored = open_run(run)
+    state, study = stored.status(), stored.study
+    share = 100.0 * state.done / state.samples
+    echo(f"{run}" + (f": {' '.join(study.title.split())}" if study.title else ""))
+    echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
+    echo(f"  chunks    {state.chunks}, {state.bytes / 1e6:.3g} MB")
+    echo(f"  computed  {duration(state.seconds)} of one core")
+    if study.sweep and not state.complete:
+        each = study.ensemble.samples
+        counts = zip(study.points, state.done_by_point, strict=True)
+        some = [f"{name_point(point)}: {done} of {each}" for point, done in counts if done < each]
+        _show_some(some, "  ")
+    if state.damaged:
+        _show_some(state.damaged, "  damaged   ")
+        echo("  running the study again mends this")
+    else:
+        echo("  verified  everything that is stored is what was written")
+    if state.failures:
+        echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
+        _show_some(state.failures, "    ")
+
+
+def export(
+    run: RunPath,
+    out: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="File to write: .nc (NetCDF) or .csv.")
+    ],
+) -> None:
+    """Write a run as one file over the sweep and the samples; missing samples are NaN.
+
+    A table (.csv) has a row a sample and columns named `name (unit)`; profiles along the interface
+    do not fit into it.
+    """
+    from stiction.study.study import open_run
+
+    stored = open_run(run)
+    stored.export(out)
+    state = stored.status()
+    echo(f"{state.done} of {state.samples} samples written to {out}; the others are NaN")
+
+
+def report(
+    run: RunPath,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file; report.html in the run's folder by default.")
+    ] = None,
+) -> None:
+    """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
+    from stiction.report import write_report
+    from stiction.study.study import open_run
+
+    path = out or run / "report.html"
+    with Meter("writing the report"):
+        write_report(open_run(run), path)
+    echo(f"report: {path}")
+
+
+# -- what a study would do -----------------------------------------------------------------------
+
+
+def check(study: StudyFile) -> None:
+    """Say what a study file would do, how long and how big, or everything that is wrong with it.
+
+    Solves a few samples: for the time, and for the error of the local criterion.
+    """
+    from stiction.study.study import Study
+
+    loaded = Study.from_toml(study)
+    echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
+    with Meter("timing a few samples"):
+        lines = description(loaded) | _cost(loaded) | _methods_that_apply(loaded.experiments[0])
+    for name, text in lines.items():
+        echo(f"  {name:20s} {text}")
+
+
+def description(study: Any) -> dict[str, str]:
+    """Return what a study would do, in a few lines with titles."""
+    from stiction.ensemble.dataset import distinct
+
+    points, ensemble = study.experiments, study.ensemble
+    samples = f"{ensemble.samples} (seed {ensemble.seed})"
+    if study.sweep:
+        samples += f" at each of {len(points)} points: {len(points) * ensemble.samples} in all"
+    some = distinct(points, "problem", "random", "method")
+    methods = ", ".join(dict.fromkeys(point.method.label for point in some))
+    lines = {"method": methods, "samples": samples}
+    for number, axis in enumerate(study.axes, start=1):
+        keys = " with ".join(variable.long_name for _, variable in axis.coordinates.values())
+        values = axis.coordinates[axis.dim][0]
+        lines[f"axis {number}"] = f"{keys}: {axis.size} values, {values[0]} to {values[-1]}"
+    found: dict[tuple[str, str], list[float]] = {}
+    for point in some:
+        for key, value in _numbers(point).items():
+            found.setdefault(key, []).append(value)
+    for (title, unit), numbers in found.items():
+        ends = dict.fromkeys(f"{value:.5g}" for value in (min(numbers), max(numbers)))
+        lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
+    return lines
+
+
+def _numbers(point: Any) -> dict[tuple[str, str], float]:
+    """What is worth knowing of a point, by title and unit."""
+    problem, field = point.problem, point.random.strength
+    unit = "Pa" if field.of is None else "(friction coefficient)"
+    found = {("mean strength", unit): field.mean}
+    found["its deviation", unit] = field.standard_deviation
+    found["its correlation", "m to 1/e"] = field.efolding_length()
+    try:
+        length = problem.nucleation_length
+    except InputError:  # it varies along the interface
+        return found
+    found["nucleation length", "m"] = length
+    found["nodes in it", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
+    for dim, whole in zip(problem.interface.dims, problem.interface.lengths, strict=True):
+        found[f"L / h_n along {dim}", ""] = whole / length
+    if hasattr(field.spectrum, "correlation_length"):
+        found["xi_0 / h_n", ""] = field.spectrum.correlation_length / length
+    return found
+
+
+def _methods_that_apply(experiment: Any) -> dict[str, str]:
+    """Which methods take the first point, and how far the local criterion is from the exact one."""
+    from stiction.ensemble.pilot import compare, first_samples
+    from stiction.methods import methods
+
+    local, exact, dynamic = (methods()[n] for n in ("local_criterion", "equilibrium", "rupture"))
+    lines = {}
+    for method, text in (
+        (local(), "applies"),
+        (exact(), "exact"),
+        (dynamic(loading_rate=1.0), "with inertia; depends on the loading rate"),
+    ):
+        refused = method.supports(experiment.problem)
+        lines[method.label] = f"does not apply: {'; '.join(refused)}" if refused else text
+    if lines[local().label] == "applies":
+        found = compare(experiment.by(local()), first_samples(experiment))
+        if found is not None:
+            lines[local().label] = (
+                f"{100.0 * found.bias:+.2g} % of the exact onset on average, with a scatter of"
+                f" {100.0 * found.scatter:.2g} % (a pilot of {found.samples} samples)"
+            )
+    return lines
+
+
+def _cost(study: Any) -> dict[str, str]:
+    """How long a study takes, from a few timed samples, and how much it stores."""
+    import numpy as np
+
+    from stiction.ensemble.batches import Span, solve_span, usable_cores
+
+    ensemble, points = study.ensemble, study.experiments
+    chosen = np.unique(np.linspace(0, len(points) - 1, PROBED).round().astype(int))
+    rates: list[float] = []
+    failures: dict[str, None] = {}
+    with collect_warnings():  # the run itself warns
+        for number in chosen.tolist():
+            point, best = points[number], np.inf
+            solve_span(point, Span(number, ensemble.first, 1))  # compiles and prepares
+            for most in (1, 8, point.batch):  # few samples at once cost more each
+                count = max(1, int(min(most, ensemble.samples, BUDGET / chosen.size / best)))
+                table = solve_span(point, Span(number, ensemble.first, count))
+                best = min(best, table.seconds / count)
+                failures |= dict.fromkeys(map(str, table.failures))
+            rates.append(best)
+    seconds = float(np.interp(np.arange(len(points)), chosen, rates).sum()) * ensemble.samples
+    each = " to ".join(dict.fromkeys((duration(min(rates)), duration(max(rates)))))
+    cores, size = usable_cores(), sum(point.sample_bytes for point in points) * ensemble.samples
+    lines = {
+        "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
+        f" here ({each} a sample, probed at {len(chosen)} of {len(points)} points)",
+        "size": f"about {size / 1e6:.3g} MB",
+    }
+    return lines | ({"failed in the probe": "; ".join(failures)} if failures else {})
+
+
+def schema() -> None:
+    """Print the JSON schema of a study file, for editors that complete and check TOML."""
+    from stiction.study.study import study_schema
+
+    echo(json.dumps(study_schema(), indent=2))
+
+
+# -- one interface -------------------------------------------------------------------------------
+
+
+def read_strength(
+    path: Path,
+    problem: Any,
+    *,
+    unit: Annotated[str | None, typer.Option(help="Of the values in PROFILE, such as MPa.")] = None,
+    x_unit: Annotated[str | None, typer.Option(help="Of x in PROFILE, such as mm.")] = None,
+    value: Annotated[
+        str | None, typer.Option(help="Column or variable of the values: name, or number from 0.")
+    ] = None,
+    x: Annotated[
+        str | None, typer.Option(help="Column or coordinate of x: name, or number from 0.")
+    ] = None,
+    interpolate: Annotated[
+        bool, typer.Option("--interpolate", help="Take points that lie elsewhere than the nodes.")
+    ] = False,
+    gaps: Annotated[
+        Literal["refuse", "fill"],
+        typer.Option(help="Refuse missing values, or fill them with straight lines."),
+    ] = "refuse",
+) -> Any:
+    """Return the strength in a file, on the nodes of a problem."""
+    from stiction.profiles import read_profile
+
+    def column(text: str | None) -> int | str | None:
+        return int(text) if text is not None and text.isdecimal() else text
+
+    return read_profile(
+        path,
+        interface=problem.interface,
+        unit=unit,
+        x_unit=x_unit,
+        value=column(value),
+        x=column(x),
+        interpolate=interpolate,
+        gaps=gaps,
+    )
+
+
+def _with_reading(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `read_strength` in place of its `**reading`."""
+    own, read = (inspect.signature(f, eval_str=True) for f in (command, read_strength))
+    parameters = [p for p in own.parameters.values() if p.kind != p.VAR_KEYWORD]
+    parameters += [p for p in read.parameters.values() if p.kind == p.KEYWORD_ONLY]
+    command.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return command
+
+
+@_with_reading
+def onset(
+    study: StudyFile,
+    strength: Annotated[
+        Path,
+        typer.Option(
+            metavar="PROFILE",
+            help="Peak strength: .npy, text (.csv, .txt, ...) or NetCDF, with or without x; in Pa"
+            " and m unless it states units, as in 'x (mm); strength (MPa)'. Of a plane: .npy of"
+            " shape (nx, ny).",
+        ),
+    ],
+    method: Annotated[
+        list[str] | None, typer.Option(help="Only this method; may be given several times.")
+    ] = None,
+    loading_rate: LoadingRate = 2e7,
+    **reading: Any,
+) -> None:
+    """At which load, and where, does one interface of given strength begin to slide?
+
+    Takes the problem from a study file, which needs nothing else, and the strength from PROFILE,
+    asks every method that applies, and prints a table. The method of the study, if it has one,
+    keeps its options; the others take their defaults.
+    """
+    import pandas as pd
+
+    from stiction.methods import methods
+    from stiction.methods import onset as find
+    from stiction.study.export import columns
+    from stiction.study.study import read_setup
+
+    problem, own, _ = read_setup(study)
+    if unknown := [name for name in method or () if name not in methods()]:
+        raise InputError([unknown_name("--method", name, methods()) for name in unknown])
+    profile = read_strength(strength, problem, **reading)
+    # Each method refuses, and warns, for itself.
+    problem.sample(profile, accept=("barriers", "overstress", "constant"))
+    rows: dict[str, dict[str, float]] = {}
+    refused: list[str] = []
+    for name in method or methods():
+        options = {"loading_rate": loading_rate} if name == "rupture" else {}
+        try:
+            given = own is not None and own.type == name
+            one = own if given else methods()[name](**options)
+            with Meter(f"onset by {name}"):
+                found = columns(find(problem, profile, method=one))
+            rows[name] = {key: v[0] for key, v in found.items() if key.startswith(ONSET)}
+        except (InputError, TypeError) as error:  # TypeError: it has options without defaults
+            refused.append(f"{name} does not apply: {error}")
+    if rows:
+        echo(pd.DataFrame(rows).T.to_string(na_rep="", float_format="{:.8g}".format))
+    for text in refused:
+        echo(text)
+    if not rows:
+        raise typer.Exit(1)
+
+
+@_with_reading
+def rupture(
+    study: StudyFile,
+    out: Annotated[Path, typer.Option(help="Folder for the result and its figures.")] = Path(
+        "stiction-rupture"
+    ),
+    sample: Annotated[
+        int, typer.Option(min=0, help="Number of the sample of the study's strength.")
+    ] = 0,
+    strength: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PROFILE",
+            help="Peak strength instead of a sample, as of `stiction onset`; the study then needs"
+            " a problem only.",
+        ),
+    ] = None,
+    loading_rate: LoadingRate = 2e7,
+    film: Annotated[
+        bool, typer.Option("--film", help="Also a film: rupture.gif, and .mp4 if there is ffmpeg.")
+    ] = False,
+    **reading: Any,
+) -> None:
+    """Simulate one interface from its first slip to global sliding, or as far as the study says.
+
+    Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
+    Writes `rupture.nc` (slip, slip rate and stress over time and x), and as PNG and PDF `rupture`
+    (slip rate in space and time, load, strength) and `front` (where the rupture front is and how
+    fast), and with --film an animation.
+    """
+    from stiction import plot
+    from stiction.dynamics.method import Rupture
+    from stiction.dynamics.simulate import simulate_rupture
+    from stiction.study.export import write_result
+    from stiction.study.study import Study, read_setup
+
+    out.mkdir(parents=True, exist_ok=True)
+    profiles: Any
+    if strength is None:
+        loaded = Study.from_toml(study)
+        point, save = loaded.experiments[0], loaded.save
+        problem, method = point.problem, point.method
+        profiles = point.profiles(point.draws(point.seed, sample, 1))
+    else:
+        problem, method, save = read_setup(study)
+        profiles = read_strength(strength, problem, **reading)
+    if not isinstance(method, Rupture):
+        method = Rupture(loading_rate=loading_rate)
+    result = simulate_rupture(problem, profiles, method=method, save=save)
+    write_result(result, out / "rupture.nc")
+    echo(_summary(result))
+    with Meter("drawing the figures"):
+        for draw in (plot.rupture, plot.front):
+            _save_figure(draw(result, problem=problem), out / draw.__name__)
+    if film:
+        with Meter("drawing the film"):
+            echo(f"film: {plot.film(result, out / 'rupture.gif')}")
+    echo(f"written to {out}")
+
+
+def _summary(result: Any) -> str:
+    """Return the numbers of a rupture, one a line, without what is not known at its end."""
+    lines = []
+    for name in RUPTURE:
+        numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
+        if numbers != ["nan"]:
+            about = result[name].attrs
+            lines.append(f"{about['long_name']}: {' and '.join(numbers)} {about['units']}")
+    return "\n".join([*lines, f"ended by: {result.attrs['stopped']}"])
+
+
+def reliability(
+    study: StudyFile,
+    out: Annotated[Path, typer.Option(help="Folder for table, data and figures.")] = Path(
+        "stiction-reliability"
+    ),
+    smallest: Annotated[
+        float, typer.Option(help="Probability down to which the curve goes.")
+    ] = 1e-9,
+    target_cv: Annotated[
+        float, typer.Option(help="Coefficient of variation at the smallest probability.")
+    ] = 0.3,
+    workers: Workers = None,
+    max_evaluations: Annotated[
+        int | None, typer.Option(help="Most samples to solve.", min=1)
+    ] = None,
+) -> None:
+    """Failure probability of a study's interface, decade by decade.
+
+    Problem, strength, method and seed come from the study file; its number of samples does not
+    matter here. Prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a figure
+    (PNG and PDF) into a folder. The stress is the mean shear stress on the interface, and failure
+    means that the interface as a whole slides below it.
+    """
+    from stiction import plot
+    from stiction.reliability.curve import failure_curve
+    from stiction.study.export import write_result
+    from stiction.study.study import Study
+
+    loaded = Study.from_toml(study)
+    if loaded.sweep:
+        raise InputError(
+            f"sweep: `stiction reliability` takes one interface, and {study} sweeps; give the point"
+            " you mean its values and take [[sweep]] out"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    curve = failure_curve(
+        loaded.problem,
+        loaded.random,
+        method=loaded.method,
+        seed=loaded.ensemble.seed,
+        smallest=smallest,
+        target_cv=target_cv,
+        workers=workers,
+        max_evaluations=max_evaluations,
+    )
+    write_result(curve, out / "failure_curve.nc")
+    table = curve.reset_coords().to_dataframe()
+    table.to_csv(out / "failure_curve.csv", index=False)
+    _save_figure(plot.failure_curve(curve), out / "failure_curve")
+    echo(table.to_string(index=False, float_format="{:.7g}".format))
+    echo(f"written to {out}")
+
+
+# -- the program ---------------------------------------------------------------------------------
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="The statistics of static friction: at which load, and where, does an interface let go?",
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        echo(f"stiction {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", "-V", callback=_print_version, is_eager=True, help="Print it."),
+    ] = False,
+) -> None:
+    pass
+
+
+_running: list[Callable[..., None]] = []
+"""The command, in whose words warnings are."""
+
+
+def _command(function: Callable[..., None]) -> Callable[..., None]:
+    """Errors in the words of the command line; Ctrl-C ends with exit code 130, as shells expect."""
+
+    @functools.wraps(function)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        _running.append(function)
+        try:
+            function(*args, **kwargs)
+        except InputError as error:
+            raise InputError([in_options(text, function) for text in error.problems]) from None
+        except KeyboardInterrupt:
+            echo("interrupted", err=True)
+            raise typer.Exit(130) from None
+
+    return wrapped
+
+
+for _function in (run, check, status, export, report, schema, onset, rupture, reliability):
+    app.command()(_command(_function))
+
+
+def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+    echo(f"warning: {in_options(str(message), _running[-1] if _running else None)}", err=True)
+
+
+def main() -> None:
+    """Entry point: mistakes and a full disk end with a message, not a traceback.
+
+    Exit code 2 for the user's mistakes; 1 where something went wrong on the way.
+    """
+    logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
+    warnings.showwarning = _show_warning
+    try:
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()
+    except InputError as error:
+        for text in error.problems:
+            echo(f"error: {text}", err=True)
+        sys.exit(2)
+    except (RunError, TimeoutError, MemoryError, OSError) as error:
+        _end(str(error) or "there is not enough memory for this")
+
+
+def _end(text: str) -> None:
+    echo(f"error: {text}", err=True)
+    try:
+        sys.stdout.flush()
+    except OSError:  # to a full disk: the interpreter would try again at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(1)
