@@ -189,8 +189,8 @@ def test_command(tmp_path):
          "equilibrium"],
     )  # fmt: skip
     assert run.exit_code == 0, run.output
-    assert "x = " in run.output
-    assert "y = " in run.output
+    assert "critical_position_x (m)" in run.output
+    assert "critical_position_y (m)" in run.output
 
 
 def test_command_refuses_profiles_of_other_shapes(tmp_path):

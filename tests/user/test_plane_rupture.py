@@ -56,7 +56,7 @@ def test_a_stored_study_is_that_in_memory_and_has_units(path, tmp_path):
 
 def test_the_command_draws_figures_and_a_film(path, tmp_path):
     out = command("rupture", path, "--film", "--out", tmp_path)
-    for text in ("onset at ", " mm after ", " J; ended by: sliding"):
+    for text in ("position of the critical patch: ", " and ", "ended by: sliding"):
         assert text in out
     film = Image.open(tmp_path / "rupture.gif")
     assert film.n_frames > 10

@@ -1,0 +1,149 @@
+"""Runs that are killed, fail to write or are damaged end with the bits of an undisturbed one.
+
+More of them: pytest tests/fuzz/test_stores.py -m slow --fuzz-count 1000 --fuzz-seed 771.
+"""
+
+from __future__ import annotations
+
+import errno
+import multiprocessing
+import os
+import random
+import signal
+import time
+import warnings
+
+import pytest
+from small_study import lengths, small_study
+
+import stiction as st
+from stiction.ensemble import batches, store
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore"),
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked"),
+]
+STUDY = st.Study.from_dict(
+    small_study(
+        nodes=64, ensemble={"samples": 60, "seed": 3, "keep": ["strength"]},
+        sweep=lengths(8e-3, 12e-3),
+    )
+)  # fmt: skip
+FORK = multiprocessing.get_context("fork")
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return STUDY.run(workers=1, pilot=False)
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    """Chunks of a few samples at once, which are joined soon."""
+    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
+    monkeypatch.setattr(store, "MANY", 4)
+    monkeypatch.setattr(batches, "piece_size", lambda experiment, span, *rest: min(7, span.samples))
+
+
+def write(folder):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return STUDY.run(out=folder, workers=1, pilot=False, progress=False)
+
+
+def begin(folder):
+    writer = FORK.Process(target=write, args=(folder,), daemon=True)
+    writer.start()
+    return writer
+
+
+@pytest.mark.parametrize("writers", [1, 2])
+def test_writers_killed_at_random(tmp_path, fuzz, reference, writers):
+    """Each writer is killed and begins again until one ends by itself; then a new run begins."""
+    chance, kills, runs, seconds = random.Random(fuzz.seed), 0, 0, 0.2
+    while kills < fuzz.count:
+        folder = tmp_path / f"run-{runs}"
+        running = [begin(folder) for _ in range(writers)]
+        while running:
+            time.sleep(chance.uniform(0.0, seconds))
+            victim = running.pop(chance.randrange(len(running)))
+            if victim.exitcode is None:
+                os.kill(victim.pid, signal.SIGKILL)
+            victim.join()
+            if victim.exitcode == -signal.SIGKILL:
+                kills += 1
+                running.append(begin(folder))
+            else:
+                assert victim.exitcode == 0
+        assert write(folder).identical(reference)
+        state = st.open_run(folder).status()
+        assert state.complete
+        assert state.damaged == ()
+        runs += 1
+    print(f"{kills} kills in {runs} runs of {writers}")
+
+
+def test_calls_of_the_system_that_fail(tmp_path, fuzz, reference, monkeypatch):
+    """The disk is full, or Ctrl-C comes, at any of the calls that write, rename or delete."""
+    chance, faults = random.Random(fuzz.seed), 0
+    calls = {
+        "fsync": files.os,
+        "replace": files.os,
+        "unlink": store.Path,
+        "write_bytes": store.Path,
+    }
+    while faults < fuzz.count:
+        folder = tmp_path / f"run-{faults}"
+        for _ in range(3):
+            name = chance.choice(list(calls))
+            whole, left = getattr(calls[name], name), chance.randrange(20)
+
+            def fail(*arguments, whole=whole, **options):
+                nonlocal left, faults
+                left -= 1
+                if left < 0:
+                    faults += left == -1
+                    raise chance.choice([OSError(errno.ENOSPC, "full"), KeyboardInterrupt()])
+                return whole(*arguments, **options)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(calls[name], name, fail)
+                try:
+                    assert write(folder).identical(reference)
+                except (st.RunError, KeyboardInterrupt):
+                    assert left < 0
+        assert write(folder).identical(reference)
+        assert st.open_run(folder).status().damaged == ()
+    print(f"{faults} faults")
+
+
+def test_damage_anywhere(tmp_path, fuzz, reference):
+    """Bits, lost or added ends, files that are gone or of other content."""
+    chance = random.Random(fuzz.seed)
+    folder = tmp_path / "run"
+    for _ in range(fuzz.count):
+        write(folder)
+        victim = chance.choice([folder / "study.json", *(folder / "chunks").iterdir()])
+        data = bytearray(victim.read_bytes())
+        kind = chance.choice(("bit", "bit", "bit", "cut", "longer", "zeros", "gone"))
+        at = chance.randrange(len(data))
+        if kind == "bit":
+            data[at] ^= 1 << chance.randrange(8)
+        elif kind == "cut":
+            del data[at:]
+        elif kind == "longer":
+            data += os.urandom(chance.randint(1, 100))
+        elif kind == "zeros":
+            data[at : at + 512] = bytes(len(data[at : at + 512]))
+        same = bytes(data) == victim.read_bytes()
+        victim.write_bytes(data)
+        if kind == "gone":
+            victim.unlink()
+        elif victim.name == "study.json" and not same:
+            with pytest.raises(st.RunError, match="damaged"):
+                st.open_run(folder)
+        elif not same:
+            assert len(st.open_run(folder).status().damaged) == 1
+        assert write(folder).identical(reference), (victim.name, kind, at)
+        assert st.open_run(folder).status().damaged == ()
