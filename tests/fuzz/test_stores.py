@@ -12,6 +12,7 @@ import random
 import signal
 import time
 import warnings
+from pathlib import Path
 
 import pytest
 from small_study import lengths, small_study
@@ -87,12 +88,7 @@ def test_writers_killed_at_random(tmp_path, fuzz, reference, writers):
 def test_calls_of_the_system_that_fail(tmp_path, fuzz, reference, monkeypatch):
     """The disk is full, or Ctrl-C comes, at any of the calls that write, rename or delete."""
     chance, faults = random.Random(fuzz.seed), 0
-    calls = {
-        "fsync": files.os,
-        "replace": files.os,
-        "unlink": store.Path,
-        "write_bytes": store.Path,
-    }
+    calls = {"fsync": os, "replace": os, "unlink": Path, "write_bytes": Path}
     while faults < fuzz.count:
         folder = tmp_path / f"run-{faults}"
         for _ in range(3):
