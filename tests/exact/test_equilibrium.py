@@ -16,11 +16,10 @@ from stiction.equilibrium.cholesky import (
     substitute,
 )
 from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.follow import State
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import block_factor
-from stiction.equilibrium.sample import LINEAR, make_sample
+from stiction.equilibrium.sample import LINEAR, State, make_sample
 from stiction.equilibrium.windows import smallest_window, window_mode
 
 

@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 import stiction as st
 from stiction.elasticity.linear import lowest_eigenvector
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium.follow import follow
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
+from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
 
 RATE = 0.5e12

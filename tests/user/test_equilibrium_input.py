@@ -80,29 +80,9 @@ def test_variables_are_labelled(problem, make_strength):
 
 @pytest.mark.parametrize("gap", [1.0, np.nan])
 def test_bounds_that_do_not_close_are_not_passed_over(problem, gap):
-    yes = np.ones(2, dtype=bool)
+    no = np.zeros(2, dtype=bool)
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        Solver(problem)._warn(np.array([1e-6, gap]), np.full(2, 1e6), yes, yes)
-
-
-def test_grid_far_too_fine(solid):
-    """Refused at once, with the number of nodes to take; there it works."""
-    friction = st.LinearWeakening(weakening_rate=0.5e12)
-    fine = st.Interface(0.0072, 8192)
-    with pytest.raises(st.InputError, match="spans 39.. of 8192 nodes.*interface.nodes <= 512"):
-        Solver(st.Problem(solid, fine, friction))
-    onset = st.onset(
-        st.Problem(solid, st.Interface(0.0072, 512), friction),
-        0.9e6 + 1e5 * np.cos(2.0 * np.pi * np.arange(512) / 512),
-        method=Equilibrium(),
-    )
-    assert onset.certificate_gap.item() < 1e-9 * onset.critical_load.item()
-    with pytest.raises(st.InputError, match="interface.nodes"):
-        st.onset(
-            st.Problem(solid, fine, st.LinearWeakening(weakening_rate=1e13)),
-            {"strength": np.full(8192, 0.9e6), "weakening_rate": 0.5e12},
-            method=Equilibrium(),
-        )
+        Solver(problem)._warn(np.array([1e-6, gap]), np.full(2, 1e6), no, no)
 
 
 def test_error_of_the_grid_needs_two_grids(solid):

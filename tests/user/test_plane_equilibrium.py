@@ -65,15 +65,6 @@ def test_what_comes_back(plane):
     assert single["critical_load"].item() == found["critical_load"].values[1]
 
 
-def test_prove_sliding_changes_nothing_on_planes(plane):
-    strength = smooth((72, 64))
-    one, other = (
-        st.onset(plane, strength, method=st.Equilibrium(prove_sliding=proof))
-        for proof in (False, True)
-    )
-    assert one["critical_load"].item() == other["critical_load"].item()
-
-
 def test_a_coarse_direction_is_warned_of_by_name(solid):
     coarse = plane_of(solid, (96, 36))
     with pytest.warns(st.AccuracyWarning, match=r"in mode III, 5\.3 along y \(better 8"):

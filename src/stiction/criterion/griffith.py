@@ -21,7 +21,7 @@ HALVINGS = 30
 
 
 def energy_release_rate(
-    problem: Problem, load: float, lengths: Any, *, centre: float = 0.0, strip: Any = 0.0
+    problem: Problem, load: float, lengths: Any, *, centre: float = 0.0
 ) -> Array:
     """Return the static energy release rate at both tips of a crack, by Bueckner's weights.
 
@@ -36,8 +36,6 @@ def energy_release_rate(
         m, between 0 and the length of the interface.
     centre : float
         Of the crack, m.
-    strip : float or (nodes,) array
-        Pa, taken from the drop besides.
 
     Returns
     -------
@@ -71,12 +69,9 @@ def energy_release_rate(
     period = problem.interface.extent
     whole = np.atleast_1d(_numbers("lengths", lengths))
     if whole.ndim != 1 or not np.all((whole > 0.0) & (whole < period)):
-        raise InputError(
-            f"lengths: must be between 0 and the length of the interface, {period:g} m, got"
-            f" {describe(lengths)}"
-        )
-    drop = _resting_stress(problem) + load * problem.load_profile - strip
-    drops = _on_nodes(problem, drop)
+        raise InputError(f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}")
+    resting, profile = _stress_drops(problem)
+    drops = (resting + load * profile)[None]
     return _release_rate(problem, _intensity_factors(problem, drops, whole, centre)[0])
 
 
@@ -116,8 +111,7 @@ def griffith_length(
 
     Notes
     -----
-    Crossings are looked for at lengths one node apart, below that at ever shorter ones, since the
-    drop does not vary faster; then they are bisected.
+    Crossings are looked for at lengths one node apart, and at ever shorter ones; then bisected.
     """
     _check(problem, centre=centre)
     if not (is_finite(fracture_energy) and fracture_energy > 0.0):
@@ -127,15 +121,17 @@ def griffith_length(
     loads = _numbers("load", load)
     if loads.ndim > 1 or not np.all(np.isfinite(loads)):
         raise InputError(f"load: must be a finite number or an array of them, got {describe(load)}")
-    spacing, nodes = problem.interface.spacing, problem.interface.size
-    whole = spacing * np.append(SHORT, np.arange(1, nodes))
-    drops = _on_nodes(problem, _resting_stress(problem), problem.load_profile)
-
+    whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
+    drops = _stress_drops(problem)
     resting, unit = _intensity_factors(problem, drops, whole, centre)
     first = np.full(loads.size, -1)
     for number, tau in enumerate(loads.ravel()):
-        released = _release_rate(problem, resting + tau * unit).min(axis=1)
-        first[number] = _crossing(released > fracture_energy, arrest)
+        above = _release_rate(problem, resting + tau * unit).min(axis=1) > fracture_energy
+        if above.any():
+            first[number] = begins = int(above.argmax())
+            if arrest:
+                falls = ~above[begins:]
+                first[number] = begins + int(falls.argmax()) if falls.any() else -1
     found = np.full(loads.size, np.inf)
     crosses = first >= 0
     low, high = np.append(0.0, whole)[first[crosses]], whole[first[crosses]]
@@ -147,17 +143,6 @@ def griffith_length(
         low, high = np.where(above == arrest, middle, low), np.where(above == arrest, high, middle)
     found[crosses] = high
     return found if loads.ndim else float(found[0])
-
-
-def _crossing(above: Array, arrest: bool) -> int:
-    """Return the first length at which enough is released, or no longer; -1 if there is none."""
-    if not above.any():
-        return -1
-    first = int(above.argmax())
-    if not arrest:
-        return first
-    after = above[first:]
-    return -1 if after.all() else first + int(after.argmin())
 
 
 def _check(problem: Any, **numbers: Any) -> None:
@@ -172,9 +157,8 @@ def _check(problem: Any, **numbers: Any) -> None:
         problems.append("problem: must be a line; a plane has no crack of two tips")
     if problem.friction.residual_ratio is not None:
         problems.append(
-            "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa,"
-            " and the strength is not known here; give friction.residual_strength instead, for"
-            " random strength the ratio times its mean"
+            "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"
+            " give friction.residual_strength, for random strength the ratio times its mean"
         )
     if problems:
         raise InputError(problems)
@@ -187,16 +171,11 @@ def _numbers(name: str, given: Any) -> Array:
         raise InputError(f"{name}: must be numbers, got {describe(given)}") from None
 
 
-def _resting_stress(problem: Problem) -> Array:
-    """Return the stress drop without a load, Pa."""
-    found: Array = np.asarray(problem.load.initial_stress - problem.friction.residual_strength)
-    return found
-
-
-def _on_nodes(problem: Problem, *drops: Any) -> Array:
-    """Return stress drops at the nodes, (drops, nodes)."""
+def _stress_drops(problem: Problem) -> Array:
+    """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
+    resting = np.asarray(problem.load.initial_stress - problem.friction.residual_strength)
     shape = problem.interface.shape
-    return np.stack([np.broadcast_to(np.asarray(drop, dtype=np.float64), shape) for drop in drops])
+    return np.stack([np.broadcast_to(given, shape) for given in (resting, problem.load_profile)])
 
 
 def _intensity_factors(problem: Problem, drops: Array, whole: Array, centre: float) -> Array:

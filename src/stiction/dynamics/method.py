@@ -103,7 +103,7 @@ class Rupture:
         `start_error` (Pa) what the estimate is. Where there is no such state, the run begins at
         the first slip and `start_error` is 0: at a loading rate too fast for it, on planes, with
         laws without straight pieces, barriers or stress above the strength, where a node loses
-        half of its strength before, and on grids too fine for `Equilibrium`.
+        half of its strength before.
     end_time : float, optional
         s; a run never goes beyond it, except for a part of the last explicit step.
     load : (times, values) or function, optional

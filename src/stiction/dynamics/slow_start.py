@@ -22,7 +22,6 @@ from stiction.dynamics.state import State
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.sample import Sample as StaticSample
 from stiction.equilibrium.sample import exceeds, refused
-from stiction.errors import InputError
 from stiction.problem import Problem, Sample
 
 _TOLERANCE = 2e-5  # of the stress scale: a fifth of the fall that counts as an event
@@ -35,10 +34,7 @@ def static_setting(problem: Problem) -> LineProgram | None:
     """What finding equilibria of a problem needs; None where they are not followed."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
-    try:
-        return LineProgram(problem)
-    except InputError:  # so fine a grid that an equilibrium takes longer than a run from rest
-        return None
+    return LineProgram(problem)
 
 
 def slow_start(
@@ -59,10 +55,6 @@ def slow_start(
     """
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
-        return None
-    try:
-        setting.refuse_too_fine(float(nodes.weakening.max()))
-    except InputError:
         return None
     static = setting.sample_of(rows, number)
     onset = setting.programme(static)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.elasticity.line import Stiffness, apply_stiffness
 from stiction.elasticity.linear import dot
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 from stiction.lanes import LANES, load, multiply_add, totals, zeros
 
 GROUP = 4
@@ -32,7 +32,7 @@ def row_start(row: int) -> int:
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
-@jit
+@jit_inside
 def _solve_one(factor: Array, start: int, size: int) -> None:
     """Forward substitution of one new row, in place."""
     row = factor[start : start + size]
@@ -42,7 +42,7 @@ def _solve_one(factor: Array, start: int, size: int) -> None:
         row[k] = (row[k] - dot(known, row, k)) / known[k]
 
 
-@jit
+@jit_inside
 def _solve_four(factor: Array, size: int) -> None:
     """Forward substitution of four new rows that follow row `size` - 1, in place.
 
@@ -211,7 +211,7 @@ def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns
         row[r] = pivot
 
 
-@jit
+@jit_inside
 def extend_forward(
     factor: Array, first: int, last: int, members: Array, values: Array, forward: Array
 ) -> None:
@@ -305,7 +305,7 @@ def make_workspace(stiffness: Stiffness) -> Workspace:
     )
 
 
-@jit
+@jit_inside
 def add_members(workspace: Workspace, size: int, count: int) -> int:
     """Append `order[:count]`; returns the members now, fewer if a pivot failed (see `append`)."""
     return append(
@@ -314,7 +314,7 @@ def add_members(workspace: Workspace, size: int, count: int) -> int:
     )  # fmt: skip
 
 
-@jit
+@jit_inside
 def substitute_members(
     workspace: Workspace, first: int, last: int, values: Array, which: int
 ) -> None:
@@ -324,13 +324,13 @@ def substitute_members(
     )
 
 
-@jit
+@jit_inside
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
     """K times a field given on the members, at all nodes."""
     apply_stiffness(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
 
 
-@jit
+@jit_inside
 def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
     """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
     right = workspace.vectors[0]
@@ -339,7 +339,7 @@ def solve_forward(workspace: Workspace, size: int, load: float, solution: Array)
     back_substitute(workspace.factor, size, right, solution)
 
 
-@jit
+@jit_inside
 def solve_first(workspace: Workspace, size: int, solution: Array) -> None:
     """Solve for the right-hand side of the first of the forward substitutions alone."""
     right = workspace.vectors[0]
@@ -348,7 +348,7 @@ def solve_first(workspace: Workspace, size: int, solution: Array) -> None:
     back_substitute(workspace.factor, size, right, solution)
 
 
-@jit
+@jit_inside
 def singular_direction(workspace: Workspace, size: int, direction: Array) -> None:
     """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
 

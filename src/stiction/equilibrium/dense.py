@@ -12,7 +12,6 @@ from stiction.arrays import Array
 from stiction.elasticity.line import Stiffness, apply_stiffness, make_stiffness, stiffness_column
 from stiction.elasticity.linear import dot
 from stiction.equilibrium.cholesky import Workspace, make_workspace
-from stiction.equilibrium.follow import Jump, State
 from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import (
     OVERFULL,
@@ -34,8 +33,18 @@ from stiction.equilibrium.runaway import (
 )
 from stiction.equilibrium.sample import (
     AT_CORNER,
+    GAP,
+    LENGTH,
+    LOAD,
+    OUTCOME,
+    PATCHES,
+    POSITION,
+    First,
+    Jump,
     Pieces,
     Sample,
+    State,
+    empty_first,
     exceeds,
     make_sample,
     pieces_of,
@@ -46,7 +55,7 @@ from stiction.equilibrium.sample import (
 from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
 from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
 from stiction.errors import InputError
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
 
@@ -56,16 +65,11 @@ LONG_LINE = 4096
 """Nodes from which on conjugate gradients may be faster."""
 MANY_NODES = 600
 """Nodes weaker than the upper bound of the load from which on they are."""
-WIDEST_PATCH = 256
-"""Nodes in the nucleation length beyond which a long line takes too long: the slipping nodes are
-too many for a dense factor, and a patch is as wide as a segment of the preconditioner."""
 PATIENCE = 1000
 """Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
 MARGIN = 1.5
 """Safety on the length at which a rupture counts as unstoppable."""
 
-LOAD, GAP, PATCHES, POSITION, LENGTH, OUTCOME = range(6)
-COLUMNS = 6
 CORNER_REACHED = 3
 """Outcome of a sample in which a corner of the law is reached before the first instability."""
 
@@ -83,26 +87,14 @@ class Line(NamedTuple):
     usual: Windows
 
 
-class First(NamedTuple):
-    """First instabilities of many samples.
-
-    Attributes
-    ----------
-    table : (samples, COLUMNS) array
-    slip, multiplier : (samples, n) arrays
-        d (where the outcome is undecided, or all if asked for) and y.
-    stiff, ahead : (samples, n) arrays
-        Where the outcome is undecided: K d, and a lower bound of the slip after the jump.
-    """
-
-    table: Array
-    slip: Array
-    multiplier: Array
-    stiff: Array
-    ahead: Array
+@jit_inside
+def copy(source: Array, target: Array) -> None:
+    """Copy a field; assigning to a slice compiles numpy's messages about shapes too."""
+    for i in range(source.size):
+        target[i] = source[i]
 
 
-@jit
+@jit_inside
 def judge(
     sample: Sample,
     line: Line,
@@ -129,15 +121,15 @@ def judge(
         if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
             outcome = CORNER_REACHED
     if all_slips or outcome == UNDECIDED:
-        first.slip[row] = slip
+        copy(slip, first.slip[row])
     first.table[row, PATCHES] = count_patches(slip)
     if outcome == UNDECIDED:
         outcome = runs_away(
             sample, line.runs, load, slip, stiff, multiplier, workspace.vectors[2], work
         )
         if outcome == UNDECIDED:
-            first.stiff[row] = stiff
-            first.ahead[row] = slip
+            copy(stiff, first.stiff[row])
+            copy(slip, first.ahead[row])
     first.table[row, GAP] = gap
     first.table[row, POSITION] = centre * spacing
     first.table[row, LENGTH] = length * spacing
@@ -167,15 +159,16 @@ def solve_batch(
     work = np.empty((6, n))
     for row in range(samples):
         sample = make_sample(excess[row], residual[row], profile, rate[row], line.pieces)
-        windows = line.usual
+        windows, start = line.usual, np.inf
         for i in range(n):
             workspace.diagonal[i] = line.stiffness.column[0] - sample.rate[i]
             if rate[row, i] != line.usual_rate:
-                windows = others
+                windows, start = others, -np.inf
         multiplier = first.multiplier[row]
         bound = window_bound(sample, windows, work[0], multiplier)
         # If it does not succeed, the certificate says so.
-        load, _ = solve_program(sample, bound, np.inf, multiplier, slip, stiff, workspace)
+        slip[:] = 0.0
+        load, _ = solve_program(sample, start, bound, np.inf, multiplier, slip, stiff, workspace)
         first.table[row, LOAD] = load
         judge(sample, line, first, row, slip, stiff, all_slips, workspace, work)
 
@@ -188,20 +181,18 @@ class LineProgram:
     problem : Problem
     every : int
         Which nodes of the problem are taken: all, or every second one.
-    prove_sliding : bool
-        Whether no length of a rupture counts as unstoppable.
 
     Raises
     ------
     InputError
-        If the law has no straight pieces, or the grid is far too fine.
+        If the law has no straight pieces.
     """
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, from which on there is a warning."""
     at_corner = AT_CORNER
 
-    def __init__(self, problem: Problem, every: int = 1, prove_sliding: bool = False) -> None:
+    def __init__(self, problem: Problem, every: int = 1) -> None:
         if reasons := refused(problem.friction):
             raise InputError(reasons)
         self.problem = problem
@@ -211,8 +202,6 @@ class LineProgram:
         modulus = problem.effective_modulus
         self.unit = np.pi * modulus / problem.interface.extent
         rate = problem.friction.weakening_rate
-        if rate is not None:
-            self.refuse_too_fine(float(np.max(rate)))
         uniform = rate is not None and np.ptp(rate) == 0.0
         usual = float(np.max(rate)) if uniform else np.nan
         column = stiffness_column(self.nodes, problem.interface.extent, modulus)
@@ -222,24 +211,10 @@ class LineProgram:
             self.pieces,
             Runs(
                 np.tile(column, 3), block_factor(column, longest), longest, self.spacing, modulus,
-                np.inf if prove_sliding else 1.0,
             ),
             usual,
             exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
         )  # fmt: skip
-
-    def refuse_too_fine(self, steepest_rate: float) -> None:
-        """Raise `InputError` where a grid is so much too fine that it would take minutes."""
-        resolution = self.problem.nucleation_lengths(steepest_rate)[0] / self.spacing
-        if self.nodes < LONG_LINE or resolution <= WIDEST_PATCH:
-            return
-        share = int(np.ceil(resolution / WIDEST_PATCH))
-        raise InputError(
-            f"interface.nodes: the nucleation length spans {resolution:.4g} of {self.nodes} nodes;"
-            f" on grids of {LONG_LINE} nodes or more Equilibrium takes at most {WIDEST_PATCH} of"
-            " them (it would need minutes a sample, and 64 leave an error of 3e-5). Take"
-            f" every {share}th node or fewer, interface.nodes <= {self.nodes // (2 * share) * 2}"
-        )
 
     def sample_of(self, rows: Samples, row: int) -> Sample:
         """Return one row of a batch."""
@@ -260,15 +235,13 @@ class LineProgram:
         load = window_bound(sample, windows, np.empty(self.nodes), multiplier)
         return load, multiplier
 
-    def programme(self, sample: Sample, cap: float = np.inf) -> Solution | None:
+    def programme(
+        self, sample: Sample, cap: float = np.inf, state: State | None = None
+    ) -> Solution | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
-        Parameters
-        ----------
-        sample : Sample
-            Only the first piece of its law counts: `excess` and `rate`.
-        cap : float
-            Load (Pa) not to go beyond.
+        Only the first piece of its law counts: `excess` and `rate`. The state is an equilibrium at
+        a lower load, if one is known.
         """
         bound, multiplier = self.bound(sample)
         long = self.nodes >= LONG_LINE
@@ -278,9 +251,12 @@ class LineProgram:
                 return found
         # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
         workspace = self._workspace(sample)
-        slip, stiff = np.empty((2, self.nodes))
-        lowest = multiplier.copy()
-        load, status = solve_program(sample, bound, cap, lowest, slip, stiff, workspace)
+        stiff, lowest = np.empty(self.nodes), multiplier.copy()
+        uniform = bool(np.all(sample.rate == self.line.usual_rate))
+        start, slip = np.inf if uniform else -np.inf, np.zeros(self.nodes)
+        if state is not None:
+            start, slip = state.load, state.slip.copy()
+        load, status = solve_program(sample, start, bound, cap, lowest, slip, stiff, workspace)
         if status == SOLVED:
             return Solution(load, slip, stiff, lowest)
         if status == OVERFULL:
@@ -300,10 +276,7 @@ class LineProgram:
         Also the rows to be followed from there, or, None, from the start, as a corner of the law
         is reached before; all others run away.
         """
-        self.refuse_too_fine(float(rows.weakening_rate.max()))
-        shape = rows.strength.shape
-        # What is never written takes no memory.
-        first = First(np.empty((shape[0], COLUMNS)), *np.empty((4, *shape)))
+        first = empty_first(rows.samples, 6, self.nodes)
         if self.nodes < LONG_LINE:
             rate = np.ascontiguousarray(rows.weakening_rate)
             unusual = rate[np.any(rate != self.line.usual_rate, axis=1)]
@@ -313,7 +286,7 @@ class LineProgram:
                 np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
             )  # fmt: skip
         else:
-            for row in range(shape[0]):
+            for row in range(rows.samples):
                 self._solve_long(self.sample_of(rows, row), row, slips, first)
         states: dict[int, State | None] = {}
         for row in map(int, np.flatnonzero(first.table[:, OUTCOME] != SLIDING)):
@@ -355,7 +328,8 @@ class LineProgram:
         stuck = state.stuck
         if target == np.inf and state.slip.any() and not stuck:
             piece, strength, rate = present_pieces(sample, state.slip)
-            found = self.programme(sample._replace(excess=strength, rate=rate))
+            present = sample._replace(excess=strength, rate=rate)
+            found = self.programme(present, state=state)
             straight = found is not None and found.load >= state.load
             if found is not None and straight and not exceeds(sample, found.slip, piece):
                 return State(found.load, found.slip, found.stiff, found.multiplier)

@@ -22,7 +22,7 @@ from stiction.elasticity.linear import (
     solve_inside,
 )
 from stiction.elasticity.operator import Operator
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""
@@ -30,7 +30,7 @@ ITERATIONS = 3000
 """Of conjugate gradients, for one equilibrium."""
 
 
-@jit
+@jit_inside
 def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tuple[int, int]:
     """Let overloaded nodes join and those with negative slip leave; returns how many of each."""
     joined, left = 0, 0

@@ -32,7 +32,7 @@ from stiction.equilibrium.sample import (
     strength_at,
     unsupported,
 )
-from stiction.jit import ZERO, jit
+from stiction.jit import ZERO, jit, jit_inside
 
 ALL = -1
 CROWDED = -2
@@ -43,7 +43,7 @@ PATIENCE = 16
 """Elastic steps after which the true states are tried even if more nodes keep joining."""
 
 
-@jit
+@jit_inside
 def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     """Longest run of residual nodes on the circle, and how many corners are passed in all."""
     n = slip.shape[0]
@@ -62,7 +62,7 @@ def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     return min(longest, n), count
 
 
-@jit
+@jit_inside
 def _join(
     sample: Sample, load: float, stiff: Array, workspace: Workspace, size: int, tolerance: float
 ) -> int:
@@ -83,7 +83,7 @@ def _join(
     return now
 
 
-@jit
+@jit_inside
 def _relax(
     sample: Sample,
     load: float,
@@ -112,7 +112,7 @@ def _relax(
     return _join(sample, load, stiff, workspace, size, tolerance)
 
 
-@jit
+@jit_inside
 def _settle(
     sample: Sample,
     load: float,

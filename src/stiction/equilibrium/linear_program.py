@@ -25,7 +25,7 @@ from stiction.equilibrium.cholesky import (
     substitute_members,
 )
 from stiction.equilibrium.sample import Sample
-from stiction.jit import ZERO, jit
+from stiction.jit import ZERO, jit, jit_inside
 
 SOLVED = 0
 STALLED = 1
@@ -33,6 +33,8 @@ OVERFULL = 2
 
 OVERSTRESS = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
+CLOSE = 0.02
+"""Share of the bound by which a load with an equilibrium may lie below it to try the bound next."""
 PASSES = 10_000
 
 
@@ -46,7 +48,7 @@ class Solution(NamedTuple):
     status: int = SOLVED
 
 
-@jit
+@jit_inside
 def sort_by(keys: Array, order: Array, count: int) -> None:
     """Sort `order[:count]` by rising `keys[:count]`, both in place (Shell, Ciura's gaps)."""
     for gap in (1750, 701, 301, 132, 57, 23, 10, 4, 1):
@@ -62,7 +64,7 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
             order[j] = node
 
 
-@jit
+@jit_inside
 def overstressed(
     sample: Sample, load: float, stiff: Array, workspace: Workspace, tolerance: float
 ) -> int:
@@ -79,7 +81,7 @@ def overstressed(
     return count
 
 
-@jit
+@jit_inside
 def stress_tolerance(sample: Sample, load: float) -> float:
     """Overstress, Pa, that is round-off."""
     scale = 0.0
@@ -89,7 +91,7 @@ def stress_tolerance(sample: Sample, load: float) -> float:
     return OVERSTRESS * scale / n
 
 
-@jit
+@jit_inside
 def _back_off(sample: Sample, load: float, workspace: Workspace, size: int, stiff: Array) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
@@ -109,7 +111,7 @@ def _back_off(sample: Sample, load: float, workspace: Workspace, size: int, stif
     multiply_members(workspace, size, solution, stiff)
 
 
-@jit
+@jit_inside
 def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
     """Remove the members that would slip backwards at a load; returns how many stay."""
     solution = workspace.vectors[1]
@@ -129,6 +131,7 @@ def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
 @jit
 def solve_program(
     sample: Sample,
+    start: float,
     bound: float,
     cap: float,
     multiplier: Array,
@@ -138,23 +141,43 @@ def solve_program(
 ) -> tuple[float, int]:
     """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
-    If `cap` is below the critical load, the result is the least equilibrium there. The workspace
-    has the diagonal of A in it. The status is SOLVED, STALLED after too many passes, or OVERFULL:
-    more members than the workspace holds.
+    The load is first `start` and then half way up to the bound until that is close: at too high a
+    load far too many nodes join. It is half way from the first slip where `start` is -inf. Nodes
+    that slip already, at `slip`, join first. If `cap` is below the critical load, the result is the
+    least equilibrium there. The workspace has the diagonal of A in it. The status is SOLVED,
+    STALLED after too many passes, or OVERFULL: more members than the workspace holds.
     """
-    load = min(bound, cap)
-    tolerance = stress_tolerance(sample, load)
+    top = min(bound, cap)
+    if start == -np.inf:
+        start = top
+        for i in range(slip.shape[0]):
+            start = min(start, sample.excess[i] / sample.profile[i])
+        start = 0.5 * (start + top)
+    load = min(start, top)
+    tolerance = stress_tolerance(sample, top)
     members, inside = workspace.members, workspace.inside
     solution = workspace.vectors[1]
     inside[:] = False
     stiff[:] = 0.0
     size = ZERO
+    known = ZERO
+    for i in range(slip.shape[0]):
+        if slip[i] > 0.0:
+            workspace.order[known] = i
+            known += 1
     status = STALLED
     for _ in range(PASSES):
-        count = overstressed(sample, load, stiff, workspace, tolerance)
+        count = known or overstressed(sample, load, stiff, workspace, tolerance)
+        known = ZERO
         if count == 0:
-            status = SOLVED
-            break
+            top = min(bound, cap)
+            if load >= top:
+                status = SOLVED
+                break
+            load = top if top - load <= CLOSE * abs(top) else 0.5 * (load + top)
+            solve_forward(workspace, size, load, solution)
+            multiply_members(workspace, size, solution, stiff)
+            continue
         if size + count > MOST_MEMBERS:
             status = OVERFULL
             break

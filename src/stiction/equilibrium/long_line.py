@@ -281,9 +281,9 @@ class LongLine:
         workspace.diagonal[:] = stiffness.column[0]
         workspace.diagonal[:WINDOW] = stiffness.column[0] - sample.rate[nodes]
         local = _padded(self.multiplier[nodes], 0.0)
-        slip, stiff = np.empty((2, 2 * WINDOW))
+        slip, stiff = np.zeros((2, 2 * WINDOW))
         part = _window_of(sample, nodes)
-        solve_program(part, self.bound, np.inf, local, slip, stiff, workspace)
+        solve_program(part, np.inf, self.bound, np.inf, local, slip, stiff, workspace)
         better = np.zeros(n)
         better[nodes] = local[:WINDOW]
         better /= dot(better, sample.profile, n)

@@ -70,11 +70,6 @@ class Equilibrium:
     discretization_error : bool
         Also return an estimate of the error of `first_instability` that is due to the grid, at
         about a third more time: see `docs/equilibrium.md`. Nodes must be a multiple of four.
-    prove_sliding : bool
-        Follow every jump until the strength left cannot carry the load on average, which proves
-        that the interface slides, instead of until a length at which no fracture energy stops a
-        rupture (Griffith). Takes 5 to 50 % longer; of 5,250 samples it changed none. On planes
-        it is always done.
     events : int
         Also return the first so many arrested events of each sample over 'event', NaN where there
         are fewer: a sequence, since stress and slip are carried on from one to the next. Their
@@ -112,7 +107,6 @@ class Equilibrium:
     sensitivity: Flag = False
     slip: Flag = False
     discretization_error: Flag = False
-    prove_sliding: Flag = False
     events: Number = 0
     gap: Gap = 1e-6
     type: Literal["equilibrium"] = "equilibrium"
@@ -180,12 +174,9 @@ class Equilibrium:
         Raises
         ------
         InputError
-            If the nucleation length spans so many nodes that it would take minutes, or the number
-            of nodes is no multiple of four for `discretization_error`. From the solver: if the
-            initial stress reaches the strength somewhere.
+            If the number of nodes is no multiple of four for `discretization_error`.
         """
         return Solver(
             problem, sensitivity=self.sensitivity, slip=self.slip,
-            discretization_error=self.discretization_error, prove_sliding=self.prove_sliding,
-            events=self.events, gap=self.gap,
+            discretization_error=self.discretization_error, events=self.events, gap=self.gap,
         )  # fmt: skip

@@ -8,11 +8,15 @@ import numpy as np
 import xarray as xr
 
 from stiction.arrays import Array
-from stiction.equilibrium import dense
-from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.follow import Event, follow
-from stiction.equilibrium.solver import event_table, event_variables, make_program
-from stiction.equilibrium.transforms import PlaneProgram
+from stiction.equilibrium.sample import LOAD as LOAD_COLUMN
+from stiction.equilibrium.solver import (
+    Event,
+    Program,
+    event_table,
+    event_variables,
+    follow,
+    make_program,
+)
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, check_memory, real_array, to_plain
 from stiction.problem import Problem, Sample
@@ -150,10 +154,10 @@ def equilibrium_path(
     return to_dataset(values, variables, coordinates, attributes)
 
 
-def _life(program: LineProgram | PlaneProgram, rows: Sample) -> tuple[list[Event], float, bool]:
+def _life(program: Program, rows: Sample) -> tuple[list[Event], float, bool]:
     """Arrested events of a sample, the load at which it slides (Pa), whether that is known."""
     first, states = program.first(rows, False)
-    if first is not None and 0 not in states:  # it runs away at its first instability
-        return [], float(first.table[0, dense.LOAD]), True
+    if 0 not in states:  # it runs away at its first instability
+        return [], float(first.table[0, LOAD_COLUMN]), True
     path = follow(program, program.sample_of(rows, 0), states[0])
     return path.events, path.last.load, path.known

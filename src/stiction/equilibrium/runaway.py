@@ -23,7 +23,7 @@ from stiction.equilibrium.sample import (
     strength_at,
     unsupported,
 )
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 from stiction.lanes import multiply_add
 
 SLIDING = 0
@@ -72,8 +72,6 @@ class Runs(NamedTuple):
         From `block_factor`, for runs of so many nodes.
     spacing, modulus : float
         m and G* (Pa).
-    caution : float
-        Factor on Griffith's length; infinite where no length counts as unstoppable.
     """
 
     wide_column: Array
@@ -81,7 +79,6 @@ class Runs(NamedTuple):
     longest: int
     spacing: float
     modulus: float
-    caution: float
 
 
 @jit
@@ -97,10 +94,10 @@ def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
         drop = min(drop, load * sample.profile[i] - sample.residual[i])
         fall = sample.excess[i] - sample.residual[i]
         energy = max(energy, sample.pieces.area * fall * sample.critical[i])
-    return runs.caution * griffith_length(drop, energy, runs.modulus) / runs.spacing
+    return griffith_length(drop, energy, runs.modulus) / runs.spacing
 
 
-@jit
+@jit_inside
 def _add_scaled(target: Array, source: Array, first: int, factor: float) -> None:
     part = source[first : first + target.shape[0]]
     for i in range(target.shape[0]):

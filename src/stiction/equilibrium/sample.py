@@ -7,7 +7,8 @@ has one piece: its start is tau_p, to the bit.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from stiction.arrays import Array
 from stiction.friction import FrictionLaw
 from stiction.friction.kernels import registered
 from stiction.friction.parameters import Linear, Polygon
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 from stiction.problem import Sample as Samples
 
 AT_CORNER = 1.0 - 1e-12
@@ -135,12 +136,86 @@ def sample_of(rows: Samples, row: int, pieces: Pieces = LINEAR) -> Sample:
     return make_sample(excess, residual, np.array(rows.load_profile).flatten(), rate, pieces)
 
 
+OUTCOME, LOAD, GAP, PATCHES, POSITION, LENGTH = range(6)
+
+
+class First(NamedTuple):
+    """First instabilities of many samples.
+
+    Attributes
+    ----------
+    table : (samples, columns) array
+        What `Equilibrium` returns, and OUTCOME; of planes more columns.
+    slip, multiplier : (samples, n) arrays
+        d (where the outcome is undecided, or all if asked for) and y.
+    stiff, ahead : (samples, n) arrays
+        Where the outcome is undecided: K d, and a lower bound of the slip after the jump.
+    """
+
+    table: Array
+    slip: Array
+    multiplier: Array
+    stiff: Array
+    ahead: Array
+
+
+def empty_first(samples: int, columns: int, nodes: int) -> First:
+    """Return space for the first instabilities; what is never written takes no memory."""
+    return First(np.empty((samples, columns)), *np.empty((4, samples, nodes)))
+
+
 class Present(NamedTuple):
     """The piece on which each node is, what it has at zero slip (Pa), and its slope (Pa/m)."""
 
     piece: NDArray[np.int64]
     strength: Array
     rate: Array
+
+
+@dataclass
+class State:
+    """An equilibrium on the path of one sample, by default one at which it is unstable.
+
+    Attributes
+    ----------
+    load : float
+        tau_0, Pa.
+    slip, stiff, direction : (nodes,) arrays
+        d (m), K d (Pa; of lines only), and the direction in which it is unstable.
+    upper : float
+        A load without equilibrium (Pa), where it is known.
+    certified : bool
+        Whether that is proved.
+    unstable, known : bool
+        Whether the path is unstable there, and whether it could be followed so far.
+    stuck : bool
+        Whether the programme failed to find the next instability before.
+    ahead : Any
+        What is known already of the equilibrium to which it leads.
+    """
+
+    load: float
+    slip: Array
+    stiff: Array
+    direction: Array
+    upper: float = np.nan
+    certified: bool = True
+    unstable: bool = True
+    known: bool = True
+    stuck: bool = False
+    ahead: Any = None
+
+
+class Jump(NamedTuple):
+    """Where an instability ends: whether it is arrested, and counts; the state; if it is known.
+
+    `counts` is false for a jump so small that it is a long step of the stable path.
+    """
+
+    arrested: bool
+    known: bool
+    state: State
+    counts: bool = True
 
 
 def present_pieces(sample: Sample, slip: Array, at_corner: float = AT_CORNER) -> Present:
@@ -184,7 +259,7 @@ def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
     return found
 
 
-@jit
+@jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """The piece on which a node of this d_c is after a slip."""
     piece = 0
@@ -193,14 +268,14 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     return piece
 
 
-@jit
+@jit_inside
 def start_of(sample: Sample, i: int, piece: int) -> float:
     """What a piece of node i has at zero slip, Pa: tau_p on the first, tau_r on the last."""
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 
 
-@jit
+@jit_inside
 def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -224,7 +299,7 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
     return step
 
 
-@jit
+@jit_inside
 def unsupported(sample: Sample, load: float, slip: Array) -> bool:
     """Whether the whole interface, at its present strengths, cannot carry the load."""
     balance = 0.0

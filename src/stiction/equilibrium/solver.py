@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.linear import dot
-from stiction.equilibrium.dense import GAP, LENGTH, LOAD, PATCHES, POSITION, LineProgram
-from stiction.equilibrium.follow import Event, Path, State, follow
-from stiction.equilibrium.patches import critical_patch, largest_patch, patches_of
-from stiction.equilibrium.sample import Sample, present_pieces, residual_nodes, steep_corners
+from stiction.elasticity.linear import inner
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.patches import Patch, critical_patch, largest_patch, patches_of
+from stiction.equilibrium.sample import (
+    GAP,
+    LENGTH,
+    LOAD,
+    PATCHES,
+    POSITION,
+    First,
+    Sample,
+    State,
+    present_pieces,
+    residual_nodes,
+    steep_corners,
+)
 from stiction.equilibrium.transforms import PlaneProgram
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
@@ -34,54 +45,94 @@ SHARE = 0.5
 EVENT_CORE = 1e-3
 """Share of the largest added slip from which on a node belongs to the patch of an event."""
 
-_PATCH = Variable("m", "length of the patch that slipped", ("event",))
-EVENTS = {
-    "event_load": Variable("Pa", "load factor of the event", ("event",)),
-    "event_stress": Variable("Pa", "mean interface stress at the event", ("event",)),
-    "event_position": Variable("m", "centre of the slip added by the event", ("event",)),
-    "event_length": _PATCH,
-    "event_mean_slip": Variable("m", "mean slip added to that patch", ("event",)),
-    "event_moment": Variable("N", "shear modulus times slip added, per unit depth", ("event",)),
-}
+Program: TypeAlias = LineProgram | PlaneProgram
 
 
 def event_variables(interface: Interface) -> dict[str, Variable]:
     """Return what is known of each arrested event on a line or a plane."""
-    if not interface.is_plane:
-        return EVENTS
-    extent = replace(_PATCH, long_name="extent of the patch that slipped")
-    area = replace(_PATCH, units="m2", long_name="area of the patch that slipped")
-    moment = Variable("N m", "shear modulus times slip added", ("event",))
-    variables = EVENTS | {"event_position": position(interface, EVENTS["event_position"])}
-    variables |= {"event_extent": position(interface, extent), "event_area": area}
-    del variables["event_length"]
-    return variables | {"event_moment": moment}
+
+    def variable(units: str, text: str) -> Variable:
+        return Variable(units, text, ("event",))
+
+    plane = interface.is_plane
+    centre = variable("m", "centre of the slip added by the event")
+    extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
+    moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
+    return {
+        "event_load": variable("Pa", "load factor of the event"),
+        "event_stress": variable("Pa", "mean interface stress at the event"),
+        "event_position": position(interface, centre),
+        "event_extent" if plane else "event_length": position(interface, extent),
+        **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
+        "event_mean_slip": variable("m", "mean slip added to that patch"),
+        "event_moment": variable("N m" if plane else "N", moment),
+    }
+
+
+class Event(NamedTuple):
+    """An instability that came to rest: the states before and after it."""
+
+    before: State
+    after: State
 
 
 def event_table(problem: Problem, rows: Samples, row: int, events: list[Event]) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
-    interface = problem.interface
-    found: dict[str, list[Any]] = {name: [] for name in event_variables(interface)}
-    initial = rows.initial_stress[row].mean()
-    for event in events:
-        added = (event.after.slip - event.before.slip).reshape(interface.shape)
+    interface, plane = problem.interface, problem.interface.is_plane
+    initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
+    table = []
+    for before, after in events:
+        added = (after.slip - before.slip).reshape(interface.shape)
         inside, patch = largest_patch(np.maximum(added, 0.0), interface.spacings, EVENT_CORE)
-        found["event_load"].append(event.before.load)
-        found["event_stress"].append(initial + event.before.load * rows.load_profile.mean())
-        found["event_position"].append(patch.centre if interface.is_plane else patch.centre[0])
-        if interface.is_plane:
-            found["event_extent"].append(patch.extents)
-            found["event_area"].append(patch.area)
-        else:
-            found["event_length"].append(patch.extents[0])
-        found["event_mean_slip"].append(added[inside].mean())
+        stress = initial + before.load * profile
         moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
-        found["event_moment"].append(moment)
-    wide = [name for name, variable in event_variables(interface).items() if variable.dims[1:]]
-    return {
-        name: np.reshape(column, (-1, 2)) if name in wide else np.array(column, dtype=np.float64)
-        for name, column in found.items()
-    }
+        measures = (
+            (patch.centre, patch.extents, patch.area) if plane else (*patch.centre, patch.area)
+        )
+        table.append((before.load, stress, *measures, added[inside].mean(), moment))
+    names = event_variables(interface)
+    if not table:
+        return {name: np.empty((0, 2)[: len(names[name].dims)]) for name in names}
+    columns = zip(*table, strict=True)
+    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+
+
+@dataclass
+class Path:
+    """What happens to one sample until it slides.
+
+    `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
+    or a path did not come to its end: `last` is then a lower bound.
+    """
+
+    first: State
+    last: State
+    events: list[Event] = field(default_factory=list)
+    known: bool = True
+
+
+def follow(program: Program, sample: Sample, found: State | None = None) -> Path:
+    """Follow a sample from its first instability, or from rest, to global sliding.
+
+    Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
+    carry it through.
+    """
+    if found is None:
+        found = program.next(sample, program.at_rest(sample))
+    first: State | None = None
+    events: list[Event] = []
+    known = found.known
+    while found.unstable:
+        jump = program.jump(sample, found)
+        if jump.counts:
+            first = first or found
+            if not jump.arrested:
+                known = jump.known
+                break
+            events.append(Event(found, jump.state))
+        found = program.next(sample, jump.state)
+        known = found.known
+    return Path(first or found, found, events, known)
 
 
 def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
@@ -91,23 +142,17 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
     return f"sample{'s' * (numbers.size > 1)} {shown}{more}"
 
 
-def make_program(
-    problem: Problem, gap: float = 1e-6, prove_sliding: bool = False, every: int = 1
-) -> LineProgram | PlaneProgram:
+def make_program(problem: Problem, gap: float = 1e-6, every: int = 1) -> Program:
     """Return what finds the equilibria of a problem on its nodes, or on every second one."""
     if problem.interface.is_plane:
         return PlaneProgram(problem, gap, every)
-    return LineProgram(problem, every, prove_sliding)
+    return LineProgram(problem, every)
 
 
 class Solver:
     """Solves samples of a problem; safe to call from several threads.
 
-    Parameters
-    ----------
-    problem : Problem
-    sensitivity, slip, discretization_error, prove_sliding, events, gap
-        As of `Equilibrium`.
+    Options as of `Equilibrium`.
     """
 
     def __init__(
@@ -117,14 +162,13 @@ class Solver:
         sensitivity: bool = False,
         slip: bool = False,
         discretization_error: bool = False,
-        prove_sliding: bool = False,
         events: int = 0,
         gap: float = 1e-6,
     ) -> None:
         self.problem = problem
-        self.program = make_program(problem, gap, prove_sliding)
+        self.program = make_program(problem, gap)
         self.sensitivity, self.slip, self.events = sensitivity, slip, events
-        self.coarse: LineProgram | PlaneProgram | None = None
+        self.coarse: Program | None = None
         if discretization_error:
             _check_multiple_of_four(problem)
             self.coarse = make_program(problem, gap, every=2)
@@ -134,20 +178,12 @@ class Solver:
         if self.coarse is None:
             self.problem.warn_if_coarse(rows, FINE, ROUGHLY)
         first, states = self.program.first(rows, self.slip)
-        values = self._empty(rows)
-        load, gap = np.empty((2, rows.samples))
-        if first is not None:
-            load[:], gap[:] = first.table[:, LOAD], first.table[:, GAP]
-            values["critical_position"][:] = first.table[:, POSITION]
-            values["sliding_position"][:] = first.table[:, POSITION]
-            values["critical_patch_length"][:] = first.table[:, LENGTH]
-            values["slip_patches"][:] = first.table[:, PATCHES]
-            if self.slip:
-                values["slip"] = first.slip
-            if self.sensitivity:
-                values["sensitivity"] = first.multiplier
-        at_first = load.copy()
-        certified, known = np.ones((2, rows.samples), dtype=np.bool_)
+        interface = self.problem.interface
+        places = slice(POSITION, POSITION + len(interface.shape))
+        load, sliding = first.table[:, LOAD].copy(), first.table[:, places].copy()
+        arrested = np.zeros(rows.samples, dtype=np.int64)
+        reached, unproved, lost = np.zeros((3, rows.samples), dtype=np.bool_)
+        events = self._no_events(rows.samples)
         for row, state in states.items():
             sample = self.program.sample_of(rows, row)
             try:
@@ -155,95 +191,75 @@ class Solver:
             except Exception as error:
                 error.add_note(f"in sample {row} of the {rows.samples} that were solved together")
                 raise
-            load[row], known[row] = path.last.load, path.known
             if state is None:
-                at_first[row] = path.first.load
-                gap[row] = self._describe(values, row, sample, path.first)
-                certified[row] = path.first.certified and not np.isnan(gap[row])
-            self._describe_end(values, rows, row, sample, path)
-        self._warn(gap, at_first, certified, known)
-        values |= {
+                self._describe(first, row, sample, path.first)
+                unproved[row] = not path.first.certified or np.isnan(first.table[row, GAP])
+            last = path.last
+            load[row], lost[row], arrested[row] = last.load, not path.known, len(path.events)
+            reached[row] = residual_nodes(sample, last.slip, self.program.at_corner).any()
+            sliding[row] = first.table[row, places]
+            if last.direction.any():
+                sliding[row] = self._patch(last.direction).centre
+            table = event_table(self.problem, rows, row, path.events[: self.events])
+            for name, column in events.items():
+                column[row, : len(table[name])] = table[name]
+        at_first, gap = first.table[:, LOAD], first.table[:, GAP]
+        self._warn(gap, at_first, unproved, lost)
+        values = {
             "critical_load": load,
             "critical_stress": rows.mean_stress(load),
             "first_instability": rows.mean_stress(at_first),
             "certificate_gap": gap * rows.load_profile.mean(),
-        }
-        if self.problem.interface.is_plane:
-            values["certified"] = certified
+            "critical_position": first.table[:, places],
+            "sliding_position": sliding,
+            "slip_patches": first.table[:, PATCHES].astype(np.int64),
+            "arrested_events": arrested,
+            "residual_reached": reached,
+        } | events
+        if interface.is_plane:
+            values["critical_patch_extent"] = first.table[:, 6:8]
+            values["critical_patch_area"] = first.table[:, 8]
+            values["certified"] = ~unproved
+        else:
+            values["critical_patch_length"] = first.table[:, LENGTH]
+            for name in ("critical_position", "sliding_position"):
+                values[name] = values[name][:, 0]
+        if self.slip:
+            values["slip"] = first.slip.reshape(rows.strength.shape)
         if self.sensitivity:
-            values["sensitivity"] *= rows.load_profile.mean()
-            _warn_if_lost(values["sensitivity"])
+            sensitivity = first.multiplier * rows.load_profile.mean()
+            values["sensitivity"] = sensitivity.reshape(rows.strength.shape)
+            _warn_if_lost(sensitivity)
         if self.coarse is not None:
             values["discretization_error"] = self._discretization_error(
                 rows, values["first_instability"]
             )
         return values
 
-    def _empty(self, rows: Samples) -> dict[str, NDArray[Any]]:
-        """What is returned for each sample besides its loads, to be filled."""
-        count, interface = rows.samples, self.problem.interface
-        place = (count, 2) if interface.is_plane else (count,)
-        values: dict[str, NDArray[Any]] = {
-            "critical_position": np.empty(place),
-            "sliding_position": np.empty(place),
-            "slip_patches": np.empty(count, dtype=np.int64),
-            "arrested_events": np.zeros(count, dtype=np.int64),
-            "residual_reached": np.zeros(count, dtype=np.bool_),
+    def _no_events(self, samples: int) -> dict[str, Array]:
+        """Return NaN for each variable of each of the events that are kept."""
+        if not self.events:
+            return {}
+        return {
+            name: np.full((samples, self.events, *(2,) * (len(variable.dims) - 1)), np.nan)
+            for name, variable in event_variables(self.problem.interface).items()
         }
-        if interface.is_plane:
-            values["critical_patch_extent"] = np.empty(place)
-            values["critical_patch_area"] = np.empty(count)
-        else:
-            values["critical_patch_length"] = np.empty(count)
-        for name in ("slip", "sensitivity"):
-            if getattr(self, name):
-                values[name] = np.empty((count, *rows.shape))
-        if self.events:
-            for name, variable in event_variables(interface).items():
-                components = (2,) * (len(variable.dims) - 1)
-                values[name] = np.full((count, self.events, *components), np.nan)
-        return values
 
-    def _describe(
-        self, values: dict[str, NDArray[Any]], row: int, sample: Sample, state: State
-    ) -> float:
-        """Write what is known of a first instability besides its load; returns the gap, Pa."""
+    def _patch(self, direction: Array) -> Patch:
         interface = self.problem.interface
-        profile = sample.profile
-        y = state.direction / max(dot(state.direction, profile, profile.size), 1e-300)
-        _, patch = critical_patch(y.reshape(interface.shape), interface.spacings)
-        values["slip_patches"][row] = patches_of(state.slip.reshape(interface.shape))
-        if interface.is_plane:
-            values["critical_position"][row] = patch.centre
-            values["critical_patch_extent"][row] = patch.extents
-            values["critical_patch_area"][row] = patch.area
-        else:
-            values["critical_position"][row] = patch.centre[0]
-            values["critical_patch_length"][row] = patch.extents[0]
-        if self.slip:
-            values["slip"][row] = state.slip.reshape(interface.shape)
-        if self.sensitivity:
-            slope = _sensitivity(self.program, sample, state.slip, y)
-            values["sensitivity"][row] = slope.reshape(interface.shape)
-        return self.program.gap(sample, state, y)
+        return critical_patch(direction.reshape(interface.shape), interface.spacings)[1]
 
-    def _describe_end(
-        self, values: dict[str, NDArray[Any]], rows: Samples, row: int, sample: Sample, path: Path
-    ) -> None:
-        """Write what happened after the first instability."""
-        interface, last = self.problem.interface, path.last
-        values["arrested_events"][row] = len(path.events)
-        reached = residual_nodes(sample, last.slip, self.program.at_corner)
-        values["residual_reached"][row] = reached.any()
-        if last.direction.any():
-            direction = last.direction.reshape(interface.shape)
-            _, patch = critical_patch(direction, interface.spacings)
-            centre = patch.centre if interface.is_plane else patch.centre[0]
-            values["sliding_position"][row] = centre
-        if self.events:
-            table = event_table(self.problem, rows, row, path.events[: self.events])
-            for name, column in table.items():
-                values[name][row, : len(column)] = column
+    def _describe(self, first: First, row: int, sample: Sample, state: State) -> None:
+        """Write what is known of a first instability that was found by following the path."""
+        y = state.direction / max(inner(state.direction, sample.profile), 1e-300)
+        patch = self._patch(y)
+        gap = self.program.gap(sample, state, y)
+        patches = patches_of(state.slip.reshape(self.problem.interface.shape))
+        known = (state.load, gap, patches, *patch.centre, *patch.extents, patch.area)
+        first.table[row, LOAD:] = known[: first.table.shape[1] - LOAD]
+        first.slip[row] = state.slip
+        if self.sensitivity:
+            first.multiplier[row] = _sensitivity(self.program, sample, state.slip, y)
 
     def _discretization_error(self, rows: Samples, onset: Array) -> Array:
         """Size of the error of each onset that is due to the distance of the nodes, Pa.
@@ -269,37 +285,36 @@ class Solver:
         return error
 
     def _warn(
-        self, gap: Array, load: Array, certified: NDArray[np.bool_], known: NDArray[np.bool_]
+        self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
     ) -> None:
         """Warn where the bounds are wide, or none, or where a path did not come to an end."""
-        magnitude = np.maximum(np.abs(load), 1e-300)
-        wide = np.flatnonzero(certified & ~(gap <= self.program.widest_gap * magnitude))
+        share = gap / np.maximum(np.abs(load), 1e-300)
+        wide = np.flatnonzero(~unproved & ~(share <= self.program.widest_gap))
         if wide.size:
             warn_accuracy(
                 f"the bounds of the first instability did not close to {self.program.widest_gap:g}"
                 f" of it in {wide.size} of {gap.size} samples ({listed(wide)}): they hold, and are"
-                f" up to {(gap / magnitude)[wide].max():.2g} of it apart; take more nodes"
+                f" up to {share[wide].max():.2g} of it apart; take more nodes"
             )
-        free = np.flatnonzero(~certified)
+        free = np.flatnonzero(unproved)
         if free.size and self.problem.interface.is_plane:
             warn_accuracy(
                 f"nodes reach their residual strength before the first instability in {free.size}"
                 f" of {gap.size} samples ({listed(free)}): it was found by following equilibria,"
-                f" to {(gap / magnitude)[free].max():.2g} of it, and has no certificate"
+                f" to {share[free].max():.2g} of it, and has no certificate"
             )
-        lost = np.flatnonzero(~known)
-        if lost.size:
+        if lost.any():
             warn_accuracy(
-                f"a jump did not come to its end in {lost.size} of {gap.size} samples"
-                f" ({listed(lost)}): their critical load is the last with a known equilibrium, a"
-                " lower bound"
+                f"a jump did not come to its end in {lost.sum()} of {gap.size} samples"
+                f" ({listed(np.flatnonzero(lost))}): their critical load is the last with a known"
+                " equilibrium, a lower bound"
             )
 
 
-def first_instabilities(program: LineProgram | PlaneProgram, rows: Samples) -> Array:
+def first_instabilities(program: Program, rows: Samples) -> Array:
     """Return the loads of the first instabilities alone, tau_0, Pa."""
     first, states = program.first(rows, False)
-    load = np.empty(rows.samples) if first is None else first.table[:, LOAD].copy()
+    load = first.table[:, LOAD].copy()
     for row, state in states.items():
         if state is None:
             sample = program.sample_of(rows, row)
@@ -319,9 +334,7 @@ def _check_multiple_of_four(problem: Problem) -> None:
         )
 
 
-def _sensitivity(
-    program: LineProgram | PlaneProgram, sample: Sample, slip: Array, y: Array
-) -> Array:
+def _sensitivity(program: Program, sample: Sample, slip: Array, y: Array) -> Array:
     """Derivative of the load of an instability by the peak strengths, from its multiplier."""
     piece = present_pieces(sample, slip, program.at_corner).piece
     corners = steep_corners(sample, slip)
@@ -333,10 +346,9 @@ def _sensitivity(
 
 def _warn_if_lost(sensitivity: Array) -> None:
     """Warn where a first instability has no derivative."""
-    count = len(sensitivity)
-    lost = int(np.isnan(sensitivity.reshape(count, -1)).any(axis=1).sum())
+    lost = int(np.isnan(sensitivity).any(axis=1).sum())
     if lost:
         warn_accuracy(
-            f"several nodes begin to weaken more steeply at once in {lost} of {count}"
+            f"several nodes begin to weaken more steeply at once in {lost} of {len(sensitivity)}"
             " samples: their first instability has no derivative, sensitivity is NaN"
         )

@@ -25,7 +25,7 @@ from stiction.equilibrium.cholesky import (
     substitute_members,
 )
 from stiction.equilibrium.sample import Sample, piece_at, start_of
-from stiction.jit import ZERO, jit
+from stiction.jit import ZERO, jit, jit_inside
 
 REACHED = 0
 UNSTABLE = 1
@@ -35,7 +35,7 @@ REFRESH = 16
 """Events after which slip is solved for anew, lest round-off adds up."""
 
 
-@jit
+@jit_inside
 def _begin(
     sample: Sample, slip: Array, piece: NDArray[np.int64], strength: Array, workspace: Workspace
 ) -> int:
@@ -53,7 +53,7 @@ def _begin(
     return count
 
 
-@jit
+@jit_inside
 def _next_event(
     sample: Sample,
     load: float,
@@ -89,7 +89,7 @@ def _next_event(
     return step, starts, ends
 
 
-@jit
+@jit_inside
 def _change_slope(workspace: Workspace, size: int, member: int, before: float, after: float) -> int:
     """Change the weakening rate of a member in the factor; returns the members still in it."""
     node = workspace.members[member]
@@ -98,7 +98,8 @@ def _change_slope(workspace: Workspace, size: int, member: int, before: float, a
         raise_diagonal(workspace.factor, size, member, before - after, workspace.vectors)
         return size
     # It weakens more steeply: the factor is made anew from there on.
-    workspace.order[: size - member] = workspace.members[member:size]
+    for t in range(member, size):
+        workspace.order[t - member] = workspace.members[t]
     return add_members(workspace, member, size - member)
 
 

@@ -17,7 +17,6 @@ from stiction.arrays import Array
 from stiction.elasticity.linear import inner, lowest_eigenvector
 from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
 from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
-from stiction.equilibrium.follow import Jump, State
 from stiction.equilibrium.relaxation import (
     AT_RESIDUAL,
     BALANCED,
@@ -25,7 +24,17 @@ from stiction.equilibrium.relaxation import (
     least_equilibrium,
     present,
 )
-from stiction.equilibrium.sample import Sample, exceeds, pieces_of, residual_nodes, sample_of
+from stiction.equilibrium.sample import (
+    First,
+    Jump,
+    Sample,
+    State,
+    empty_first,
+    exceeds,
+    pieces_of,
+    residual_nodes,
+    sample_of,
+)
 from stiction.equilibrium.turning_point import close
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -211,9 +220,11 @@ class PlaneProgram:
         """Return one sample of a batch."""
         return sample_of(rows, row, self.pieces)
 
-    def first(self, rows: Samples, slips: bool) -> tuple[None, dict[int, State | None]]:
-        """Return the rows that are to be followed from rest: all of them."""
-        return None, dict.fromkeys(range(rows.samples))
+    def first(self, rows: Samples, slips: bool) -> tuple[First, dict[int, State | None]]:
+        """Return an empty table, and the rows that are to be followed from rest: all of them."""
+        return empty_first(rows.samples, 9, rows.strength[0].size), dict.fromkeys(
+            range(rows.samples)
+        )
 
     def at_rest(self, sample: Sample) -> State:
         """Return the state in which the first node is about to slip."""

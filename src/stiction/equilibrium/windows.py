@@ -20,7 +20,7 @@ from stiction.elasticity.line import stiffness_column
 from stiction.elasticity.linear import dot
 from stiction.equilibrium.sample import Sample
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 
 GROWTH = 1.04
 """Ratio of successive widths tried where the weakening rate varies."""
@@ -151,7 +151,7 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
     return _windows(nodes, tuple(rungs[rung(highest) : rung(lowest) + 1]), unit)
 
 
-@jit
+@jit_inside
 def _window_value(sample: Sample, mode: Array, width: int, start: int) -> tuple[float, float]:
     """Weighted sums of the strength and of the load profile over a window on the circle."""
     excess, profile = sample.excess, sample.profile
@@ -162,7 +162,7 @@ def _window_value(sample: Sample, mode: Array, width: int, start: int) -> tuple[
     return above, below
 
 
-@jit
+@jit_inside
 def _count_fast(rate: Array, threshold: float, length: Array) -> None:
     """How many nodes in a row, from each on, weaken at least as fast as a threshold."""
     n = rate.shape[0]
@@ -173,7 +173,7 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
         length[i] = run
 
 
-@jit
+@jit_inside
 def _write_multiplier(sample: Sample, start: int, mode: Array, multiplier: Array) -> None:
     """Write the multiplier of a window (without a mode: of the uniform field), <p, y> = 1."""
     n = multiplier.shape[0]
