@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -172,3 +174,65 @@ def test_symbol_of_the_plane_is_the_lines_along_x():
     column = stiffness_column(32, 0.01, 1e9 / 0.67)
     symbol = stiffness_symbol((32, 8), (0.01, 0.01), 1e9 / 0.67, 1e9)[:17, 0]
     assert symbol == pytest.approx(np.fft.rfft(column).real, abs=1e-9 * symbol.max())
+
+
+LAWS = {
+    "flattens": {"slip": [0.3, 1.0], "strength": [0.4, 0.0], "weakening_rate": RATE},
+    "steepens": {"slip": [0.5, 1.0], "strength": [0.7, 0.0], "weakening_rate": 0.5 * RATE},
+    "three": {"slip": [0.2, 0.6, 1.0], "strength": [0.7, 0.2, 0.0], "weakening_rate": RATE},
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("residual", [0.0, 0.25e6])
+def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(solid, name, residual):
+    """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
+    law = st.PiecewiseWeakening(**LAWS[name], residual_strength=residual)
+    line = st.Problem(solid, st.Interface(0.02, 64), law)
+    strip = st.Problem(solid, st.Interface((0.02, 0.0025), (64, 8)), law)
+    field = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.3e6, high=2.66e6),
+        st.PowerLawSpectrum(correlation_length=3e-3),
+    )
+    tau_p = field.sample(line.interface, samples=4, seed=2)
+    exact = st.onset(line, tau_p, method=st.Equilibrium())
+    assert exact["residual_reached"].any()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", st.AccuracyWarning)
+        found = st.onset(
+            strip, np.repeat(tau_p[:, :, None], 8, axis=2), method=st.Equilibrium(gap=1e-8)
+        )
+    # Nothing is found more closely than the gap; measured 7e-9 at most.
+    np.testing.assert_allclose(found["critical_load"], exact["critical_load"], rtol=2e-8)
+    same = found["arrested_events"].values == exact["arrested_events"].values
+    # On planes a jump of 2 % of d_c at most is a step of the stable path.
+    assert (found["arrested_events"] <= exact["arrested_events"]).all()
+    first = "first_instability"
+    np.testing.assert_allclose(found[first][same], exact[first][same], rtol=2e-8)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_of_several_pieces_against_relaxation(solid, name):
+    """Below the onset node by node relaxation comes to rest, above it slides."""
+    law = st.PiecewiseWeakening(**LAWS[name])
+    problem = st.Problem(solid, st.Interface((3.0 * LENGTH, 3.0 * LENGTH), NODES), law)
+    tau_p = 0.5e6 + 2e6 * noise(3.0, np.random.default_rng(5))
+    load = st.onset(problem, tau_p, method=st.Equilibrium()).critical_load.item()
+    u, f = np.r_[0.0, LAWS[name]["slip"]], np.r_[1.0, LAWS[name]["strength"]]
+    steep = (f[0] - f[1]) / u[1]
+    critical = steep * tau_p / LAWS[name]["weakening_rate"]
+    symbol = stiffness_symbol(
+        NODES, problem.interface.lengths, problem.effective_modulus, solid.shear_modulus
+    )
+    for share, slides in ((0.998, False), (1.002, True)):
+        slip, last = np.zeros(NODES), np.inf
+        for _ in range(100_000):
+            stress = share * load - np.fft.irfft2(symbol * np.fft.rfft2(slip), NODES)
+            drive = stress - tau_p * np.interp(slip / critical, u, f)
+            growth = np.maximum(drive, 0.0) / symbol.max()
+            slip, last = slip + growth, growth.max()
+            if last < 1e-17 or np.all(slip > critical):
+                break
+        assert bool(np.all(slip > critical)) == slides
+        assert slides or last < 1e-17

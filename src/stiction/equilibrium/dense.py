@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -81,8 +82,8 @@ class Line(NamedTuple):
     """
 
     stiffness: Stiffness
-    pieces: Pieces
     runs: Runs
+    pieces: Pieces
     usual_rate: float
     usual: Windows
 
@@ -204,14 +205,10 @@ class LineProgram:
         rate = problem.friction.weakening_rate
         uniform = rate is not None and np.ptp(rate) == 0.0
         usual = float(np.max(rate)) if uniform else np.nan
-        column = stiffness_column(self.nodes, problem.interface.extent, modulus)
-        longest = min(LONGEST_RUN, self.nodes - 1)
+        extent = problem.interface.extent
         self.line = Line(
-            make_stiffness(column),
+            *_stiffness_and_runs(self.nodes, extent, modulus),
             self.pieces,
-            Runs(
-                np.tile(column, 3), block_factor(column, longest), longest, self.spacing, modulus,
-            ),
             usual,
             exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
         )  # fmt: skip
@@ -426,6 +423,16 @@ class LineProgram:
         halves = np.empty((2, self.nodes // 2))
         apply_stiffness(self.line.stiffness, members, members.size, field[members], halves, result)
         return result
+
+
+@lru_cache(maxsize=4)
+def _stiffness_and_runs(nodes: int, extent: float, modulus: float) -> tuple[Stiffness, Runs]:
+    column = stiffness_column(nodes, extent, modulus)
+    longest = min(LONGEST_RUN, nodes - 1)
+    factor = block_factor(column, longest)
+    return make_stiffness(column), Runs(
+        np.tile(column, 3), factor, longest, extent / nodes, modulus
+    )
 
 
 def _no_windows() -> Windows:

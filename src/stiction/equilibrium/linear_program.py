@@ -152,7 +152,7 @@ def solve_program(
         start = top
         for i in range(slip.shape[0]):
             start = min(start, sample.excess[i] / sample.profile[i])
-        start = 0.5 * (start + top)
+        start = 0.25 * start + 0.75 * top
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
     members, inside = workspace.members, workspace.inside
@@ -174,7 +174,7 @@ def solve_program(
             if load >= top:
                 status = SOLVED
                 break
-            load = top if top - load <= CLOSE * abs(top) else 0.5 * (load + top)
+            load = top if top - load <= CLOSE * abs(top) else 0.25 * load + 0.75 * top
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
             continue

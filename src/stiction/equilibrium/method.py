@@ -134,13 +134,7 @@ class Equilibrium:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        reasons = refused(problem.friction)
-        if problem.interface.is_plane and not problem.friction.linear and not reasons:
-            reasons.append(
-                "on a plane it takes strength that falls linearly with slip only; use"
-                " st.LinearWeakening(...)"
-            )
-        return reasons
+        return refused(problem.friction)
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""

@@ -259,7 +259,7 @@ class Solver:
         first.table[row, LOAD:] = known[: first.table.shape[1] - LOAD]
         first.slip[row] = state.slip
         if self.sensitivity:
-            first.multiplier[row] = _sensitivity(self.program, sample, state.slip, y)
+            first.multiplier[row] = _sensitivity(self.program, sample, state, y)
 
     def _discretization_error(self, rows: Samples, onset: Array) -> Array:
         """Size of the error of each onset that is due to the distance of the nodes, Pa.
@@ -299,9 +299,10 @@ class Solver:
         free = np.flatnonzero(unproved)
         if free.size and self.problem.interface.is_plane:
             warn_accuracy(
-                f"nodes reach their residual strength before the first instability in {free.size}"
-                f" of {gap.size} samples ({listed(free)}): it was found by following equilibria,"
-                f" to {share[free].max():.2g} of it, and has no certificate"
+                "nodes reach their residual strength, or another corner of the law, before the"
+                f" first instability in {free.size} of {gap.size} samples ({listed(free)}): it was"
+                f" found by following equilibria, to {share[free].max():.2g} of it, and has no"
+                " certificate"
             )
         if lost.any():
             warn_accuracy(
@@ -334,12 +335,17 @@ def _check_multiple_of_four(problem: Problem) -> None:
         )
 
 
-def _sensitivity(program: Program, sample: Sample, slip: Array, y: Array) -> Array:
-    """Derivative of the load of an instability by the peak strengths, from its multiplier."""
-    piece = present_pieces(sample, slip, program.at_corner).piece
-    corners = steep_corners(sample, slip)
-    if isinstance(program, LineProgram) and corners.size:
-        return program.corner_sensitivity(sample, slip, piece, corners)
+def _sensitivity(program: Program, sample: Sample, state: State, y: Array) -> Array:
+    """Derivative of the load of an instability by the peak strengths, from its multiplier.
+
+    NaN where nodes begin to weaken more steeply as it comes, several at once or on a plane.
+    """
+    piece = present_pieces(sample, state.slip, program.at_corner).piece
+    if isinstance(program, PlaneProgram):
+        if sample.pieces.steepens and not state.certified:
+            return np.full(y.size, np.nan)
+    elif (corners := steep_corners(sample, state.slip)).size:
+        return program.corner_sensitivity(sample, state.slip, piece, corners)
     # Of a piece that starts from share tau_p + (1 - share) tau_r; the share of the last is 0.
     return y * np.where(sample.critical > 0.0, sample.pieces.starts[piece], 1.0)
 
@@ -349,6 +355,6 @@ def _warn_if_lost(sensitivity: Array) -> None:
     lost = int(np.isnan(sensitivity).any(axis=1).sum())
     if lost:
         warn_accuracy(
-            f"several nodes begin to weaken more steeply at once in {lost} of {len(sensitivity)}"
-            " samples: their first instability has no derivative, sensitivity is NaN"
+            f"nodes begin to weaken more steeply in {lost} of {len(sensitivity)} samples:"
+            " their first instability has no derivative that is known, sensitivity is NaN"
         )

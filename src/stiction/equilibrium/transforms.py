@@ -32,7 +32,6 @@ from stiction.equilibrium.sample import (
     empty_first,
     exceeds,
     pieces_of,
-    residual_nodes,
     sample_of,
 )
 from stiction.equilibrium.turning_point import close
@@ -259,7 +258,7 @@ class PlaneProgram:
         slip = np.maximum(found.slip.reshape(-1), state.slip)
         return State(
             found.lower, slip, state.stiff, found.multiplier.reshape(-1), upper=found.upper,
-            certified=not residual_nodes(sample, state.slip, AT_RESIDUAL).any(),
+            certified=not present(sample, state.slip).piece[sample.critical > 0.0].any(),
         )  # fmt: skip
 
     def _step_on(self, sample: Sample, state: State) -> State:

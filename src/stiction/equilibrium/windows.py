@@ -22,7 +22,7 @@ from stiction.equilibrium.sample import Sample
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.jit import jit, jit_inside
 
-GROWTH = 1.04
+GROWTH = 1.25
 """Ratio of successive widths tried where the weakening rate varies."""
 DENSE = 300
 """Widest window whose eigenvector is found with a dense matrix."""
