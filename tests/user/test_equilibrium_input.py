@@ -44,7 +44,7 @@ def test_unknown_option():
 @pytest.mark.parametrize(
     ("loads", "message"),
     [
-        ([2e5, 1e5], "entries 0 and 1"),
+        ([2e5, 1e5], "rise.*entry 1 is 100000"),
         ([-1.0, 1e5], "negative"),
         ([np.nan], "finite"),
         ([], "one-dimensional"),

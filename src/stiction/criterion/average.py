@@ -168,38 +168,46 @@ def minimum_rows(
 
 
 class LocalOnset(NamedTuple):
-    """Least moving average (Pa), the node it is at, the window, and the average, (nx, ny)."""
+    """Least moving average (Pa), the place it is at (in nodes, (2,)), and the window."""
 
     load: float
-    node: tuple[int, int]
+    place: Array
     window: int
-    average: Array
 
 
 def local_onset(windows: Sequence[Window], excess: Array, profile: Array) -> LocalOnset:
     """Find the least <s, y>/<p, y> over places and windows y of a plane.
 
-    Parameters
-    ----------
-    windows : sequence of Window
-    excess, profile : (nx, ny) arrays
-        Strength less initial stress (Pa), and the load profile.
+    Strength less initial stress (Pa) and load profile are (nx, ny). The load is that of a node,
+    which is exact for the discrete problem.
     """
     strength = np.fft.rfft2(excess)
     uniform = bool((profile == profile[0, 0]).all())
     load = None if uniform else np.fft.rfft2(profile)
-    best: LocalOnset | None = None
+    lowest, best, chosen = np.inf, excess, 0
     for number, window in enumerate(windows):
         average = np.fft.irfft2(strength * window.spectrum, excess.shape)
         if load is None:
             average /= profile[0, 0]
         else:
             average /= np.fft.irfft2(load * window.spectrum, excess.shape)
-        place = int(average.argmin())
-        if best is None or average.flat[place] < best.load:
-            ny = excess.shape[1]
-            best = LocalOnset(
-                float(average.flat[place]), (place // ny, place % ny), number, average
-            )
-    assert best is not None
-    return best
+        least = float(average.min())
+        if least < lowest:
+            lowest, best, chosen = least, average, number
+    return LocalOnset(lowest, _between_nodes(best), chosen)
+
+
+def _between_nodes(average: Array) -> Array:
+    """Return where a parabola through the nodes around the lowest has its minimum, in nodes.
+
+    Places at nodes would show as stripes in a histogram.
+    """
+    node = np.unravel_index(int(average.argmin()), average.shape)
+    place = np.array(node, dtype=np.float64)
+    for axis in (0, 1):
+        line = np.take(average, node[1 - axis], axis=1 - axis)
+        before, here, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
+        bend = before - 2.0 * here + after
+        if bend > 0.0:
+            place[axis] += 0.5 * (before - after) / bend
+    return np.mod(place, average.shape)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.criterion.average import LocalOnset, local_onset, minimum_rows
+from stiction.criterion.average import local_onset, minimum_rows
 from stiction.criterion.windows import Weights, Window, windows_of
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, describe, is_real, model
@@ -142,15 +142,7 @@ class LocalCriterion:
         return solve
 
     def warn_of(self, problem: Problem, sample: Sample, values: dict[str, Array]) -> None:
-        """Warn if samples reach their residual strength before the onset.
-
-        Parameters
-        ----------
-        problem : Problem
-        sample : Sample
-        values : dict of arrays
-            What the solver returned for it.
-        """
+        """Warn if samples reach their residual strength before the onset."""
         reached, missing = beyond_residual(problem, sample, values)
         if not reached.any():
             return
@@ -185,27 +177,11 @@ def _on_plane(
     spacings = np.array(problem.interface.spacings)
     return {
         "critical_load": np.maximum([onset.load for onset in onsets], least),
-        "critical_position": np.array([_place(onset) * spacings for onset in onsets]),
+        "critical_position": np.array([onset.place * spacings for onset in onsets]),
         "critical_aspect": np.array([window.aspect for window in chosen]),
         "critical_patch_extent": np.array([window.extents for window in chosen]),
         "critical_patch_area": np.array([window.area for window in chosen]),
     }
-
-
-def _place(found: LocalOnset) -> Array:
-    """Return where a parabola through the nodes around the lowest has its minimum, in nodes, (2,).
-
-    Places at nodes would show as stripes in a histogram. The load is that of the node, which is
-    exact for the discrete problem.
-    """
-    place = np.array(found.node, dtype=np.float64)
-    for axis in (0, 1):
-        line = np.take(found.average, found.node[1 - axis], axis=1 - axis)
-        before, here, after = (line[(found.node[axis] + s) % line.size] for s in (-1, 0, 1))
-        bend = before - 2.0 * here + after
-        if bend > 0.0:
-            place[axis] += 0.5 * (before - after) / bend
-    return np.mod(place, found.average.shape)
 
 
 def beyond_residual(
@@ -213,29 +189,15 @@ def beyond_residual(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Estimate which samples reach their residual strength before the onset, and what that costs.
 
-    Parameters
-    ----------
-    problem : Problem
-    sample : Sample
-    values : dict of arrays
-        What the solver of `LocalCriterion` returned for it.
+    Of the first thousand samples: whether a node of the critical patch has slipped as far as it
+    weakens, (tau_p - tau_r)/W, at the critical load; and by what share that load is too low, to
+    first order: the strength that slip would have taken below the residual one, averaged with the
+    weights of the patch. Of a law that is not linear nothing is said: `check_law` has warned of it.
 
-    Returns
-    -------
-    reached : (m,) bool array
-        Of the first thousand samples: whether a node of the critical patch has slipped as far as
-        it weakens, (tau_p - tau_r)/W, at the critical load.
-    missing : (m,) array
-        By what share the critical load is too low, to first order: the strength that slip would
-        have taken below the residual one, averaged with the weights of the patch.
-
-    Notes
-    -----
     At the critical load tau_0 the slip of the patch follows from (K - W) slip = tau_0 p - (tau_p -
     tau_i) with no singularity at its rim. For a parabola of strength, tau_0 + c s^2 with s the
     distance in units of the semi-axes, it is nearly `SLIP` c/W (1 - s^2)^1.6; c is taken from the
-    strength by regression with the weights of the patch. Of a friction law that is not linear
-    nothing is said: `check_law` has warned of it.
+    strength by regression with the weights of the patch.
     """
     sample = sample.part(slice(0, ENOUGH))
     count, interface = sample.samples, problem.interface
@@ -382,23 +344,16 @@ def check_law(problem: Problem) -> None:
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
     """Warn where the moving average is a coarse sum."""
+    cost = (
+        "where the strength varies within a quarter of it, the local criterion is off by about"
+        " 0.8 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less"
+    )
     if problem.interface.is_plane:
-        enough, cost = (
-            8.0,
-            (
-                "the local criterion takes the lowest node and critical patches of whole nodes,"
-                " which makes it about 0.15 % too high at 8 nodes, 0.4 % at 5 and 0.7 % at 4"
-            ),
+        cost = (
+            "the local criterion takes the lowest node and critical patches of whole nodes, which"
+            " makes it about 0.15 % too high at 8 nodes, 0.4 % at 5 and 0.7 % at 4"
         )
-    else:
-        enough, cost = (
-            12.0,
-            (
-                "where the strength varies within a quarter of it, the local criterion is off by"
-                " about 0.8 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less"
-            ),
-        )
-    problem.warn_if_coarse(sample, enough, cost)
+    problem.warn_if_coarse(sample, 8.0 if problem.interface.is_plane else 12.0, cost)
 
 
 def excess_of(sample: Sample) -> Array:

@@ -83,18 +83,8 @@ def windows_of(
 ) -> list[Window]:
     """Return the critical windows of a weakening rate (Pa/m): one on a line, five on a plane.
 
-    Parameters
-    ----------
-    problem : Problem
-    rate : float
-    weights : {"exact", "rounded"}
-    aspect : float, optional
-        On a plane, the ellipse of this aspect only.
-
-    Raises
-    ------
-    InputError
-        If a window does not fit on the interface.
+    With an aspect, on a plane, the ellipse of this aspect only. `InputError` if a window does not
+    fit on the interface.
     """
     if not problem.interface.is_plane:
         return [_line_window(problem, rate, weights)]
@@ -280,25 +270,12 @@ def rounded_weight() -> Weight:
 def grid_weights(weight: Weight, half_width: float) -> Array:
     """Return weights w_0, w_1 = w_-1, ... of the nodes 0, 1, ... from the centre of a patch.
 
-    With weights that are not negative and add up to one, an average lies between the least and
-    the greatest strength, whatever jumps the strength has. A product in Fourier space with the
-    transform of g instead is exact for smooth strength, but its weights ring: they are negative
-    outside the patch, and beside a strong barrier the average falls below the lowest strength.
+    `half_width` is h_n/2 in nodes; w_0 + 2 (w_1 + w_2 + ...) is the integral of `weight`. With
+    weights that are not negative and add up to one, an average lies between the least and the
+    greatest strength, whatever jumps the strength has. A product in Fourier space with the
+    transform of g is exact for smooth strength, but its weights ring: beside a strong barrier the
+    average falls below the lowest strength.
 
-    Parameters
-    ----------
-    weight : Weight
-    half_width : float
-        h_n/2 in units of the distance between nodes.
-
-    Returns
-    -------
-    (m,) array
-        Not negative; w_0 + 2 (w_1 + w_2 + ...) is the integral of `weight`. Nodes up to one beyond
-        the end of the patch may count.
-
-    Notes
-    -----
     Inside a patch plain samples of g are as accurate as can be (the trapezoidal rule), only its
     ends, where g falls like a root, need other weights (as in Alpert, 1999, SIAM J. Sci. Comput.
     20, 1551). These are fitted to the transform of g at all wavenumbers of the grid, by least
@@ -368,19 +345,8 @@ def ellipse_window(
 ) -> Window | None:
     """Return the smallest unstable ellipse of one aspect; None if it meets its images.
 
-    Parameters
-    ----------
-    symbol : (nx, ny // 2 + 1) array
-        K(k), Pa/m.
-    shape, lengths : (int, int), (float, float)
-        Nodes and periods (m).
-    rate : float
-        W, Pa/m.
-    aspect : float
-        Semi-axis along x over that along y.
+    K(k) and W are in Pa/m, the periods in m; the aspect is that of the semi-axes along x and y.
 
-    Notes
-    -----
     What happens on the nodes of an ellipse is the same on a box of the plane that is twice as
     long, made periodic with the stiffness between its own nodes: a block of a Toeplitz matrix is
     one of a circulant. So the cost follows the ellipse and not the plane.
@@ -426,12 +392,8 @@ def _smallest_unstable(
 ) -> _Unstable | None:
     """Find the smallest unstable ellipse in a box by bisection of its semi-axis up to `axis`.
 
-    Parameters
-    ----------
-    column : (mx, my) array
-        Stress (Pa) at each node of the box by unit slip at node (0, 0).
-    least : float
-        Square of a semi-axis that is known to be stable, m^2.
+    The column is the stress (Pa) at each node of the box by unit slip at node (0, 0); `least` is
+    the square of a semi-axis that is known to be stable, m².
     """
     shape = column.shape
     symbol = np.fft.rfft2(column).real

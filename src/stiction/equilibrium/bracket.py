@@ -93,17 +93,9 @@ def _upper_bound(
 class Bracket:
     """Programme of one sample on a grid, and what is known of its solution.
 
-    Attributes
-    ----------
-    operator : Operator
-    excess, profile : (nodes,) arrays
-        Strength less initial stress (Pa), and the load profile.
-    lower, upper : float
-        Rigorous bounds of the onset load, Pa.
-    slip, multiplier : (nodes,) arrays
-        d (m) and y, <p, y> = 1, that prove them.
-    iterations : int
-        Of conjugate gradients or LOBPCG so far; each takes two pairs of transforms.
+    Strength less initial stress (Pa) and load profile, flat; rigorous bounds of the onset load
+    (Pa) with the slip (m) and multiplier, <p, y> = 1, that prove them; iterations of conjugate
+    gradients or LOBPCG so far, each of which takes two pairs of transforms.
     """
 
     operator: Operator

@@ -124,29 +124,11 @@ def append(
     diagonal: Array,
     tolerance: float,
 ) -> int:
-    """Append nodes to the factor of A on the members, until done or a pivot fails.
+    """Append nodes[:count] to the factor of A on members[:size], until done or a pivot fails.
 
-    Parameters
-    ----------
-    factor : (row_start(n + 4),) array, changed
-    size : int
-        Members so far.
-    members : (n,) int array, changed
-        Node numbers in the order of the factor.
-    nodes, count : (n,) int array and int
-        What to append, in this order.
-    coupling : (n,) array
-        First column of the stiffness, the matrix being coupling[|i - j|] off the diagonal.
-    diagonal : (n,) array
-        Diagonal of A.
-    tolerance : float
-        A pivot at or below this share of its diagonal counts as not positive.
-
-    Returns
-    -------
-    int
-        Members now. If it is less than size + count, the node after the last member failed, and
-        its (unfinished) row, without the pivot, follows the last one in the factor.
+    A is coupling[|i - j|] off its `diagonal`. A pivot is not positive at or below the share
+    `tolerance` of it. Returns the members now: if they are less than size + count, the node after
+    the last one failed, and its row, without the pivot, follows the last one in the factor.
     """
     done = 0
     while done < count:
@@ -187,14 +169,7 @@ def append(
 def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns: Array) -> None:
     """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
 
-    Parameters
-    ----------
-    factor : (row_start(n + 4),) array, changed
-    size, position : int
-        Rows of the factor, and the row whose diagonal entry rises.
-    amount : float
-    turns : (>= 2, >= size) array, work space
-        Cosine and sine of each rotation.
+    Their cosines and sines are kept in `turns`, work space.
     """
     for r in range(position, size):
         start = row_start(r)
@@ -209,17 +184,6 @@ def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns
         turns[0, r] = row[r] / pivot
         turns[1, r] = extra / pivot
         row[r] = pivot
-
-
-@jit_inside
-def extend_forward(
-    factor: Array, first: int, last: int, members: Array, values: Array, forward: Array
-) -> None:
-    """Forward substitution of node values, for rows first..last-1 of the factor."""
-    for r in range(first, last):
-        start = row_start(r)
-        row = factor[start : start + r + 1]
-        forward[r] = (values[members[r]] - dot(row, forward, r)) / row[r]
 
 
 @jit
@@ -319,9 +283,11 @@ def substitute_members(
     workspace: Workspace, first: int, last: int, values: Array, which: int
 ) -> None:
     """Extend one of the forward substitutions by the members first..last-1."""
-    extend_forward(
-        workspace.factor, first, last, workspace.members, values, workspace.forward[which]
-    )
+    forward = workspace.forward[which]
+    for r in range(first, last):
+        start = row_start(r)
+        row = workspace.factor[start : start + r + 1]
+        forward[r] = (values[workspace.members[r]] - dot(row, forward, r)) / row[r]
 
 
 @jit_inside

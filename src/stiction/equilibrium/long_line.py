@@ -123,20 +123,10 @@ def runs_away_alone(
 
 
 class Segments(NamedTuple):
-    """A preconditioner: the slipping nodes cut into segments, each with a factor of its own.
+    """A preconditioner: the slipping nodes cut into segments of WIDTH nodes from `origin` on.
 
-    Attributes
-    ----------
-    column, diagonal : (n,) arrays
-        First column of K and diagonal of A, Pa/m.
-    origin : int
-        First node of segment 0.
-    factors, members, sizes : (segments, row_start(WIDTH + 4)), (segments, WIDTH + 4), (segments,)
-        Factor, nodes and number of nodes of each segment.
-    inside : (n,) bool array
-        Which nodes slip.
-    order, work : (WIDTH + 4,) int array, (3, WIDTH + 4) array
-        Work space.
+    Each has a factor, nodes and a number of them: (segments, ...) arrays. `inside` marks the nodes
+    that slip; `column` and `diagonal` are those of K and A, (n,); the rest is work space.
     """
 
     column: Array
@@ -154,17 +144,12 @@ def _make_segments(column: Array, diagonal: Array, origin: int) -> Segments:
     """Segments without nodes."""
     n = column.shape[0]
     count = -(-n // WIDTH)
+    integers = np.zeros((count, WIDTH + 4), dtype=np.int64)
     return Segments(
-        column,
-        diagonal,
-        origin,
-        np.empty((count, row_start(WIDTH + 4))),
-        np.zeros((count, WIDTH + 4), dtype=np.int64),
-        np.zeros(count, dtype=np.int64),
-        np.zeros(n, dtype=np.bool_),
-        np.empty(WIDTH + 4, dtype=np.int64),
-        np.empty((3, WIDTH + 4)),
-    )
+        column, diagonal, origin, np.empty((count, row_start(WIDTH + 4))), integers,
+        np.zeros(count, dtype=np.int64), np.zeros(n, dtype=np.bool_),
+        np.empty(WIDTH + 4, dtype=np.int64), np.empty((3, WIDTH + 4)),
+    )  # fmt: skip
 
 
 @jit

@@ -19,27 +19,25 @@ from stiction.results import Variable, along, onset_variables, position
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
-BOUNDS = {
+VARIABLES = {
     "certificate_gap": Variable("Pa", "distance between the bounds of the first instability"),
-}
-CERTIFIED = {
-    "certified": Variable("1", "whether the bounds of the first instability are rigorous"),
-}
-PATCHES = {
     "slip_patches": Variable("1", "number of slipping patches at the first instability"),
-}
-LENGTH = {
-    "critical_patch_length": Variable("m", "length of the patch that becomes unstable first"),
-}
-EXTENT = Variable("m", "extent of the patch that becomes unstable first")
-AREA = Variable("m2", "area of the patch that becomes unstable first")
-JUMPS = {
     "arrested_events": Variable("1", "number of instabilities that came to rest"),
     "residual_reached": Variable("1", "whether a node was at its residual strength before sliding"),
+    "sliding_position": Variable("m", "position of the patch that runs along the whole interface"),
 }
-SLIDING_POSITION = Variable("m", "position of the patch that runs along the whole interface")
-SLIP = Variable("m", "slip at the first instability")
-SENSITIVITY = Variable("1", "sensitivity of the first instability to the strength at each node")
+OF_LINES = {
+    "critical_patch_length": Variable("m", "length of the patch that becomes unstable first"),
+}
+OF_PLANES = {
+    "critical_patch_extent": Variable("m", "extent of the patch that becomes unstable first"),
+    "critical_patch_area": Variable("m2", "area of the patch that becomes unstable first"),
+    "certified": Variable("1", "whether the bounds of the first instability are rigorous"),
+}
+ON_NODES = {
+    "slip": Variable("m", "slip at the first instability"),
+    "sensitivity": Variable("1", "sensitivity of the first instability to the strength there"),
+}
 DISCRETIZATION_ERROR = Variable(
     "Pa", "estimated error of the first instability due to the distance of the nodes"
 )
@@ -55,6 +53,7 @@ class Equilibrium:
     linear programme, solved to round-off with a certificate; beyond the first instability, or
     where the residual strength or another corner of a `PiecewiseWeakening` is reached before it,
     events are followed one by one: exact too, at 5 times the cost for two pieces and 50 for 32.
+    On planes the path between such events is followed in steps of the load.
     Weakening rate, residual strength, initial stress and load profile may vary along the interface.
 
     On planes the programme is solved with transforms, to bounds that are `gap` of the load apart;
@@ -139,25 +138,18 @@ class Equilibrium:
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """What the solver returns for each sample."""
         interface = problem.interface
-        variables = onset_variables(interface) | BOUNDS
-        if interface.is_plane:
-            extent = {
-                "critical_patch_extent": position(interface, EXTENT),
-                "critical_patch_area": AREA,
-            }
-            variables |= CERTIFIED | PATCHES | extent
-        else:
-            variables |= PATCHES | LENGTH
-        variables |= JUMPS | {"sliding_position": position(interface, SLIDING_POSITION)}
+        variables = onset_variables(interface) | VARIABLES
+        variables |= OF_PLANES if interface.is_plane else OF_LINES
+        for name in {"sliding_position", "critical_patch_extent"} & variables.keys():
+            variables[name] = position(interface, variables[name])
         if self.events:
             variables |= {
                 name: replace(variable, dims=("sample", *variable.dims))
                 for name, variable in event_variables(interface).items()
             }
-        if self.slip:
-            variables["slip"] = along(problem.interface, SLIP)
-        if self.sensitivity:
-            variables["sensitivity"] = along(problem.interface, SENSITIVITY)
+        for name, variable in ON_NODES.items():
+            if getattr(self, name):
+                variables[name] = along(interface, variable)
         if self.discretization_error:
             variables["discretization_error"] = DISCRETIZATION_ERROR
         return variables

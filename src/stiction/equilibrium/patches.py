@@ -48,10 +48,7 @@ def count_patches(slip: Array) -> int:
 def main_patch(field: Array) -> tuple[int, int, float]:
     """First node, length and centroid (in nodes, from 0 to n) of the run with the largest entry.
 
-    Parameters
-    ----------
-    field : (n,) array
-        Not negative; runs are where it is positive.
+    Runs are where the field, which is not negative, is positive.
     """
     n = field.shape[0]
     peak = 0
@@ -83,12 +80,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the number of the patch, from 1 on, of every node (0: none), and how many there are.
-
-    Parameters
-    ----------
-    mask : (nx, ny) bool array
-    """
+    """Return the number of the patch, from 1 on, of each node (0: none), and how many there are."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -116,16 +108,7 @@ def _span(occupied: Mask, peak: int) -> tuple[int, int]:
 
 
 def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
-    """Return the centre (centroid of the weight), extents and area of a patch.
-
-    Parameters
-    ----------
-    mask : (nx, ny) bool array
-        Its nodes, at least one.
-    weight : (nx, ny) array
-    spacings : (float, float)
-        m.
-    """
+    """Return the centre (centroid of the weight), extents and area of a patch of a plane."""
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):
@@ -143,14 +126,8 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
 def largest_patch(weight: Array, spacings: tuple[float, ...], share: float) -> tuple[Mask, Patch]:
     """Return the patch around the largest weight: which nodes belong to it, and its measures.
 
-    Parameters
-    ----------
-    weight : (n,) or (nx, ny) array
-        Not negative, not all zero.
-    spacings : tuple of floats
-        m, one for each direction.
-    share : float
-        Of the largest weight, from which on a node belongs to a patch.
+    The weight is not negative and not all zero; nodes belong to a patch where it is above a share
+    of its largest value.
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:
@@ -165,18 +142,11 @@ def largest_patch(weight: Array, spacings: tuple[float, ...], share: float) -> t
 
 
 def critical_patch(multiplier: Array, spacings: tuple[float, ...]) -> tuple[Mask, Patch]:
-    """Return the patch that becomes unstable, from its multiplier.
+    """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
 
     On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
     largest value, around that value. Not all slipping nodes that are connected with it: in a rough
     strength these reach across the plane, with a y that is next to nothing.
-
-    Parameters
-    ----------
-    multiplier : (n,) or (nx, ny) array
-        y >= 0, not all zero.
-    spacings : tuple of floats
-        m.
     """
     return largest_patch(multiplier, spacings, 0.0 if multiplier.ndim == 1 else CORE)
 

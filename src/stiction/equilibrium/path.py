@@ -11,7 +11,6 @@ from stiction.arrays import Array
 from stiction.equilibrium.sample import LOAD as LOAD_COLUMN
 from stiction.equilibrium.solver import (
     Event,
-    Program,
     event_table,
     event_variables,
     follow,
@@ -19,7 +18,7 @@ from stiction.equilibrium.solver import (
 )
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, check_memory, real_array, to_plain
-from stiction.problem import Problem, Sample
+from stiction.problem import Problem
 from stiction.results import Variable, along, coordinate, to_dataset
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -44,22 +43,13 @@ def _check_loads(loads: Any) -> Array:
         raise InputError(
             f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
         )
-    if np.any(np.diff(given) <= 0.0):
-        worst = int(np.argmin(np.diff(given)))
-        raise InputError(
-            f"loads: must rise; entries {worst} and {worst + 1} are {given[worst]:g} and"
-            f" {given[worst + 1]:g} Pa"
-        )
-    if given[0] < 0.0:
-        raise InputError(f"loads: must not be negative, got {given[0]:g} Pa")
+    if np.any(np.diff(given, prepend=-1e-300) <= 0.0):
+        worst = int(np.argmin(np.diff(given, prepend=0.0)))
+        raise InputError(f"loads: must rise, none negative; entry {worst} is {given[worst]:g} Pa")
     return given
 
 
-def equilibrium_path(
-    problem: Problem,
-    profiles: Any,
-    loads: Any,
-) -> xr.Dataset:
+def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     """Return slip and stress of one interface at rising loads, and its arrested events.
 
     Patches grow, merge and become unstable; an instability that comes to rest is an event.
@@ -114,7 +104,12 @@ def equilibrium_path(
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)
     sample = program.sample_of(rows, 0)
-    passed, end, known = _life(program, rows)
+    first, states = program.first(rows, False)
+    passed: list[Event] = []
+    end, known = float(first.table[0, LOAD_COLUMN]), True
+    if 0 in states:  # otherwise it runs away at its first instability
+        whole = follow(program, sample, states[0])
+        passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
@@ -152,12 +147,3 @@ def equilibrium_path(
     coordinates |= {dim: coordinate(interface, dim) for dim in dims}
     attributes = {"study": {"problem": to_plain(problem)}}
     return to_dataset(values, variables, coordinates, attributes)
-
-
-def _life(program: Program, rows: Sample) -> tuple[list[Event], float, bool]:
-    """Arrested events of a sample, the load at which it slides (Pa), whether that is known."""
-    first, states = program.first(rows, False)
-    if 0 not in states:  # it runs away at its first instability
-        return [], float(first.table[0, LOAD_COLUMN]), True
-    path = follow(program, program.sample_of(rows, 0), states[0])
-    return path.events, path.last.load, path.known

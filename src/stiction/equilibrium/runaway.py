@@ -64,14 +64,8 @@ def block_factor(column: Array, width: int) -> Array:
 class Runs(NamedTuple):
     """What the test needs of a line.
 
-    Attributes
-    ----------
-    wide_column : (3 n,) array
-        First column of K, three times over, Pa/m.
-    factor, longest : array and int
-        From `block_factor`, for runs of so many nodes.
-    spacing, modulus : float
-        m and G* (Pa).
+    The first column of K three times over (Pa/m), the factor for runs of up to `longest` nodes,
+    the distance of the nodes (m), and G* (Pa).
     """
 
     wide_column: Array

@@ -32,18 +32,9 @@ the round-off of K d; an instability of such nodes would be one of nothing, and 
 class Pieces(NamedTuple):
     """A falling polygon f of u = slip/d_c, in what does not depend on the node.
 
-    Attributes
-    ----------
-    ends : (M,) array
-        u at the end of each piece, the last 1.
-    starts : (M + 1,) array
-        f of each piece, and of the residual strength, continued back to zero slip: 1, ..., 0.
-    slopes : (M + 1,) array
-        How steep they are in units of the first: 1, ..., 0.
-    first : float
-        -f' of the first piece.
-    area : float
-        Integral of f.
+    `ends` are the u at the end of each piece, the last 1. Of each piece and of the residual
+    strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` how steeply it
+    falls in units of the first (1, ..., 0); `first` is -f' there, `area` the integral of f.
     """
 
     ends: Array
@@ -142,14 +133,9 @@ OUTCOME, LOAD, GAP, PATCHES, POSITION, LENGTH = range(6)
 class First(NamedTuple):
     """First instabilities of many samples.
 
-    Attributes
-    ----------
-    table : (samples, columns) array
-        What `Equilibrium` returns, and OUTCOME; of planes more columns.
-    slip, multiplier : (samples, n) arrays
-        d (where the outcome is undecided, or all if asked for) and y.
-    stiff, ahead : (samples, n) arrays
-        Where the outcome is undecided: K d, and a lower bound of the slip after the jump.
+    What `Equilibrium` returns and the outcome, (samples, columns), of planes more columns; slip d
+    (m; where the outcome is undecided, or all if asked for) and multiplier, (samples, nodes); where
+    the outcome is undecided K d (Pa), and a lower bound of the slip after the jump.
     """
 
     table: Array
@@ -176,22 +162,11 @@ class Present(NamedTuple):
 class State:
     """An equilibrium on the path of one sample, by default one at which it is unstable.
 
-    Attributes
-    ----------
-    load : float
-        tau_0, Pa.
-    slip, stiff, direction : (nodes,) arrays
-        d (m), K d (Pa; of lines only), and the direction in which it is unstable.
-    upper : float
-        A load without equilibrium (Pa), where it is known.
-    certified : bool
-        Whether that is proved.
-    unstable, known : bool
-        Whether the path is unstable there, and whether it could be followed so far.
-    stuck : bool
-        Whether the programme failed to find the next instability before.
-    ahead : Any
-        What is known already of the equilibrium to which it leads.
+    Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), and the direction in which it is unstable;
+    `upper`, a load without equilibrium (Pa) where one is known, and whether that is proved.
+    `unstable` and `known` say whether the path is unstable there and could be followed so far,
+    `stuck` whether the programme failed to find the next instability before; `ahead` is what is
+    known already of the equilibrium to which it leads.
     """
 
     load: float

@@ -8,7 +8,6 @@ the load by relaxation at fixed load.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -92,23 +91,11 @@ def doubled(coarse: Array) -> Array:
     return coarse
 
 
-@dataclass(frozen=True)
-class PlaneOnset:
+class PlaneOnset(NamedTuple):
     """Onset of one sample on a plane.
 
-    Attributes
-    ----------
-    lower, upper : float
-        Rigorous bounds of the onset load tau_0, Pa.
-    slip : (nx, ny) array
-        d at onset, m; proves the lower bound.
-    multiplier : (nx, ny) array
-        y, with <p, y> = 1: derivative of the load by the strength; proves the upper bound.
-    closed : bool
-        Whether they are as close as was asked for. On a grid too coarse for the critical patch
-        they may not be.
-    iterations : int
-        On the finest grid; each takes two pairs of transforms.
+    Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (nx, ny), that prove
+    them; whether they are as close as was asked for; iterations on the finest grid.
     """
 
     lower: float
@@ -145,19 +132,9 @@ def plane_onset(
 ) -> PlaneOnset:
     """Return the largest load with an equilibrium while no node has reached a corner of its law.
 
-    Parameters
-    ----------
-    plane : Plane
-    excess : (nx, ny) array
-        Peak strength less initial stress, Pa.
-    profile : (nx, ny) array
-        Load profile p > 0.
-    rate : (nx, ny) array
-        W, Pa/m; zero at nodes that have reached their residual strength.
-    gap : float
-        Relative gap between the bounds at which to stop.
-    slip : (nx, ny) array, optional
-        Equilibrium at a lower load to start from, m, instead of coarse grids.
+    All fields are (nx, ny): peak strength less initial stress (Pa), load profile p > 0, weakening
+    rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a lower load to start from
+    instead of coarse grids. The bounds are to be closed to a relative gap.
     """
     levels = [tuple(np.asarray(given, dtype=np.float64) for given in (excess, profile, rate))]
     while slip is None:

@@ -159,12 +159,8 @@ def close(
     """Close a bracket by Newton's method on the turning point of a patch.
 
     If another patch turns out to be unstable, it is held instead. Load and slip are a guess;
-    `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known.
-
-    Returns
-    -------
-    closed, bend : bool, float
-        Whether the bounds are within `gap` of the load, and the curvature found.
+    `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known. Returns whether the bounds
+    are within `gap` of the load, and the curvature found.
     """
     if bracket.closed(gap):
         return True, bend

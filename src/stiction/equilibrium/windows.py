@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import bisect
 import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -64,6 +65,16 @@ def estimated_width(nodes: int, rate: float) -> int:
     return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
 
 
+def narrowest(nodes: int, widths: Sequence[int], guess: int, rate: float) -> int:
+    """Index of the first of rising widths that is unstable, their number if none is."""
+    i = min(guess, len(widths) - 1)
+    while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
+        i += 1
+    while i > 0 and window_mode(nodes, widths[i - 1])[0] <= rate:
+        i -= 1
+    return i
+
+
 def smallest_window(nodes: int, rate: float) -> int | None:
     """Fewest nodes that are unstable by themselves at a weakening rate, or None.
 
@@ -74,22 +85,9 @@ def smallest_window(nodes: int, rate: float) -> int | None:
     width = estimated_width(nodes, rate)
     if width > 1.2 * widest:
         return None
-    width = min(width, widest)
-    low, high = 0, widest + 1  # `low` is stable; `high` is unstable, or too wide
     # The estimate is a node or so off, more where the window is a fair part of the circle.
-    for probe in (width - 3, width + 3):
-        if low < probe < high:
-            if window_mode(nodes, probe)[0] <= rate:
-                high = probe
-            else:
-                low = probe
-    while high - low > 1:
-        middle = (low + high) // 2
-        if window_mode(nodes, middle)[0] <= rate:
-            high = middle
-        else:
-            low = middle
-    return high if high <= widest else None
+    width = narrowest(nodes, range(1, widest + 1), width - 1, rate) + 1
+    return width if width <= widest else None
 
 
 def ladder(nodes: int) -> list[int]:
@@ -139,14 +137,8 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
     rungs = ladder(nodes)
 
     def rung(rate: float) -> int:
-        """The first rung that is unstable; the last one if none is."""
-        width = estimated_width(nodes, rate / unit)
-        i = min(bisect.bisect_left(rungs, width), len(rungs) - 1)
-        while i < len(rungs) - 1 and window_mode(nodes, rungs[i])[0] * unit > rate:
-            i += 1
-        while i > 0 and window_mode(nodes, rungs[i - 1])[0] * unit <= rate:
-            i -= 1
-        return i
+        guess = bisect.bisect_left(rungs, estimated_width(nodes, rate / unit))
+        return narrowest(nodes, rungs, guess, rate / unit)
 
     return _windows(nodes, tuple(rungs[rung(highest) : rung(lowest) + 1]), unit)
 
