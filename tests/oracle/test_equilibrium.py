@@ -150,6 +150,16 @@ def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, r
         np.testing.assert_allclose(large.slip, dense.slip, atol=1e-10 * sample.critical.max())
 
 
+def test_onset_of_a_long_line(solid, make_strength):
+    """Certified, and with the quick test for arrest, as shorter lines are."""
+    problem = st.Problem(solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12))
+    tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
+    onset = st.onset(problem, tau_p, method=Equilibrium(sensitivity=True))
+    assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
+    loads = (onset.sensitivity.values * tau_p).sum(axis=1)
+    np.testing.assert_allclose(onset.first_instability, loads, rtol=1e-11)
+
+
 def test_patches_alike_on_a_long_interface(solid):
     """Thirty-two periods of a profile let go at the load of one: all patches are singular at once.
 

@@ -95,7 +95,7 @@ def copy(source: Array, target: Array) -> None:
         target[i] = source[i]
 
 
-@jit_inside
+@jit
 def judge(
     sample: Sample,
     line: Line,
