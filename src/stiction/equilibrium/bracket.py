@@ -94,8 +94,7 @@ class Bracket:
     """Programme of one sample on a grid, and what is known of its solution.
 
     Strength less initial stress (Pa) and load profile, flat; rigorous bounds of the onset load
-    (Pa) with the slip (m) and multiplier, <p, y> = 1, that prove them; iterations of conjugate
-    gradients or LOBPCG so far, each of which takes two pairs of transforms.
+    (Pa) with the slip (m) and multiplier, <p, y> = 1, that prove them.
     """
 
     operator: Operator
@@ -105,7 +104,6 @@ class Bracket:
     upper: float = field(init=False)
     slip: Array = field(init=False)
     multiplier: Array = field(init=False)
-    iterations: int = 0
 
     def __post_init__(self) -> None:
         nodes = self.excess.size
@@ -179,11 +177,10 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
         slip = stable.copy()
         inside = bracket.inside
         inside[:] = (slip > 0.0) | (excess < load * profile)
-        status, taken = equilibrate(
+        status, _ = equilibrate(
             operator, bracket.free, load * profile - excess, inside, slip, bracket.residual,
             bracket.workspace, accuracy * bracket.scale,
         )  # fmt: skip
-        bracket.iterations += taken
         if status == SOLVED:
             low, stable = load, slip
             bracket.raise_slip(slip)
@@ -192,10 +189,9 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
         if status != NEGATIVE:
             continue
         vector = np.abs(bracket.workspace[1])
-        value, taken = lowest_eigenvector(
+        value, _ = lowest_eigenvector(
             operator, inside, vector, 1e-4 * float(operator.rate.max()), 200
         )
-        bracket.iterations += taken
         if value <= 0.0:
             direction = np.maximum(vector, 0.0)
             high = min(high, bracket.raise_multiplier(vector))

@@ -319,7 +319,7 @@ class LongLine:
         drive = load * self.sample.profile - self.sample.excess
         return self.solve(drive, guess, share * self.scale)
 
-    def cut(self, node: int, y: Array) -> float:
+    def cut(self, y: Array) -> float:
         """Take the multiplier y if it lowers the bound; returns its value."""
         y = np.maximum(y, 0.0)
         y = y / dot(y, self.sample.profile, y.size)
@@ -400,7 +400,7 @@ class LongLine:
                     _append_nodes(self.nodes, np.array([node]))
                     slip = slip + (-margin[node] / pivot) * y
                 else:
-                    value = self.cut(node, y)
+                    value = self.cut(y)
                     settled = value >= load - tolerance
                     load = min(load, self.bound)
                     slip = self.settle(load, slip)

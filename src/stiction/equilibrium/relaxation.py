@@ -61,21 +61,21 @@ def step_to_corner(sample: Sample, now: Present, slip: Array, direction: Array) 
 
 def _solve(
     operator: Operator, drive: Array, rate: Array, slip: Array, tolerance: float
-) -> tuple[int, Array, int]:
-    """Equilibrium for given strengths at zero slip and rates; status, slip, iterations."""
+) -> tuple[int, Array]:
+    """Equilibrium for given strengths at zero slip and rates; status and slip."""
     new = slip.copy()
     inside = (slip > 0.0) | (drive > 0.0)
-    status, taken = equilibrate(
+    status, _ = equilibrate(
         operator._replace(rate=rate), no_spring(slip.size), drive, inside, new,
         np.empty_like(slip), np.empty((3, slip.size)), tolerance,
     )  # fmt: skip
-    return status, new, taken
+    return status, new
 
 
 def _weakening_step(
     operator: Operator, sample: Sample, load: float, slip: Array, tolerance: float
-) -> tuple[Array, int]:
-    """Slip moved with the true states until the first node reaches a corner, and iterations.
+) -> Array:
+    """Slip moved with the true states until the first node reaches a corner.
 
     Only the nodes that slip or are overloaded move; it goes towards their equilibrium, or, if they
     have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
@@ -89,27 +89,24 @@ def _weakening_step(
     free = no_spring(slip.size)
     residual_of(operator, free, drive, slip, rest)
     inside = (slip > 0.0) | (rest > 0.0)
-    status, used = solve_inside(operator, free, inside, new, rest, workspace, tolerance, ITERATIONS)
+    status, _ = solve_inside(operator, free, inside, new, rest, workspace, tolerance, ITERATIONS)
     direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
     longest = 1.0
     if status == NEGATIVE:
         direction = np.abs(workspace[1])
         largest = float(sample.rate.max())
-        _, taken = lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
-        used += taken
+        lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
         direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
         longest = np.inf
     step = min(step_to_corner(sample, now, slip, direction), longest)
-    return (slip + step * direction if np.isfinite(step) else slip), used
+    return slip + step * direction if np.isfinite(step) else slip
 
 
 class Relaxed(NamedTuple):
-    """BALANCED, SLIDING or UNDECIDED; the slip; whether it was unstable on the way; iterations."""
+    """BALANCED, SLIDING or UNDECIDED; the slip."""
 
     status: int
     slip: Array
-    jumped: bool
-    iterations: int
 
 
 def least_equilibrium(
@@ -135,39 +132,31 @@ def least_equilibrium(
     drag = DRAG * float(sample.rate.max())
     frozen = np.full_like(sample.rate, -drag)
     slip = np.maximum(slip, 0.0)
-    jumped = False
-    used = 0
     patient = False
     for _ in range(STEPS):
         now = present(sample, slip)
         drive = load * sample.profile - now.strength
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
-            return Relaxed(SLIDING, slip, True, used)
+            return Relaxed(SLIDING, slip)
         if not patient:
-            status, new, taken = _solve(operator, drive, now.rate, slip, tolerance)
-            used += taken
-            if status == EXHAUSTED:
-                return Relaxed(UNDECIDED, slip, jumped, used)
-            jumped = jumped or status == NEGATIVE
-            if jumped and only_stable:
-                return Relaxed(UNDECIDED, slip, jumped, used)
+            status, new = _solve(operator, drive, now.rate, slip, tolerance)
+            if status == EXHAUSTED or (status == NEGATIVE and only_stable):
+                return Relaxed(UNDECIDED, slip)
             if status == SOLVED:
                 new = np.maximum(new, slip)
                 if step_to_corner(sample, now, slip, new - slip) >= 1.0:
-                    return Relaxed(BALANCED, new, jumped, used)
-            slip, taken = _weakening_step(operator, sample, load, slip, tolerance)
-            used += taken
+                    return Relaxed(BALANCED, new)
+            slip = _weakening_step(operator, sample, load, slip, tolerance)
             now = present(sample, slip)
         # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
         rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
         strength = now.strength - now.rate * slip
         drive = load * sample.profile - (strength + rough - drag * slip)
-        status, new, taken = _solve(operator, drive, frozen, slip, rough)
-        used += taken
+        status, new = _solve(operator, drive, frozen, slip, rough)
         if status != SOLVED:
-            return Relaxed(UNDECIDED, slip, jumped, used)
+            return Relaxed(UNDECIDED, slip)
         new = np.maximum(new, slip)
         weakening = ~residual_nodes(sample, new, AT_RESIDUAL) & (sample.critical > 0.0)
         patient = bool((new - slip > SETTLED * sample.critical)[weakening].any())
         slip = new
-    return Relaxed(UNDECIDED, slip, jumped, used)
+    return Relaxed(UNDECIDED, slip)

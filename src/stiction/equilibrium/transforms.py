@@ -96,7 +96,7 @@ class PlaneOnset(NamedTuple):
     """Onset of one sample on a plane.
 
     Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (nx, ny), that prove
-    them; whether they are as close as was asked for; iterations on the finest grid.
+    them; whether they are as close as was asked for.
     """
 
     lower: float
@@ -104,7 +104,6 @@ class PlaneOnset(NamedTuple):
     slip: Array
     multiplier: Array
     closed: bool
-    iterations: int
 
 
 def _narrow(bracket: Bracket, gap: float) -> float:
@@ -165,7 +164,7 @@ def plane_onset(
         coarse = bracket
     return PlaneOnset(
         bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
-        bracket.multiplier.reshape(strength.shape), bracket.closed(gap), bracket.iterations,
+        bracket.multiplier.reshape(strength.shape), bracket.closed(gap),
     )  # fmt: skip
 
 

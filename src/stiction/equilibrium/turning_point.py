@@ -67,11 +67,10 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
     right = load * profile - excess + (stiffness * amplitude) * held
-    status, taken = equilibrate(
+    status, _ = equilibrate(
         operator, spring, right, inside, slip, bracket.residual, workspace,
         accuracy * bracket.scale,
     )  # fmt: skip
-    bracket.iterations += taken
     if status != SOLVED:
         return None
     slope = np.where(inside, guess.slope, 0.0)
@@ -83,10 +82,9 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
     tolerance = accuracy * stiffness * bracket.scale * inner(profile, slope) / cost
-    status, taken = solve_inside(
+    status, _ = solve_inside(
         operator, spring, inside, slope, bracket.residual, workspace, tolerance, ITERATIONS
     )
-    bracket.iterations += taken
     if status != SOLVED:
         return None
     share = inner(held, slope)
@@ -102,10 +100,9 @@ def _other_patch(bracket: Bracket) -> Array | None:
     vector = np.where(bracket.inside, np.abs(bracket.workspace[1]), 0.0)
     if not vector.any():
         return None
-    value, taken = lowest_eigenvector(
+    value, _ = lowest_eigenvector(
         bracket.operator, bracket.inside, vector, 1e-3 * float(bracket.operator.rate.max()), 12
     )
-    bracket.iterations += taken
     if value <= 0.0:
         bracket.raise_multiplier(vector)
     held: Array = np.maximum(vector, 0.0)
