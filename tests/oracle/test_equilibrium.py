@@ -273,9 +273,8 @@ def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
         part = runs_away_alone(
             sample, stiffness, found.load, found.slip, found.multiplier, griffith
         )
-        whole = jump(
-            sample, found.load, found.slip, found.stiff, griffith, make_workspace(stiffness)
-        )
+        spaces = make_workspace(stiffness), make_workspace(stiffness)
+        whole = jump(sample, found.load, found.slip, found.stiff, griffith, *spaces)
         # Only a lower bound: what slides in the window slides.
         assert not part or whole == SLIDING
         outcomes.append((part, whole == SLIDING))

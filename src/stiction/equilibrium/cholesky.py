@@ -251,7 +251,6 @@ class Workspace(NamedTuple):
     halves: Array
 
 
-@jit
 def make_workspace(stiffness: Stiffness) -> Workspace:
     """Workspace for samples of a line. Pages of the factor that are never used cost no memory."""
     n = stiffness.column.shape[0]
@@ -259,9 +258,9 @@ def make_workspace(stiffness: Stiffness) -> Workspace:
     return Workspace(
         stiffness,
         np.empty(row_start(capacity + 4)),
-        np.empty(n + 4, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.bool_),
+        np.empty(n + 4, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+        np.empty(n, dtype=np.bool_),
         np.empty(n),
         np.empty((2, n + 4)),
         np.empty((4, n + 4)),

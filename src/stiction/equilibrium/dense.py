@@ -147,17 +147,16 @@ def solve_batch(
     others: Windows,
     all_slips: bool,
     first: First,
+    workspace: Workspace,
+    work: Array,
 ) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
     Arrays of the samples are (samples, n), as of `Sample`; `others` are the windows of samples with
-    another weakening rate than the usual one anywhere.
+    another weakening rate than the usual one anywhere. `work` is (8, n) of work space.
     """
     samples, n = excess.shape
-    workspace = make_workspace(line.stiffness)
-    slip = np.empty(n)
-    stiff = np.empty(n)
-    work = np.empty((6, n))
+    slip, stiff = work[6], work[7]
     for row in range(samples):
         sample = make_sample(excess[row], residual[row], profile, rate[row], line.pieces)
         windows, start = line.usual, np.inf
@@ -281,6 +280,7 @@ class LineProgram:
                 np.ascontiguousarray(rows.strength - rows.initial_stress),
                 np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
                 np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
+                make_workspace(self.line.stiffness), np.empty((8, self.nodes)),
             )  # fmt: skip
         else:
             for row in range(rows.samples):
@@ -369,7 +369,8 @@ class LineProgram:
         ):
             outcome = SLIDING
         if outcome == UNDECIDED:
-            outcome = jump(sample, found.load, slip, stiff, griffith, make_workspace(stiffness))
+            spaces = make_workspace(stiffness), make_workspace(stiffness)
+            outcome = jump(sample, found.load, slip, stiff, griffith, *spaces)
         before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
         if outcome == ARRESTED and not np.any(after > before):
             outcome = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability

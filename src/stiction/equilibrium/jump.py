@@ -16,7 +16,6 @@ from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
     add_members,
-    make_workspace,
     multiply_members,
     singular_direction,
     solve_first,
@@ -161,7 +160,13 @@ def _settle(
 
 @jit
 def jump(
-    sample: Sample, load: float, slip: Array, stiff: Array, griffith: float, workspace: Workspace
+    sample: Sample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    griffith: float,
+    workspace: Workspace,
+    other: Workspace,
 ) -> int:
     """Follow an instability at a fixed load to the next least equilibrium, or to none.
 
@@ -182,7 +187,6 @@ def jump(
     size = add_members(workspace, ZERO, count)
     if size < count:
         return SLIDING
-    other = make_workspace(workspace.stiffness)
     waited = 0
     passed = 0
     for _ in range(STEPS):

@@ -117,7 +117,8 @@ def runs_away_alone(
     stiff = _times(small.column, local)
     outside = _times(stiffness.column, slip)[nodes] - stiff[:WINDOW]
     part = _window_of(sample, nodes, outside)
-    outcome = jump(part, load, local, stiff, griffith, make_workspace(small))
+    spaces = make_workspace(small), make_workspace(small)
+    outcome = jump(part, load, local, stiff, griffith, *spaces)
     slip[nodes] = np.maximum(slip[nodes], local[:WINDOW])
     return bool(outcome == SLIDING)
 
