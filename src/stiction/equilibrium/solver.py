@@ -299,9 +299,9 @@ class Solver:
         free = np.flatnonzero(unproved)
         if free.size and self.problem.interface.is_plane:
             warn_accuracy(
-                "nodes reach their residual strength, or another corner of the law, before the"
-                f" first instability in {free.size} of {gap.size} samples ({listed(free)}): it was"
-                f" found by following equilibria, to {share[free].max():.2g} of it, and has no"
+                "nodes reach a corner of the law or their residual strength before the first"
+                f" instability in {free.size} of {gap.size} samples ({listed(free)}): it was found"
+                f" by following equilibria, to {share[free].max():.2g} of it, and has no"
                 " certificate"
             )
         if lost.any():
