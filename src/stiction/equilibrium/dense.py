@@ -223,10 +223,12 @@ class LineProgram:
             return _no_windows()
         return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
 
+    def _is_usual(self, sample: Sample) -> bool:
+        return bool(np.all((sample.rate == self.line.usual_rate) | (sample.rate == 0.0)))
+
     def bound(self, sample: Sample) -> tuple[float, Array]:
         """Return the discrete local bound of one sample (Pa), and its multiplier."""
-        usual = bool(np.all((sample.rate == self.line.usual_rate) | (sample.rate == 0.0)))
-        windows = self.line.usual if usual else self._windows(sample.rate)
+        windows = self.line.usual if self._is_usual(sample) else self._windows(sample.rate)
         multiplier = np.empty(self.nodes)
         load = window_bound(sample, windows, np.empty(self.nodes), multiplier)
         return load, multiplier
@@ -248,8 +250,7 @@ class LineProgram:
         # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
         workspace = self._workspace(sample)
         stiff, lowest = np.empty(self.nodes), multiplier.copy()
-        uniform = bool(np.all(sample.rate == self.line.usual_rate))
-        start, slip = np.inf if uniform else -np.inf, np.zeros(self.nodes)
+        start, slip = np.inf if self._is_usual(sample) else -np.inf, np.zeros(self.nodes)
         if state is not None:
             start, slip = state.load, state.slip.copy()
         load, status = solve_program(sample, start, bound, cap, lowest, slip, stiff, workspace)

@@ -141,11 +141,12 @@ def solve_program(
 ) -> tuple[float, int]:
     """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
-    The load is first `start` and then half way up to the bound until that is close: at too high a
-    load far too many nodes join. It is half way from the first slip where `start` is -inf. Nodes
-    that slip already, at `slip`, join first. If `cap` is below the critical load, the result is the
-    least equilibrium there. The workspace has the diagonal of A in it. The status is SOLVED,
-    STALLED after too many passes, or OVERFULL: more members than the workspace holds.
+    The load is first `start`, then each time three quarters nearer to the bound until that is
+    close: at too high a load far too many nodes join. Where `start` is -inf it is so much nearer
+    than the first slip. Nodes that slip already, at `slip`, join first. If `cap` is below the
+    critical load, the result is the least equilibrium there. The workspace has the diagonal of A in
+    it. The status is SOLVED, STALLED after too many passes, or OVERFULL: more members than the
+    workspace holds.
     """
     top = min(bound, cap)
     if start == -np.inf:
