@@ -8,7 +8,6 @@ the load by relaxation at fixed load.
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -229,12 +228,9 @@ class PlaneProgram:
 
     def next(self, sample: Sample, state: State) -> State:
         """Return the next instability on the path from a stable state."""
-        return self._by_programme(sample, state) or self._step_on(sample, state)
-
-    def _by_programme(self, sample: Sample, state: State) -> State | None:
         found = self.programme(sample, state.slip)
         if found is None:
-            return None
+            return self._step_on(sample, state)
         slip = np.maximum(found.slip.reshape(-1), state.slip)
         return State(
             found.lower, slip, state.stiff, found.multiplier.reshape(-1), upper=found.upper,
@@ -242,27 +238,22 @@ class PlaneProgram:
         )  # fmt: skip
 
     def _step_on(self, sample: Sample, state: State) -> State:
-        """Follow the stable path in steps of the load until the programme holds for the rest of it.
+        """Follow the stable path in steps of the load.
 
         A step is halved if it looks unstable, which a long one may do only because nodes reach a
-        corner in it. The programme is tried again where that happens after other steps.
+        corner in it.
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         step = FIRST_STEP * load
-        moved = False
         while True:
             trial = least_equilibrium(operator, sample, load + step, slip, 0.1 * gap, True)
             if trial.status == BALANCED:
-                load, slip, step, moved = load + step, trial.slip, 1.5 * step, True
-                continue
-            found = self._by_programme(sample, replace(state, slip=slip)) if moved else None
-            if found is not None and found.load >= load:
-                return found
-            moved = False
-            if step <= gap * load:
+                load, slip, step = load + step, trial.slip, 1.5 * step
+            elif step > gap * load:
+                step = max(0.4 * step, 0.7 * gap * load)
+            else:
                 break
-            step = max(0.4 * step, 0.7 * gap * load)
         beyond = load + step
         ahead = least_equilibrium(operator, sample, beyond, slip, 0.1 * gap)
         direction = _direction(operator, sample, slip, ahead.slip)
