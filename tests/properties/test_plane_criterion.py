@@ -100,8 +100,8 @@ def test_sample_i_is_the_same_whatever_batch_and_workers(plane):
 @pytest.mark.parametrize("mean_mode", [False, True])
 def test_variance_of_the_nucleation_stress_is_that_of_theory(plane, mean_mode):
     field = field_of(1.0, mean_mode=mean_mode, anisotropy=1.4)
-    aspect = 1.3
-    theory = st.theory.nucleation_statistics(plane, field, aspect=aspect)
+    aspect = middle_aspect(plane)
+    theory = st.theory.nucleation_statistics(plane, field)
     tau_n = st.theory.nucleation_stress(
         plane, field.sample(plane.interface, samples=400, seed=2), aspect=aspect
     )
