@@ -198,15 +198,16 @@ class LineProgram:
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
         self.nodes = problem.interface.size // every
-        self.spacing = problem.interface.spacing * every
         modulus = problem.effective_modulus
         self.unit = np.pi * modulus / problem.interface.extent
         rate = problem.friction.weakening_rate
         uniform = rate is not None and np.ptp(rate) == 0.0
         usual = float(np.max(rate)) if uniform else np.nan
         extent = problem.interface.extent
+        stiffness, runs = _stiffness_and_runs(self.nodes, extent, modulus)
         self.line = Line(
-            *_stiffness_and_runs(self.nodes, extent, modulus),
+            stiffness,
+            runs,
             self.pieces,
             usual,
             exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
