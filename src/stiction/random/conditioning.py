@@ -46,13 +46,13 @@ CURVED, OFTEN = 0.25, 0.05
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     """Places (rows x, and y on a plane) and values (last row) of what was measured."""
     read = (info.context or {}).get("read")
+    if read is not None and not isinstance(value, xr.DataArray):
+        value = read(value, "strength")
+    if isinstance(value, dict) and "dims" in value:
+        value = xr.DataArray.from_dict(value)
     if isinstance(value, dict) and "values" in value:
-        rows = [real_array(value[name]) for name in ("x", "y", "values") if name in value]
+        rows = [np.ravel(value[name]) for name in ("x", "y", "values") if name in value]
     else:
-        if read is not None and not hasattr(value, "dims"):
-            value = read(value, "strength")
-        if isinstance(value, dict) and "dims" in value:
-            value = xr.DataArray.from_dict(value)
         dims = getattr(value, "dims", None)
         if dims not in (("x",), ("x", "y"), ("y", "x")) or any(d not in value.coords for d in dims):
             raise ValueError(

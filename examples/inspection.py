@@ -1,0 +1,72 @@
+"""What is an inspection worth? Failure probabilities of specimens before and after a scan.
+
+Each of forty simulated specimens is scanned over a tenth, a third and all of its length, with an
+error of 20 kPa, and its failure probability computed given the scan.
+Run: python examples/inspection.py [folder for the figure]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray as xr
+
+import stiction as st
+
+SHARES = {"a tenth": 0.1, "a third": 1 / 3, "all": 1.0}
+STRESS, NOISE = 0.68e6, 20e3  # Pa
+
+
+def probabilities(specimens: int = 40, samples: int = 1000) -> tuple[float, dict[str, np.ndarray]]:
+    """Return P of an unknown specimen, and of each one given a scan of each share."""
+    problem = st.paper.problem(nodes=512)
+    strength = st.paper.strength(problem, correlation_ratio=1.0)
+    x, rng = problem.interface.x, np.random.default_rng(0)
+
+    def failing(field, samples=samples):
+        found = st.monte_carlo(
+            problem, field, method=st.LocalCriterion(), samples=samples, seed=0, pilot=False,
+            progress=False,
+        )  # fmt: skip
+        return float((found.critical_stress < STRESS).mean())
+
+    found = {name: [] for name in SHARES}
+    for specimen in strength.sample(problem.interface, samples=specimens, seed=1):
+        measured = specimen + NOISE * rng.standard_normal(x.size)
+        for name, share in SHARES.items():
+            scan = xr.DataArray(measured, {"x": x}, "x")[: round(share * x.size)]
+            found[name].append(failing(strength.given(scan, noise=NOISE)))
+    return failing(strength, 20_000), {name: np.array(each) for name, each in found.items()}
+
+
+def draw(before: float, after: dict[str, np.ndarray]):
+    """Draw a dot for each specimen, and the mean of each column."""
+    with st.plot.paper_style():
+        figure, axes = plt.subplots(figsize=(4.5, 3.0))
+        rng = np.random.default_rng(0)
+        for place, (name, values) in enumerate(after.items()):
+            axes.plot(place + rng.uniform(-0.2, 0.2, values.size), values, "o", ms=3, mfc="none")
+            axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color="k")
+        axes.axhline(before, color="0.6", ls="--", lw=0.8)
+        axes.text(2.45, before, "without a scan", ha="right", va="bottom", color="0.4")
+        axes.set_xticks(range(len(after)), after)
+        axes.set(
+            xlabel="scanned part of the interface", ylabel="failure probability", ylim=(-0.02, 1.02)
+        )
+    return figure
+
+
+if __name__ == "__main__":
+    before, after = probabilities()
+    print(f"without a scan P = {before:.3f}")
+    for name, values in after.items():
+        print(
+            f"{name} scanned: mean {values.mean():.3f} +- {values.std() / values.size**0.5:.3f},"
+            f" {np.mean(values < 0.1 * before):.0%} of specimens below a tenth of it,"
+            f" {np.mean(values > 0.9):.0%} above 0.9"
+        )
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    draw(before, after).savefig(folder / "inspection.png", dpi=150)
