@@ -9,6 +9,11 @@ and mu + P^(1/2) a with the symmetric root turns the usual draws into conditione
 others. It is the same distribution as by Matheron's rule (Journel and Huijbregts, 1978; Doucet,
 2010). With the singular values of Psi = U s V^T, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V^T is well
 conditioned however densely a smooth field was measured.
+
+Values are measured of the marginal and not of z. Their likelihood, a function of z at each place, is
+replaced by the Gaussian that gives the same mean and variance, in turns with the regression
+(expectation propagation; Minka, 2001). This holds near bounds of the marginal, too, where errors
+are not small against the bend of the map.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.jit import jit
 from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model, real_array
-from stiction.random.mapping import quantile_of_normal
+from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 
 NEGLIGIBLE = 1e-8
@@ -37,10 +42,10 @@ DOUBTFUL = 5.0
 """Standard deviations of chi-square beyond which measured values do not suit a field."""
 IMPOSSIBLE = 4.0
 """Errors beyond a bound of the marginal that no measured value has."""
-NODES, PASSES = 65, 4
-"""Of the posterior of the factor between specimens, and how often its range is narrowed."""
-CURVED, OFTEN = 0.25, 0.05
-"""Curvature of the map over an error, relative to it, and a share of values: worth a warning."""
+REACH, NODES, TURNS = 8.0, 65, 8
+"""Half width of Gaussians, nodes across them, and turns between likelihood and regression."""
+FLAT, TINY, SETTLED = 1e-4, 1e-12, 1e-3
+"""Least precision of a measured z and least variance, and a change of z that ends the turns."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
@@ -109,23 +114,49 @@ class Conditions:
         """The measured values, (points,)."""
         return self.profile[-1]
 
-    def normal(self, marginal: Any, factors: Array | None = None) -> tuple[Array, Array, Array]:
-        """Return measured values of z and their errors, to first order, (factors, points) each.
+    def gaussian(
+        self, marginal: Any, factor: float, mean: Array, variance: Array
+    ) -> tuple[Array, Array, float]:
+        """Replace the likelihood of z at each place by a Gaussian.
 
-        `factors`, of which there is one by default, multiply the marginal. Values within an error
-        of a bound, or beyond, are taken as one error inside; the third array, (factors,), is the
-        sum of the squares of these moves, over the errors.
+        Parameters
+        ----------
+        marginal : Beta or any other marginal
+        factor : float
+            By which it is multiplied.
+        mean, variance : (points,) arrays
+            Of z from all else.
+
+        Returns
+        -------
+        (points,) arrays
+            Values of z and their precisions.
+        float
+            Logarithm of what the product of all, with unit maxima, is to be multiplied by.
         """
-        law = marginal.distribution
-        low, high = law.support()
-        factors = np.ones((1, 1)) if factors is None else factors[:, None]
-        noise, given = self.noise / factors, self.values / factors
-        edge = np.minimum(noise, 0.25 * (high - low))
-        value = np.clip(given, low + edge, high - edge)
-        below = law.cdf(value)
-        z = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(value)))
-        slope = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi) / law.pdf(value)
-        return z, noise / slope, (((value - given) / noise) ** 2).sum(axis=1)
+        law, noise, value = marginal.distribution, self.noise / factor, self.values / factor
+        width = REACH * np.sqrt(variance)
+        ends = []
+        for side in (-1.0, 1.0):
+            below = law.cdf(value + side * REACH * noise)
+            above = law.sf(value + side * REACH * noise)
+            score = np.where(below < 0.5, ndtri(below), -ndtri(above))
+            ends.append(np.clip(score, mean - width, mean + width))
+        half = np.maximum(0.5 * (ends[1] - ends[0]), 1e-3 * width)[:, None]
+        z = 0.5 * (ends[0] + ends[1])[:, None] + half * np.linspace(-1.0, 1.0, NODES)
+        off = (z - mean[:, None]) ** 2 / variance[:, None]
+        density = -0.5 * (off + ((value[:, None] - from_normal(marginal, z)) / noise) ** 2)
+        top = density.max(axis=1, keepdims=True)
+        weight = np.exp(density - top)
+        total = weight.sum(axis=1)
+        centre = (weight * z).sum(axis=1) / total
+        spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
+        precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
+        found = (centre / spread - mean / variance) / precision
+        whole = variance + 1.0 / precision
+        scale = np.log(total * half[:, 0]) + top[:, 0]
+        scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
+        return found, precision, float(scale.sum())
 
     def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
@@ -151,27 +182,6 @@ class Conditions:
             )
         if problems:
             raise InputError(problems)
-
-    def warn(self, marginal: Any) -> None:
-        """Warn of values near a bound, and where the error is not small against the map's bend."""
-        low, high = marginal.distribution.support()
-        near = (self.values < low + self.noise) | (self.values > high - self.noise)
-        if near.any():
-            warn_accuracy(
-                f"given.profile: {near.sum()} of {near.size} values lie within an error of a bound"
-                f" of the marginal ({low:g} to {high:g}), or beyond, and are taken as one error"
-                " inside"
-            )
-        z, error, _ = self.normal(marginal)
-        ends = [quantile_of_normal(marginal.distribution, z + shift) for shift in (-error, error)]
-        middle = quantile_of_normal(marginal.distribution, z)
-        bend = np.abs(ends[0] + ends[1] - 2.0 * middle) / (2.0 * self.noise)
-        if np.mean(bend > CURVED) > OFTEN:
-            warn_accuracy(
-                f"given.noise: over {self.noise:g} the map from the Gaussian field to the marginal"
-                f" bends at {100.0 * np.mean(bend > CURVED):.0f} % of the values, and errors are"
-                " taken to first order"
-            )
 
 
 _OTHER_DIMENSION = {
@@ -209,12 +219,12 @@ class Measured(NamedTuple):
     phi: Array
     factor: Any = None
 
-    def normal(self, u: Array) -> tuple[Array, Array, Array]:
-        """Return measured z and their errors for draws u of the factor between specimens."""
-        factors = np.ones(u.size)
+    def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
+        """Return `Conditions.gaussian` for the draw u of the factor between specimens."""
+        factor = 1.0
         if self.factor is not None:
-            factors = quantile_of_normal(self.factor.distribution, u)
-        return self.conditions.normal(self.marginal, factors)
+            factor = float(quantile_of_normal(self.factor.distribution, np.array(u)))
+        return self.conditions.gaussian(self.marginal, factor, mean, variance)
 
 
 class Conditioning:
@@ -227,60 +237,89 @@ class Conditioning:
 
     Notes
     -----
-    A factor b(u) between specimens is part of what is measured: z depend on its draw u, and the
-    probability of the values is, but for a constant,
+    The draw u of a factor between specimens has the posterior
 
-        log p(values | u) = -chi^2(u)/(2 rho^2) - sum log(1 + (s/rho)^2)/2,
+        log p(u | values) = -u^2/2 + log scale(u) - chi^2(u)/2 - sum log(1 + s^2(u))/2,
 
-    with rho the geometric mean of the errors at u over those at the mean of u, for which the
-    regression is made. The draw of u is mapped to its posterior, quantile by quantile.
+    with the Gaussians for one place at a time. It is tabulated, and u mapped to it quantile by
+    quantile. The regression is made at its mean; elsewhere values of z move by as much as the
+    Gaussians for one place at a time do.
     """
 
     def __init__(self, measured: Sequence[Measured]) -> None:
         self.measured = measured
+        self.phi = np.concatenate([one.phi for one in measured])
+        check_memory("given.profile", 24.0 * self.phi.size, "give fewer places")
         self.grid: Array | None = None
-        self._regress(np.zeros(1))
-        if all(one.factor is None for one in measured):
-            return
+        alone = np.zeros(self.phi.shape[0]), np.ones(self.phi.shape[0])
+        middle, moves = 0.0, np.zeros((1, alone[0].size))
+        if any(one.factor is not None for one in measured):
+            middle, moves = self._tabulate(alone)
+        others = alone
+        for _ in range(TURNS):
+            z, precision, _ = self._gaussian(middle, others)
+            self._regress(z, precision)
+            before, others = others, self._others(z, precision)
+            if np.abs(others[0] - before[0]).max() < SETTLED:
+                break
+        self.data = (z + moves) @ self.left
+
+    def _gaussian(self, u: float, others: tuple[Array, Array]) -> tuple[Array, Array, float]:
+        """Gaussians that stand for the measured values, given z from all others."""
+        parts, first = [], 0
+        for one in self.measured:
+            here = slice(first, first + one.phi.shape[0])
+            parts.append(one.gaussian(u, others[0][here], others[1][here]))
+            first = here.stop
+        z, precision = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+        return z, precision, sum(part[2] for part in parts)
+
+    def _regress(self, z: Array, precision: Array) -> None:
+        root = np.sqrt(precision)
+        left, values, right = svd(self.phi * root[:, None], full_matrices=False)
+        kept = values > NEGLIGIBLE
+        self.left, self.values = root[:, None] * left[:, kept], values[kept]
+        self.right = np.ascontiguousarray(right[kept].T)
+        self.data = (z @ self.left)[None, :]
+        self.chi_square = self._chi_square(z, precision, 1.0)
+
+    def _chi_square(self, z: Array, precision: Array, ratio: float) -> float:
+        """z^T (C + S)^-1 z with errors `ratio` times those of the regression."""
+        power = (self.values / ratio) ** 2
+        left = (z @ self.left) / ratio
+        return float(z * precision @ z - power / (1.0 + power) @ left**2)
+
+    def _others(self, z: Array, precision: Array) -> tuple[Array, Array]:
+        """Mean and variance of z at each place from what was measured at all others."""
+        mean, deviation = self.moments(self.phi)
+        least = 1.0 / (self.phi**2).sum(axis=1)
+        rest = np.maximum(deviation**-2 - precision, least)
+        return (mean / deviation**2 - precision * z) / rest, 1.0 / rest
+
+    def _tabulate(self, alone: tuple[Array, Array]) -> tuple[float, Array]:
+        """Find the posterior of u; return its mean, and how values of z move along the grid."""
         middle, spread = 0.0, 1.0
-        for _ in range(PASSES):
-            grid = np.clip(middle + spread * np.linspace(-8.0, 8.0, NODES), -37.0, 37.0)
-            self._regress(grid)
-            weight = self._posterior_weights(grid)
+        for _ in range(TURNS // 2):
+            grid = np.clip(middle + spread * np.linspace(-REACH, REACH, NODES), -37.0, 37.0)
+            z, precision, _ = self._gaussian(middle, alone)
+            self._regress(z, precision)
+            values = [self._gaussian(u, alone) for u in grid]
+            density = -0.5 * grid**2
+            for i, (here, errors, scale) in enumerate(values):
+                ratio = float(np.exp(0.5 * np.log(precision / errors).mean()))
+                volume = np.log1p((self.values / ratio) ** 2).sum()
+                density[i] += scale - 0.5 * (volume + self._chi_square(here, errors, ratio))
+            weight = np.exp(density - density.max())
+            weight /= weight.sum()
             middle = float(weight @ grid)
-            spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, 8.0 * spread / NODES)
+            spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, REACH * spread / NODES)
         mass = 0.5 * (weight[1:] + weight[:-1])
         below, above = np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1]
         score = np.where(below < 0.5, ndtri(below), -ndtri(above))
         usable = np.isfinite(score)
         self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
-
-    def _regress(self, grid: Array) -> None:
-        """Regress on the values at the middle of a grid of u, and reduce those at all of it."""
-        parts = [one.normal(grid) for one in self.measured]
-        z, error = (np.concatenate([part[i] for part in parts], axis=1) for i in (0, 1))
-        own = error[grid.size // 2]
-        phi = np.concatenate([one.phi for one in self.measured])
-        check_memory("given.profile", 24.0 * phi.size, "give fewer places")
-        left, values, right = svd(phi / own[:, None], full_matrices=False)
-        kept = values > NEGLIGIBLE
-        self.values, self.right = values[kept], np.ascontiguousarray(right[kept].T)
-        self.data = (z / own) @ left[:, kept]  # (nodes of u, r)
-        self.total, self.moved = ((z / own) ** 2).sum(axis=1), sum(part[2] for part in parts)
-        self.ratio = np.exp(np.log(error / own).mean(axis=1))
-        self.points = own.size
-
-    def chi_square(self) -> Array:
-        """Return chi^2 at each u of the grid; as many as values, if they suit the field."""
-        power = (self.values / self.ratio[:, None]) ** 2
-        found: Array = self.total - (power / (1.0 + power) * self.data**2).sum(axis=1)
-        return found / self.ratio**2 + self.moved
-
-    def _posterior_weights(self, grid: Array) -> Array:
-        volume = np.log1p((self.values / self.ratio[:, None]) ** 2).sum(axis=1)
-        density = -0.5 * (grid**2 + self.chi_square() + volume)
-        weight = np.exp(density - density.max())
-        return weight / float(weight.sum())
+        now = self._gaussian(middle, alone)[0]
+        return middle, np.array([here for here, _, _ in values]) - now
 
     def specimen(self, u: Array) -> Array:
         """Return the draws of the factor between specimens, conditioned."""
@@ -306,17 +345,15 @@ class Conditioning:
         along = phi @ self.right
         share = self.values**2 / (1.0 + self.values**2)
         variance = (phi**2).sum(axis=1) - along**2 @ share
-        return along @ (share / self.values * self.data[0]), np.sqrt(np.maximum(variance, 0.0))
+        return along @ (share / self.values * self.data[0]), np.sqrt(np.maximum(variance, TINY))
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
-        for one in self.measured:
-            one.conditions.warn(one.marginal)
-        chi_square, points = float(self.chi_square().min()), self.points
-        if chi_square > points + DOUBTFUL * np.sqrt(2.0 * points):
+        points = self.phi.shape[0]
+        if self.chi_square > points + DOUBTFUL * np.sqrt(2.0 * points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
-                f" {chi_square:.4g} for {points} values): check its marginal, its correlation"
+                f" {self.chi_square:.4g} for {points} values): check its marginal, its correlation"
                 " length and the noise"
             )
 
