@@ -1,4 +1,4 @@
-"""My specimens differ from lot to lot as well as along each interface: what does that do to the tail?
+"""My specimens differ from lot to lot as well as along each interface: what of the tail?
 
 `between` multiplies a property by a factor of its own for each specimen, constant along it.
 """

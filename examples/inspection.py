@@ -47,7 +47,7 @@ def draw(before: float, after: dict[str, np.ndarray]):
     with st.plot.paper_style():
         figure, axes = plt.subplots(figsize=(4.5, 3.0))
         rng = np.random.default_rng(0)
-        for place, (name, values) in enumerate(after.items()):
+        for place, values in enumerate(after.values()):
             axes.plot(place + rng.uniform(-0.2, 0.2, values.size), values, "o", ms=3, mfc="none")
             axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color="k")
         axes.axhline(before, color="0.6", ls="--", lw=0.8)

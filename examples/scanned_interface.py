@@ -1,6 +1,7 @@
-"""A part of my interface was scanned: at which load does this one slide, and with what probability?
+"""A part of my interface was scanned: how likely does this one slide below a stress?
 
-`RandomField.given` keeps the field at the measured values, each with an error, and random elsewhere.
+`RandomField.given` keeps the field at the measured values, each with an error; elsewhere it is
+random.
 """
 
 import numpy as np

@@ -10,8 +10,8 @@ others. It is the same distribution as by Matheron's rule (Journel and Huijbregt
 2010). With the singular values of Psi = U s V^T, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V^T is well
 conditioned however densely a smooth field was measured.
 
-Values are measured of the marginal and not of z. Their likelihood, a function of z at each place, is
-replaced by the Gaussian that gives the same mean and variance, in turns with the regression
+Values are measured of the marginal and not of z. Their likelihood, a function of z at each place,
+is replaced by the Gaussian that gives the same mean and variance, in turns with the regression
 (expectation propagation; Minka, 2001). This holds near bounds of the marginal, too, where errors
 are not small against the bend of the map.
 """
@@ -32,8 +32,8 @@ from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.jit import jit
-from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model, real_array
-from stiction.random.mapping import from_normal, quantile_of_normal
+from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model
+from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 
 NEGLIGIBLE = 1e-8
@@ -42,10 +42,11 @@ DOUBTFUL = 5.0
 """Standard deviations of chi-square beyond which measured values do not suit a field."""
 IMPOSSIBLE = 4.0
 """Errors beyond a bound of the marginal that no measured value has."""
-REACH, NODES, TURNS = 8.0, 65, 8
+REACH, NODES, TURNS = 8.0, 49, 8
 """Half width of Gaussians, nodes across them, and turns between likelihood and regression."""
-FLAT, TINY, SETTLED = 1e-4, 1e-12, 1e-3
-"""Least precision of a measured z and least variance, and a change of z that ends the turns."""
+FLAT, SHARP, TINY, SETTLED = 1e-4, 1e-4, 1e-12, 1e-3
+"""Least precision of a measured z, its error that needs no turns, least variance, and a change of z
+that ends the turns."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
@@ -135,15 +136,15 @@ class Conditions:
             Logarithm of what the product of all, with unit maxima, is to be multiplied by.
         """
         law, noise, value = marginal.distribution, self.noise / factor, self.values / factor
+        # Where the likelihood and z from all else overlap.
+        edges = value + REACH * noise * np.array([[-1.0], [1.0]])
+        below = law.cdf(edges)
+        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges))).clip(-FURTHEST, FURTHEST)
         width = REACH * np.sqrt(variance)
-        ends = []
-        for side in (-1.0, 1.0):
-            below = law.cdf(value + side * REACH * noise)
-            above = law.sf(value + side * REACH * noise)
-            score = np.where(below < 0.5, ndtri(below), -ndtri(above))
-            ends.append(np.clip(score, mean - width, mean + width))
-        half = np.maximum(0.5 * (ends[1] - ends[0]), 1e-3 * width)[:, None]
-        z = 0.5 * (ends[0] + ends[1])[:, None] + half * np.linspace(-1.0, 1.0, NODES)
+        low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
+        low, high = np.where(low < high, (low, high), (mean - width, mean + width))
+        half = np.maximum(0.5 * (high - low), TINY)[:, None]
+        z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
         off = (z - mean[:, None]) ** 2 / variance[:, None]
         density = -0.5 * (off + ((value[:, None] - from_normal(marginal, z)) / noise) ** 2)
         top = density.max(axis=1, keepdims=True)
@@ -151,8 +152,9 @@ class Conditions:
         total = weight.sum(axis=1)
         centre = (weight * z).sum(axis=1) / total
         spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
+        spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
         precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
-        found = (centre / spread - mean / variance) / precision
+        found = mean + (centre - mean) * (1.0 + 1.0 / (precision * variance))
         whole = variance + 1.0 / precision
         scale = np.log(total * half[:, 0]) + top[:, 0]
         scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
@@ -281,25 +283,29 @@ class Conditioning:
         self.left, self.values = root[:, None] * left[:, kept], values[kept]
         self.right = np.ascontiguousarray(right[kept].T)
         self.data = (z @ self.left)[None, :]
-        self.chi_square = self._chi_square(z, precision, 1.0)
+        self.precision = precision
+        self.chi_square = self._chi_square(z, 1.0)
 
-    def _chi_square(self, z: Array, precision: Array, ratio: float) -> float:
+    def _chi_square(self, z: Array, ratio: float) -> float:
         """z^T (C + S)^-1 z with errors `ratio` times those of the regression."""
         power = (self.values / ratio) ** 2
         left = (z @ self.left) / ratio
-        return float(z * precision @ z - power / (1.0 + power) @ left**2)
+        return float(self.precision @ z**2 / ratio**2 - power / (1.0 + power) @ left**2)
 
     def _others(self, z: Array, precision: Array) -> tuple[Array, Array]:
         """Mean and variance of z at each place from what was measured at all others."""
         mean, deviation = self.moments(self.phi)
         least = 1.0 / (self.phi**2).sum(axis=1)
         rest = np.maximum(deviation**-2 - precision, least)
-        return (mean / deviation**2 - precision * z) / rest, 1.0 / rest
+        # Over so small an error the map is straight, and the difference would be round-off.
+        sharp = deviation < SHARP
+        found = (mean / deviation**2 - precision * z) / rest
+        return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)
 
     def _tabulate(self, alone: tuple[Array, Array]) -> tuple[float, Array]:
         """Find the posterior of u; return its mean, and how values of z move along the grid."""
         middle, spread = 0.0, 1.0
-        for _ in range(TURNS // 2):
+        for _ in range(3):
             grid = np.clip(middle + spread * np.linspace(-REACH, REACH, NODES), -37.0, 37.0)
             z, precision, _ = self._gaussian(middle, alone)
             self._regress(z, precision)
@@ -308,7 +314,7 @@ class Conditioning:
             for i, (here, errors, scale) in enumerate(values):
                 ratio = float(np.exp(0.5 * np.log(precision / errors).mean()))
                 volume = np.log1p((self.values / ratio) ** 2).sum()
-                density[i] += scale - 0.5 * (volume + self._chi_square(here, errors, ratio))
+                density[i] += scale - 0.5 * (volume + self._chi_square(here, ratio))
             weight = np.exp(density - density.max())
             weight /= weight.sum()
             middle = float(weight @ grid)
@@ -344,8 +350,9 @@ class Conditioning:
         """Return mean and standard deviation of z = phi @ draws, (points,) each."""
         along = phi @ self.right
         share = self.values**2 / (1.0 + self.values**2)
-        variance = (phi**2).sum(axis=1) - along**2 @ share
-        return along @ (share / self.values * self.data[0]), np.sqrt(np.maximum(variance, TINY))
+        free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
+        variance = along**2 @ (1.0 - share) + np.where(free > TINY, free, 0.0)
+        return along @ (share / self.values * self.data[0]), np.sqrt(variance)
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
