@@ -283,11 +283,18 @@ def _models_in(annotation: Any) -> list[type]:
     return [cls for part in typing.get_args(annotation) for cls in _models_in(part)]
 
 
+def keys_of(cls: Any) -> dict[str, str]:
+    """Return the keys of a model in a study file, and the field that each stands for."""
+    known = getattr(cls, "__pydantic_fields__", {})
+    names = [field.name for field in dataclasses.fields(cls) if field.init]
+    return {(name in known and known[name].alias) or name: name for name in names}
+
+
 def _parameters(owner: Any) -> dict[str, Any]:
     """Names and annotations of the fields of a model, or of the arguments of a function."""
     if dataclasses.is_dataclass(owner):
         hints = typing.get_type_hints(owner, include_extras=True)
-        return {field.name: hints[field.name] for field in dataclasses.fields(owner) if field.init}
+        return {key: hints[name] for key, name in keys_of(owner).items()}
     hints = typing.get_type_hints(_without_return(owner), include_extras=True)
     return {name: hints.get(name, Any) for name in inspect.signature(owner).parameters}
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from stiction.errors import InputError, unknown_name
-from stiction.model import describe
+from stiction.model import describe, keys_of
 from stiction.random.marginals import ScipyMarginal
-from stiction.random.random_interface import RandomInterface
 
-CORRELATION = "correlation"
-"""Table of `RandomInterface` whose keys are names of properties, and its values pure numbers."""
+MAPPINGS = ("correlation", "between")
+"""Tables of `RandomInterface` whose keys are names of properties."""
 
 
 def with_values(owner: Any, values: Mapping[str, Any]) -> Any:
@@ -41,33 +40,32 @@ def _replaced(owner: Any, tree: Mapping[str, Any], path: str) -> Any:
     if isinstance(owner, ScipyMarginal):
         changes = {name: leaf.value for name, leaf in tree.items() if isinstance(leaf, _Leaf)}
         return {"type": owner.type, **dict(owner.parameters), **changes}
-    if not dataclasses.is_dataclass(owner):
+    if isinstance(owner, Mapping):
+        return {**owner} | {
+            name: branch.value
+            if isinstance(branch, _Leaf)
+            else _replaced(owner.get(name, {}), branch, f"{path}.{name}")
+            for name, branch in tree.items()
+        }
+    if not dataclasses.is_dataclass(owner) or isinstance(owner, type):
         raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
-    names = [field.name for field in dataclasses.fields(owner) if field.init]
+    names = keys_of(type(owner))
     unknown = [unknown_name(path or "sweep", name, names) for name in tree if name not in names]
     if unknown:
         raise InputError(unknown)
     changes = {}
     for name, branch in tree.items():
         inner = f"{path}.{name}" if path else name
+        field = names[name]
         if isinstance(branch, _Leaf):
-            changes[name] = branch.value
-        elif name == CORRELATION and isinstance(owner, RandomInterface):
-            changes[name] = _joined(owner.correlation or {}, branch)
+            changes[field] = branch.value
         else:
-            changes[name] = _replaced(getattr(owner, name), branch, inner)
+            part = getattr(owner, field)
+            part = {} if part is None and name in MAPPINGS else part
+            changes[field] = _replaced(part, branch, inner)
     try:
         return dataclasses.replace(owner, **changes)
     except InputError as error:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
         raise InputError([f"{path}.{text}" if path else text for text in texts]) from None
-
-
-def _joined(owner: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
-    """A nested mapping with the leaves of the tree put into it."""
-    result = dict(owner)
-    for name, branch in tree.items():
-        leaf = isinstance(branch, _Leaf)
-        result[name] = branch.value if leaf else _joined(result.get(name, {}), branch)
-    return result

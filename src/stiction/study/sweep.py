@@ -17,9 +17,8 @@ import pydantic
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction.ensemble.dataset import GridAxis
-from stiction.ensemble.dotted_keys import CORRELATION
 from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import _models_in, describe, is_whole, to_plain
+from stiction.model import _models_in, describe, is_whole, keys_of, to_plain
 from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
 
@@ -260,13 +259,15 @@ def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:
     for key in (key for axis in axes for key in axis.keys):
         classes, done = [cls], ""
         for step in key.split("."):
-            found = [f.name for c in classes for f in dataclasses.fields(c) if f.init]
+            found = [key for c in classes for key in keys_of(c)]
             names = list(dict.fromkeys(found))
             if classes and step not in names:
                 texts.append(unknown_name(f"sweep: {done or 'the study'}", step, names))
                 break
-            owners = [c for c in classes if step in {f.name for f in dataclasses.fields(c)}]
-            hints = [typing.get_type_hints(c, include_extras=True)[step] for c in owners]
+            owners = [c for c in classes if step in keys_of(c)]
+            hints = [
+                typing.get_type_hints(c, include_extras=True)[keys_of(c)[step]] for c in owners
+            ]
             classes = [inner for hint in hints for inner in _models_in(hint)]
             done = f"{done}.{step}" if done else step
     return texts
@@ -283,7 +284,7 @@ def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
         for i, key in enumerate(axis.keys):
             values = _coordinate([step[i] for step in axis.steps])
             parts = key.split(".")
-            unit = "1" if CORRELATION in parts else _UNITS.get(parts[-1], "1")
+            unit = "1" if "correlation" in parts else _UNITS.get(parts[-1], "1")
             unit = unit if values.dtype.kind in "if" else "1"
             coordinates[names[key]] = (values, Variable(unit, key, (dim,)))
         result.append(GridAxis(dim, len(axis.steps), coordinates))
@@ -294,7 +295,7 @@ def _short_names(keys: Sequence[str], taken: Sequence[str]) -> dict[str, str]:
     names: dict[str, str] = {}
     for key in keys:
         parts = key.split(".")
-        fewest = parts[::-1].index(CORRELATION) + 1 if CORRELATION in parts else 1
+        fewest = parts[::-1].index("correlation") + 1 if "correlation" in parts else 1
         for count in range(fewest, len(parts) + 1):
             name = "_".join(parts[-count:])
             alike = [other for other in keys if other.split(".")[-count:] == parts[-count:]]

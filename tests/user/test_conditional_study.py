@@ -1,0 +1,95 @@
+"""A field that was measured in part and factors between specimens, in study files and tails."""
+
+import numpy as np
+import pytest
+from small_study import small_study
+
+import stiction as st
+
+SWEEP = [{"random.strength.given.noise": [5e3, 20e3]}, {"random.between.strength.cv": [0.05, 0.2]}]
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """The plain form of a study whose strength was scanned over a third, and has a factor."""
+    monkeypatch.chdir(tmp_path)
+    plain = small_study()
+    own = st.Study.from_dict(plain)
+    x = own.problem.interface.x[:40]
+    scan = own.random.strength.sample(own.problem.interface, seed=9)[0, :40]
+    header = "x (mm),strength (MPa)"
+    table = np.column_stack([x * 1e3, scan * 1e-6])
+    np.savetxt("scan.csv", table, delimiter=",", header=header, comments="")
+    plain["random"]["strength"]["given"] = {"profile": "scan.csv", "noise": 20e3}
+    plain["random"]["between"] = {"strength": {"type": "lognormal", "mean": 1.0, "cv": 0.1}}
+    return plain
+
+
+def test_a_study_file_is_the_same_as_the_calls(study):
+    read = st.Study.from_dict(study, folder=".")
+    result = read.run(progress=False)
+    field = st.Study.from_dict(small_study()).random.strength
+    given = field.given(st.read_profile("scan.csv"), noise=20e3)
+    random = st.RandomInterface(
+        strength=given, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
+    )
+    called = st.monte_carlo(
+        read.problem, random, method=read.method, samples=30, seed=3, progress=False
+    )
+    assert np.array_equal(result.critical_stress, called.critical_stress)
+    assert st.Study.from_result(result) == read
+    read.run(out="RUN", progress=False)
+    assert st.open_run("RUN").study == read
+
+
+def test_noise_and_scatter_can_be_swept(study):
+    found = st.Study.from_dict(study | {"sweep": SWEEP}, folder=".").run(progress=False)
+    assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 30}
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda r: r["strength"]["given"].update(noise=-1.0), "given.noise: must be greater than"),
+        (lambda r: r["strength"]["given"].pop("profile"), "random.strength.given.profile: missing"),
+        (lambda r: r["strength"]["given"].update(nois=1.0), "did you mean 'noise'"),
+        (lambda r: r["strength"]["given"].update(profile="scam.csv"), "scam.csv: cannot be read"),
+        (lambda r: r["between"].update(strenght={"type": "lognormal", "mean": 1.0, "cv": 0.1}),
+         "between: 'strenght' is not random here"),
+        (lambda r: r["between"]["strength"].update(mean=1.2), "must be positive with mean 1"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named(study, change, text):
+    change(study["random"])
+    with pytest.raises(st.InputError, match=text):
+        st.Study.from_dict(study, folder=".")
+
+
+def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(study):
+    own = st.Study.from_dict(small_study())
+    field, line = own.random.strength, own.problem.interface
+    known = st.read_profile("scan.csv")
+    with pytest.raises(st.InputError, match="lies outside the marginal"):
+        field.given(3.0 * known, noise=1e3).sample(line)
+    with pytest.raises(st.InputError, match="the interface is 0.1 m long"):
+        field.given(known.assign_coords(x=known.x + 0.09), noise=1e3).sample(line)
+    rough = known.copy(data=known.values[np.random.default_rng(0).permutation(known.size)])
+    with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
+        field.given(rough, noise=1e3).sample(line)
+    for ask in (st.theory.nucleation_statistics, st.theory.rice_distribution):
+        with pytest.raises(st.InputError, match="was measured in places"):
+            ask(own.problem, field.given(known, noise=20e3))
+
+
+def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
+    """Failure probability against counting ten times as many samples."""
+    read = st.Study.from_dict(study, folder=".")
+    counted = st.monte_carlo(
+        read.problem, read.random, method=read.method, samples=20_000, seed=8, pilot=False
+    ).critical_stress
+    stress = float(counted.quantile(0.01))
+    found = st.failure_probability(
+        read.problem, read.random, stress, method=read.method, algorithm="subset", target_cv=0.1
+    )
+    error = np.hypot(0.07, found.cv)  # of 200 failures, and of the answer
+    assert abs(np.log(found.probability / 0.01)) < 3.5 * error
