@@ -5,79 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.estimate import Estimate, Setting, estimate, simulate
-from stiction.inference.spectrum_fit import ANISOTROPIES, EXPONENTS
+from stiction.inference.spectrum_fit import RANGES as SEARCHED
 from stiction.progress import Meter
 
 PLACES = ("mean", "marginal.mean", "marginal.loc")
 """Parameters that say where something is; all others live on a logarithm."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """On which side of the mean a bound lies; what lives on a logarithm is its distance from there."""
-
-RANGES = {"spectrum.exponent": EXPONENTS, "anisotropy": ANISOTROPIES}
+RANGES = {"spectrum.exponent": SEARCHED["exponent"], "anisotropy": SEARCHED["anisotropy"]}
 """Between which ends parameters are looked for, and intervals cut off."""
 SAME = 1e-3
 """As a share of an end of a range: how near to it an interval that tells nothing lies."""
 
 
-def parameters_of(found: Estimate, setting: Setting) -> dict[str, float]:
-    """Everything that was estimated, and what follows from it, by name."""
-    marginal, spectrum = found.marginal, found.model.spectrum
-    lags = spectrum.correlation_length * LAGS
-    correlation = spectrum.untruncated_correlation(lags)
-    values = {
-        "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
-        "mean": float(marginal.distribution.mean()),
-        "standard_deviation": float(marginal.distribution.std()),
-    }
-    own = setting.marginal.parameters(marginal)
-    values |= {f"marginal.{name}": value for name, value in own.items()}
-    estimated = {
-        "correlation_length": ("spectrum.correlation_length", spectrum.correlation_length),
-        "exponent": ("spectrum.exponent", getattr(spectrum, "exponent", 0.0)),
-        "anisotropy": ("anisotropy", found.model.anisotropy),
-        "noise_share": ("noise", found.model.noise),
-    }
-    free = setting.spectrum.free
-    return values | dict(pair for name, pair in estimated.items() if name in free)
-
-
-LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
-"""In correlation lengths; every spectrum has its 1/e there."""
-
-
-@dataclass(frozen=True, eq=False)
-class Repetition:
-    """A fit to simulated records.
-
-    Attributes
-    ----------
-    estimate : Estimate
-    parameters : dict of str to float
-    """
-
-    estimate: Estimate
-    parameters: dict[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Repetitions:
-    """Fits to records simulated from one field, and that field.
-
-    Attributes
-    ----------
-    truth : Estimate
-    fits : list of Repetition
-    """
+class Repetitions(NamedTuple):
+    """A field, and fits to records simulated from it."""
 
     truth: Estimate
-    fits: list[Repetition]
+    fits: list[Estimate]
 
 
 def repeat(
@@ -88,54 +41,40 @@ def repeat(
     Repetition b depends on (seed, b) only.
     """
 
-    def one(number: int) -> Repetition | None:
+    def one(number: int) -> Estimate | None:
         rng = np.random.default_rng([seed, number])
         try:
             again = estimate(simulate(found, setting, rng), setting, found)
-            result = Repetition(again, parameters_of(again, setting))
         except InputError:  # no member of the family fits: counted by its absence
             return None
         meter.advance()
-        return result
+        return again
 
     with ThreadPoolExecutor(workers) as pool:
         results = list(pool.map(one, range(count)))
     return Repetitions(found, [result for result in results if result is not None])
 
 
-def at_ends(
-    around: Repetitions, setting: Setting, confidence: float
-) -> tuple[Estimate, Estimate] | None:
-    """The field with its correlation length at either end of a first interval; None if it is known.
+def at_ends(around: Repetitions, setting: Setting, confidence: float) -> list[Estimate]:
+    """The field with its correlation length at either end of a first interval.
 
     Records of short correlation lengths hold more of them, and errors are smaller and more alike.
     An estimate that is too short by chance therefore promises too much.
     """
-    name, family = "correlation_length", setting.spectrum
-    if name not in family.free:
-        return None
-    found = around.truth
-    estimated = parameters_of(found, setting)
-    full = f"spectrum.{name}"
-    errors = _errors(full, around, setting)
-    at, width = _scaled(full, estimated), _width(full, estimated)
-    first = _ends(at, width, errors, errors, confidence)
-    place = family.free.index(name)
-
-    def moved(end: float) -> Estimate:
+    found, family = around.truth, setting.spectrum
+    place = family.free.index("correlation_length")
+    moved = []
+    for end in _ends("spectrum.correlation_length", found, around, around, confidence):
         vector = family.vector(found.model)
         vector[place] = np.clip(end, *family.limits[place])
-        return replace(found, model=family.model(vector, found.model.shares))
-
-    return moved(first[0]), moved(first[1])
+        model = family.model(vector, found.model.shares)
+        parameters = setting.parameters_of(found.marginal, model)
+        moved.append(replace(found, model=model, parameters=parameters))
+    return moved
 
 
 def intervals(
-    around: Repetitions,
-    ends: tuple[Repetitions, Repetitions] | None,
-    setting: Setting,
-    confidence: float,
-    values: Array,
+    repeated: Sequence[Repetitions], setting: Setting, confidence: float, values: Array
 ) -> dict[str, tuple[float, float]]:
     """Studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
@@ -153,50 +92,42 @@ def intervals(
 
     Parameters
     ----------
-    around : Repetitions
-        From the estimate.
-    ends : (Repetitions, Repetitions), optional
-        From a field of shorter and one of longer correlation, see `at_ends`.
+    repeated : sequence of Repetitions
+        From the estimate; then from fields of shorter and of longer correlation, see `at_ends`.
     setting : Setting
     confidence : float
     values : (points,)
         What was fitted, of all records.
     """
-    found = around.truth
-    estimated = parameters_of(found, setting)
+    around, *ends = repeated
+    found, estimated = around.truth, around.truth.parameters
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
-        if name == "noise":
-            at, width = found.noise
-            errors = _noise_errors(around)
-            low, high = _ends(at, width, errors, errors, confidence)
-            result[name] = (math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0)))
-            continue
-        shorter, longer = ends or (around, around)
+        shorter, longer = ends if ends and name != "noise" else (around, around)
         own = [_scaled(name, one.parameters) for one in around.fits]
-        if np.dot(np.array(own) - np.mean(own), np.array(lengths) - np.mean(lengths)) < 0.0:
+        if np.cov(own, lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
-        at, width = _scaled(name, estimated), _width(name, estimated)
-        both = _errors(name, shorter, setting), _errors(name, longer, setting)
-        low, high = _ends(at, width, *both, confidence)
-        low, high = sorted(_unscaled(name, end, estimated) for end in (low, high))
+        both = _ends(name, found, shorter, longer, confidence)
+        if name == "noise":
+            low, high = (math.sqrt(max(end, 0.0)) for end in both)
+        else:
+            low, high = sorted(_unscaled(name, end, estimated) for end in both)
         result[name] = (low, high)
     noise = result["noise"][1] if "noise" in result else found.model.noise
-    for name, limits in _limits(estimated, found, setting.marginal.quiet(values, noise)).items():
+    for name, limits in _limits(found, setting.marginal.quiet(values, noise)).items():
         result[name] = _cut(result[name], limits, estimated[name])
     return result
 
 
-def _limits(
-    estimated: Mapping[str, float], found: Estimate, quiet: Array
-) -> dict[str, tuple[float, float]]:
+def _limits(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
     """Between which ends parameters can lie, of those for which there is such a thing.
 
     Values lie inside the bounds of their marginal; `quiet` are the values as they would be without
     the greatest noise that they may carry. Errors of bounds, which have a long tail where the
     values hardly show them, do not know of that, nor those of an exponent of its range.
     """
+    estimated = found.parameters
     bottom, top = (float(end) for end in found.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
     below, above = (-math.inf, least), (most, math.inf)
@@ -218,49 +149,42 @@ def _cut(
     """
     low, high = (min(max(end, limits[0]), limits[1]) for end in interval)
     near = SAME if np.isfinite(limits).all() else 0.0
-    if any(math.isclose(low, end, rel_tol=near) and math.isclose(high, end, rel_tol=near)
-           for end in limits):  # fmt: skip
-        low, high = (end if math.isfinite(end) else at for end in limits)
+    for end in limits:
+        if math.isclose(low, end, rel_tol=near) and math.isclose(high, end, rel_tol=near):
+            low, high = (end if math.isfinite(end) else at for end in limits)
     return low, high
 
 
-def _errors(name: str, repeated: Repetitions, setting: Setting) -> list[float]:
-    """Of a parameter on its own scale, in units of their widths."""
-    truth = _scaled(name, parameters_of(repeated.truth, setting))
-    return [
-        (_scaled(name, one.parameters) - truth) / _width(name, one.parameters)
-        for one in repeated.fits
-    ]
-
-
-def _noise_errors(repeated: Repetitions) -> list[float]:
-    """Errors of the variance of the noise in units of their standard errors."""
-    truth = repeated.truth.model.noise**2
-    return [(at - truth) / error for at, error in (one.estimate.noise for one in repeated.fits)]
-
-
 def _ends(
-    at: float,
-    width: float,
-    shorter: Sequence[float],
-    longer: Sequence[float],
-    confidence: float,
+    name: str, found: Estimate, shorter: Repetitions, longer: Repetitions, confidence: float
 ) -> tuple[float, float]:
-    """An estimate less the quantiles of its error, which is in units of its width.
+    """An estimate, on its own scale, less the quantiles of its error in units of its width.
 
     Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default, it
     lies further inside.
     """
+    at, width = _found(name, found)
     tail = 0.5 * (1.0 - confidence)
-    highest = float(np.quantile(shorter, 1.0 - tail, method="weibull"))
-    lowest = float(np.quantile(longer, tail, method="weibull"))
-    return at - width * highest, at - width * lowest
+    highest = np.quantile(_errors(name, shorter), 1.0 - tail, method="weibull")
+    lowest = np.quantile(_errors(name, longer), tail, method="weibull")
+    return at - width * float(highest), at - width * float(lowest)
 
 
-def _width(name: str, values: Mapping[str, float]) -> float:
-    """What the error of a parameter, on its own scale, is proportional to."""
-    root = math.sqrt(values["efolding_length"])
-    return root * values["standard_deviation"] if name in PLACES else root
+def _errors(name: str, repeated: Repetitions) -> list[float]:
+    """Errors of a parameter on its own scale, in units of their widths."""
+    model = repeated.truth.model
+    truth = model.noise**2 if name == "noise" else _found(name, repeated.truth)[0]
+    return [(at - truth) / width for at, width in (_found(name, one) for one in repeated.fits)]
+
+
+def _found(name: str, one: Estimate) -> tuple[float, float]:
+    """An estimate on its own scale, and what its error is proportional to."""
+    if name == "noise":  # its variance, which may be negative, and its own error
+        return one.noise
+    width = math.sqrt(one.parameters["efolding_length"])
+    if name in PLACES:
+        width *= one.parameters["standard_deviation"]
+    return _scaled(name, one.parameters), width
 
 
 def _scaled(name: str, values: Mapping[str, float]) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.inference.marginal_fit import Family, distance
-from stiction.inference.records import Record
 from stiction.inference.spectral_model import Grid
 from stiction.inference.spectrum_fit import (
     SpectrumFamily,
@@ -20,42 +19,45 @@ from stiction.inference.spectrum_fit import (
     noise_variance,
 )
 from stiction.inference.whittle import Model, Observed, hermite_shares, make_observed
-from stiction.inference.window import Window, make_window, without_trend
+from stiction.inference.window import Window
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
+LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
+"""In correlation lengths; every spectrum has its 1/e there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What is fitted to what.
-
-    Attributes
-    ----------
-    windows : tuple of Window
-        One a record; records of one geometry share one.
-    marginal : Family
-    spectrum : SpectrumFamily
-    degree : int
-        Of the trend that is removed.
-    """
+    """What is fitted to what: families, and a window for each record (equal ones are shared)."""
 
     windows: tuple[Window, ...]
     marginal: Family
     spectrum: SpectrumFamily
-    degree: int
 
-
-def make_windows(records: Sequence[Record], degree: int) -> tuple[Window, ...]:
-    """A window for each record."""
-    made: dict[Any, Window] = {}
-    for record in records:
-        if record.geometry not in made:
-            shape = record.values.shape
-            made[record.geometry] = make_window(shape, record.spacings, record.measured, degree)
-    return tuple(made[record.geometry] for record in records)
+    def parameters_of(self, marginal: Any, model: Model) -> dict[str, float]:
+        """Everything that is estimated, and what follows from it, by name."""
+        spectrum = model.spectrum
+        lags = spectrum.correlation_length * LAGS
+        correlation = spectrum.untruncated_correlation(lags)
+        values = {
+            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
+            "mean": float(marginal.distribution.mean()),
+            "standard_deviation": float(marginal.distribution.std()),
+        }
+        own = self.marginal.parameters(marginal)
+        values |= {f"marginal.{name}": value for name, value in own.items()}
+        free = self.spectrum.free
+        for name in ("correlation_length", "exponent"):
+            if name in free:
+                values[f"spectrum.{name}"] = getattr(spectrum, name)
+        if "anisotropy" in free:
+            values["anisotropy"] = model.anisotropy
+        if "noise_share" in free:
+            values["noise"] = model.noise
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,8 @@ class Estimate:
     ----------
     marginal : marginal
     model : Model
+    parameters : dict of str to float
+        See `Setting.parameters_of`.
     distance : float
         Kolmogorov's, between the values and the marginal.
     roughness : float
@@ -78,6 +82,7 @@ class Estimate:
 
     marginal: Any
     model: Model
+    parameters: dict[str, float]
     distance: float
     roughness: float
     noise: tuple[float, float] = (0.0, 0.0)
@@ -91,40 +96,26 @@ class Estimate:
         )
 
 
-def detrended(values: Array, window: Window, degree: int) -> Array:
-    """Measured values (points,) without their trend but with their mean."""
-    if degree == 0:
-        return values
-    result: Array = without_trend(values, window.basis) + values.mean()
-    return result
-
-
 def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
-    """Periodograms of measured values, by geometry."""
-    found: list[Observed] = []
-    for window in dict.fromkeys(windows):
-        powers = [
-            window.periodogram(row) for row, w in zip(rows, windows, strict=True) if w is window
-        ]
-        found.append(make_observed(window, np.stack(powers)))
-    return found
+    """Periodograms of measured values (points,), by geometry."""
+    powers: dict[Window, list[Array]] = {}
+    for row, window in zip(rows, windows, strict=True):
+        powers.setdefault(window, []).append(window.periodogram(row))
+    return [make_observed(window, np.stack(own)) for window, own in powers.items()]
 
 
 def estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None = None) -> Estimate:
-    """Fit measured values (points,) of each record; from a start if there is one.
+    """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
     The marginal of noisy values is too wide. So the noise is found first, with the marginal of the
     values as they are; then both are fitted again, the marginal to values less that noise.
     """
     family = setting.spectrum
-    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
     values = np.concatenate(rows)
     observed = observe(rows, setting.windows)
-    vector = None if start is None else family.vector(start.model)
-    marginal = None if start is None else start.marginal
-    noise = 0.0 if start is None else start.model.noise
-    if start is None and family.noise is not None:
-        noise = family.noise
+    vector, marginal, noise = None, None, family.noise or 0.0
+    if start is not None:
+        vector, marginal, noise = family.vector(start.model), start.marginal, start.model.noise
     signed = (0.0, 0.0)
     for _ in range(2):
         marginal = setting.marginal.fit(values, noise, marginal)
@@ -144,6 +135,7 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None = N
     return Estimate(
         marginal=marginal,
         model=model,
+        parameters=setting.parameters_of(marginal, model),
         distance=distance(marginal, setting.marginal.quiet(values, model.noise)),
         roughness=_roughness(model, observed),
         noise=signed,
@@ -151,37 +143,23 @@ def estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None = N
 
 
 def _roughness(model: Model, observed: Sequence[Observed]) -> float:
-    total, count = 0.0, 0
-    for one in observed:
-        for _, measured, predicted, _ in bands(one, model.expectation(one)):
-            total += math.log((measured + one.floor) / (predicted + one.floor)) ** 2
-            count += 1
-    return total / max(count, 1)
-
-
-def bands(
-    one: Observed, expected: Array, per_octave: int = 3
-) -> list[tuple[float, float, float, int]]:
-    """Periodogram and its expectation averaged over bands of wavenumbers.
-
-    Returns
-    -------
-    list of (wavenumber (rad/m), periodogram, expectation, ordinates)
-    """
-    vectors = one.window.wave_vectors
-    k = np.broadcast_to(np.sqrt(sum(v**2 for v in vectors)), one.weights.shape)
-    kept = one.weights > 0.0
-    k, measured, predicted = k[kept], one.average[kept], expected[kept]
-    band = np.round(per_octave * np.log2(k / k.min())).astype(np.int64)
-    return [
-        (
-            float(k[at].mean()),
-            float(measured[at].mean()),
-            float(predicted[at].mean()),
-            int(at.sum()),
-        )
-        for at in (band == b for b in np.unique(band))
+    ratios = [
+        math.log((measured + one.floor) / (predicted + one.floor))
+        for one in observed
+        for _, measured, predicted in bands(one, model.expectation(one))
     ]
+    return float(np.mean(np.square(ratios)))
+
+
+def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
+    """Wavenumber (rad/m), periodogram and expectation averaged over bands, (bands, 3)."""
+    k = np.broadcast_to(np.sqrt(sum(v**2 for v in one.window.wave_vectors)), one.weights.shape)
+    kept = one.weights > 0.0
+    k = k[kept]
+    band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
+    sums = [np.bincount(band, weights=w) for w in (k, one.average[kept], expected[kept])]
+    means: Array = np.transpose(sums) / np.bincount(band)[:, None]
+    return means
 
 
 def simulate(found: Estimate, setting: Setting, rng: np.random.Generator) -> list[Array]:
@@ -193,7 +171,6 @@ def simulate(found: Estimate, setting: Setting, rng: np.random.Generator) -> lis
         if window not in power:
             power[window] = found.model.power(grid)
         z = grid.sample(power[window], rng)[window.measured]
-        rows.append(
-            from_normal(found.marginal, z) + found.model.noise * rng.standard_normal(z.size)
-        )
+        values = from_normal(found.marginal, z) + found.model.noise * rng.standard_normal(z.size)
+        rows.append(window.without_trend(values))
     return rows

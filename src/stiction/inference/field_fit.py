@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from stiction.arrays import Array
 from stiction.inference.bootstrap import RANGES
 from stiction.inference.estimate import Estimate, Setting
-from stiction.inference.records import Record
 from stiction.inference.whittle import Observed
 from stiction.profiles import UNITS
 from stiction.random.random_field import RandomField
 
+AT_END = (
+    "{name} {value:.3g} lies at the end of the range that is searched, {limit:.3g}: the data do not"
+    " determine it; give it"
+)
 DOUBTS = {
     "lengths_held": "the records hold {value:.2g} correlation lengths, too few for intervals to be"
     " trusted: at least {limit:g} are needed; measure a longer piece, or several",
     "noise": "the noise ({value:.3g}) hides the cut-off of the spectrum, where the field has"
-    " {limit:.3g} left at wavenumbers at which its density has fallen to a quarter: the"
-    " correlation length rests on the family of the spectrum, not on the data",
-    "correlation_length": "the correlation length {value:.3g} m lies at the end of the range that"
-    " is searched, {limit:.3g} m: the data do not determine it; give it with spectrum={{...}}",
-    "exponent": "the exponent {value:.3g} lies at the end of the range that is searched,"
-    " {limit:.3g}: the data do not determine it; give it with spectrum={{...}}, or another"
-    " spectrum",
-    "anisotropy": "the anisotropy {value:.3g} lies at the end of the range that is searched,"
-    " {limit:.3g}: the data do not determine it; give it",
+    " {limit:.3g} left: the correlation length rests on the family, not on the data",
     "marginal": "the p-value of the marginal is {value:.2g}, below {limit:g}: the values are far"
-    " from its family; compare families (marginal=['beta', 'lognormal', ...]) or look at"
-    " st.plot.fit",
+    " from its family; compare families, or look at st.plot.fit",
     "spectrum": "the p-value of the spectrum is {value:.2g}, below {limit:g}: the periodogram is"
     " far from its family; take another spectrum or a higher detrend, or look at st.plot.fit",
     "repetitions": "intervals are from {value:g} of {limit:g} repetitions: the family could not be"
@@ -39,8 +32,7 @@ DOUBTS = {
 }
 
 
-@dataclass(frozen=True)
-class Doubt:
+class Doubt(NamedTuple):
     """What stands in the way of trusting a fit: a quantity beyond its limit."""
 
     name: str
@@ -48,11 +40,10 @@ class Doubt:
     limit: float
 
     def __str__(self) -> str:
-        return DOUBTS[self.name].format(value=self.value, limit=self.limit)
+        return DOUBTS.get(self.name, AT_END).format(**self._asdict())
 
 
-@dataclass(frozen=True)
-class Goodness:
+class Goodness(NamedTuple):
     """How well a family describes the values at a point.
 
     Attributes
@@ -63,7 +54,8 @@ class Goodness:
         Largest difference of the distribution functions (Kolmogorov).
     score : float
         Log likelihood of as many independent values as the record holds correlation lengths, less
-        the number of parameters; differences below about 2 mean nothing.
+        the number of parameters, and less that of the best family; differences below about 2 mean
+        nothing.
     """
 
     marginal: Any
@@ -108,14 +100,14 @@ class FieldFit:
     parameters: Mapping[str, float]
     interval: Mapping[str, tuple[float, float]]
     confidence: float
-    repetitions: tuple[RandomField, ...] = dataclasses.field(repr=False)
-    families: Mapping[str, Goodness] = dataclasses.field(repr=False)
-    p_values: Mapping[str, float] = dataclasses.field(repr=False)
-    lengths_held: float = dataclasses.field(repr=False)
-    missing: tuple[int, int] = dataclasses.field(repr=False)
-    quantity: str = dataclasses.field(repr=False)
-    _details: Details = dataclasses.field(repr=False)
-    doubts: tuple[Doubt, ...] = ()
+    repetitions: tuple[RandomField, ...]
+    families: Mapping[str, Goodness]
+    p_values: Mapping[str, float]
+    lengths_held: float
+    missing: tuple[int, int]
+    quantity: str
+    doubts: tuple[Doubt, ...]
+    _details: Details
 
     def __str__(self) -> str:
         width = max(map(len, self.parameters))
@@ -143,16 +135,13 @@ class FieldFit:
         )
         return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
 
-    def __repr__(self) -> str:
-        return str(self)
+    __repr__ = __str__
 
 
-@dataclass(frozen=True, eq=False)
-class Details:
+class Details(NamedTuple):
     """What the figure needs of a fit."""
 
     values: Array
-    records: tuple[Record, ...]
     estimate: Estimate
     setting: Setting
     observed: tuple[Observed, ...]

@@ -13,20 +13,14 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, unknown_name, warn_accuracy
-from stiction.inference.bootstrap import Repetitions, at_ends, intervals, parameters_of, repeat
-from stiction.inference.estimate import (
-    Estimate,
-    Setting,
-    detrended,
-    estimate,
-    make_windows,
-    observe,
-)
+from stiction.inference.bootstrap import Repetitions, at_ends, intervals, repeat
+from stiction.inference.estimate import Estimate, Setting, estimate, observe
 from stiction.inference.field_fit import Details, Doubt, FieldFit, Goodness
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
-from stiction.inference.spectrum_fit import SpectrumFamily, back, spectrum_family
+from stiction.inference.spectrum_fit import back, spectrum_family
 from stiction.inference.whittle import Observed
+from stiction.inference.window import Window, make_window
 from stiction.interface import Interface
 from stiction.model import Progress, Real, at_least, checked, is_finite
 from stiction.profiles import UNITS
@@ -77,20 +71,20 @@ def fit_field(
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile` returns; units
-        that are stated are converted, points may come in any order, and must be equally spaced.
-        Missing values (NaN, missing points, values that were filled in) are left out.
-        Plain arrays, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx,
-        ny), in SI, have a value at each node of `interface`. Several profiles are of one field.
+        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile` returns, with
+        equally spaced points. Missing values (NaN, missing points, values that were filled in) are
+        left out. Plain arrays, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or
+        (samples, nx, ny), in SI, have a value at each node of `interface`. Several profiles, also
+        of different length, are of one field.
     interface : Interface, optional
-        Needed for arrays without coordinates. The fitted field is looked at on it: a warning says
-        if it is too short, or its nodes too coarse, for that field.
+        Needed for arrays without coordinates. A warning says if it is too short, or its nodes too
+        coarse, for the fitted field.
     marginal : str, dict or sequence of str
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal', 'uniform' or
-        any continuous distribution of `scipy.stats`. Of several the best is taken, and `families`
-        in the result compares them. A table keeps parameters: ``{"type": "beta", "low": 0,
-        "high": 2e6}``. The lower bound of those above a bound is 0 if it is not given; it is never
-        estimated. Both bounds of 'beta' are, unless they are given.
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal' or any
+        continuous distribution of `scipy.stats`. Of several the best is taken, and `families` in
+        the result compares them. A table keeps parameters: ``{"type": "beta", "low": 0,
+        "high": 2e6}``. Both bounds of 'beta' are estimated unless they are given; the lower bound
+        of the others is 0 unless it is given.
     spectrum : str or dict
         'power_law', 'squared_exponential' or 'exponential'; a table keeps parameters, such as
         ``{"type": "power_law", "exponent": 4.0}`` or ``"power_kept": 0.999``.
@@ -138,22 +132,16 @@ def fit_field(
     -----
     The marginal is found by maximum likelihood, of values and noise together. The spectrum comes
     from a Whittle likelihood whose expectation is exact for the window: taper, gaps, the removal of
-    the trend and aliasing are in it, as is a truncation of the spectrum that is given; otherwise it
-    is whole (Sykulski et al., 2019;
-    Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian field z by
-    Hermite expansion (Grigoriu, 1995). A likelihood's own curvature understates the error; the
-    intervals come from fits to records simulated from the fitted field, reflected about the
-    estimate on the scale on which a parameter's error is about normal and measured in units of the
-    error that a record of its correlation length has (the studentised bootstrap; Davison and
-    Hinkley, 1997, section 5.2), so that a bias of the estimate is allowed for. Upper and lower ends
-    come from fields that belong there, of longer and shorter correlation (one step of a test
-    inversion; Carpenter, 1999), which matters for short records. That of the noise is
-    of its variance, by estimates that may be negative, and is cut off at zero last; those of a
-    marginal's bounds are of the logarithm of their distance from the mean. Likewise cut
-    off are those of a marginal's bounds where values lie beyond (drawn together by the greatest
-    noise of its interval), and those of an exponent and of an anisotropy at the ends of the ranges
-    that are searched, 0.65 to 16 and 0.05 to 20, which is said where they reach one; of a parameter
-    that the data do not tell the interval is all of its range.
+    the trend and aliasing are in it, as is a truncation of the spectrum if one is given (Sykulski
+    et al., 2019; Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian
+    field z by Hermite expansion (Grigoriu, 1995).
+
+    A likelihood's own curvature understates the error. The intervals come from a studentised
+    bootstrap (Davison and Hinkley, 1997, section 5.2), and their upper and lower ends from fields
+    of longer and shorter correlation (Carpenter, 1999), which matters for short records. An
+    interval of the noise may begin at zero, one of a bound of the marginal ends outside the values,
+    and those of an exponent and of an anisotropy end at the ranges that are searched, 0.65 to 16
+    and 0.05 to 20.
 
     Examples
     --------
@@ -170,151 +158,65 @@ def fit_field(
     if quantity not in UNITS:
         raise InputError(unknown_name("quantity", quantity, UNITS))
     records = records_of(profiles, interface, quantity)
-    if spectral.anisotropy != 1.0 and records[0].values.ndim == 1:
+    if anisotropy is not False and records[0].values.ndim == 1:
         raise InputError("anisotropy: is of maps; the profiles are lines, leave it out")
     spacing = max(max(record.spacings) for record in records)
-    longest = max(max(record.lengths) for record in records)
-    spectral = replace(spectral, lengths=(spacing, 2.0 * longest))
-    windows = make_windows(records, detrend)
-    rows = [record.values[record.measured] for record in records]
-    count = usable_cores() if workers is None else workers
-    times = 3 if "correlation_length" in spectral.free else 1
-    with Meter("fit_field", times * bootstrap, progress) as meter:
-        found, setting, compared = _best(families, spectral, rows, windows, detrend)
-        options = (setting, bootstrap, seed, count, meter)
-        repeated = [repeat(found, *options)]
-        fields = None
-        if times == 3 and len(repeated[0].fits) >= FEWEST:
-            fields = at_ends(repeated[0], setting, confidence)
-        if fields:
-            repeated += [repeat(field, *options) for field in fields]
-    done = [len(one.fits) for one in repeated]
-    if min(done) < FEWEST:
+    longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
+    spectral = replace(spectral, lengths=(spacing, 2.0 * float(longest)))
+    windows = _windows(records, detrend)
+    rows = [
+        window.without_trend(record.values[record.measured])
+        for window, record in zip(windows, records, strict=True)
+    ]
+    options = (bootstrap, seed, usable_cores() if workers is None else workers)
+    fields = 3 if "correlation_length" in spectral.free else 1
+    with Meter("fit_field", fields * bootstrap, progress) as meter:
+        settings = [Setting(windows, family, spectral) for family in families]
+        found, setting, compared = _best(settings, rows)
+        repeated = [repeat(found, setting, *options, meter)]
+        if fields == 3 and len(repeated[0].fits) >= FEWEST:
+            for field in at_ends(repeated[0], setting, confidence):
+                repeated.append(repeat(field, setting, *options, meter))
+    done, asked = sum(len(one.fits) for one in repeated), fields * bootstrap
+    if min(len(one.fits) for one in repeated) < FEWEST:
         raise InputError(
-            f"marginal: {setting.marginal.name!r} could be fitted to only {sum(done)} of"
-            f" {times * bootstrap} repetitions; take another marginal"
+            f"marginal: {setting.marginal.name!r} could be fitted to only {done} of {asked}"
+            " repetitions; take another marginal"
         )
-    values = np.concatenate(
-        [detrended(r, w, setting.degree) for r, w in zip(rows, windows, strict=True)]
-    )
-    return _result(
-        setting, compared, repeated, records, values, rows, interface, confidence, quantity,
-        times * bootstrap,
-    )  # fmt: skip
-
-
-def _families(
-    marginal: Any, spectrum: Any, anisotropy: Any, noise: Any
-) -> tuple[list[Family], SpectrumFamily]:
-    """The families to fit, or everything that is wrong with them."""
-    problems: list[str] = []
-
-    def collect(function: Any, *given: Any) -> Any:
-        try:
-            return function(*given)
-        except InputError as error:
-            problems.extend(error.problems)
-            return None
-
-    several = isinstance(marginal, list | tuple)
-    families = [collect(family_of, one) for one in (marginal if several else [marginal])]
-    if not families:
-        problems.append("marginal: names no family")
-    ratio = None if anisotropy is True else 1.0 if anisotropy is False else anisotropy
-    deviation = None if noise is True else 0.0 if noise is False else noise
-    spectral = collect(spectrum_family, spectrum, ratio, deviation, (0.0, 0.0))
-    if problems:
-        raise InputError(problems)
-    return families, spectral
-
-
-def _best(
-    families: Sequence[Family],
-    spectral: SpectrumFamily,
-    rows: Sequence[Array],
-    windows: Sequence[Any],
-    degree: int,
-) -> tuple[Estimate, Setting, dict[str, Goodness]]:
-    """The family that describes the values best, and what is to be said of each."""
-    compared: dict[str, Goodness] = {}
-    best, chosen, highest = None, None, -math.inf
-    problems: list[str] = []
-    for family in families:
-        setting = Setting(tuple(windows), family, spectral, degree)
-        values = np.concatenate(
-            [detrended(r, w, degree) for r, w in zip(rows, windows, strict=True)]
-        )
-        try:
-            if spectral.noise == 0.0:
-                family.check(values)
-            found = estimate(rows, setting)
-        except InputError as error:
-            problems += error.problems
-            continue
-        independent = lengths_held(found, windows)
-        fitted = mean_log_likelihood(found.marginal, values, found.model.noise)
-        parameters = len(family.parameters(found.marginal))
-        score = fitted * min(independent, values.size) - parameters
-        compared[family.name] = Goodness(found.marginal, found.distance, score)
-        if best is None or score > highest:
-            best, chosen, highest = found, setting, score
-    if best is None or chosen is None:
-        raise InputError(problems)
-    top = max(one.score for one in compared.values())
-    compared = {name: replace(one, score=one.score - top) for name, one in compared.items()}
-    return best, chosen, compared
-
-
-def lengths_held(found: Estimate, windows: Sequence[Any]) -> float:
-    """Correlation lengths, or on a plane areas, that windows hold together."""
-    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
-    total = 0.0
-    for window in windows:
-        sizes = [d / length for d in window.spacings]
-        if len(sizes) == 2:
-            sizes[1] /= ratio
-        total += float(window.measured.sum()) * math.prod(sizes)
-    return total
+    fit = _result(repeated, setting, compared, records, rows, confidence, quantity)
+    if done < asked:
+        fit = replace(fit, doubts=(*fit.doubts, Doubt("repetitions", done, asked)))
+    for doubt in fit.doubts:
+        warn_accuracy(str(doubt))
+    if interface is not None:
+        fit.field.modes(interface)
+        fit.field.warn_if_inaccurate(interface)
+    return fit
 
 
 def _result(
+    repeated: Sequence[Repetitions],
     setting: Setting,
     compared: dict[str, Goodness],
-    repeated: Sequence[Repetitions],
     records: Sequence[Record],
-    values: Array,
     rows: Sequence[Array],
-    interface: Interface | None,
     confidence: float,
     quantity: str,
-    asked: int,
 ) -> FieldFit:
-    around = repeated[0]
-    found, fits = around.truth, [one.estimate for one in around.fits]
-    ends = (repeated[1], repeated[2]) if len(repeated) == 3 else None
-    rows = [detrended(r, w, setting.degree) for r, w in zip(rows, setting.windows, strict=True)]
-    observed = tuple(observe(rows, setting.windows))
+    found, fits = repeated[0]
+    values, observed = np.concatenate(rows), tuple(observe(rows, setting.windows))
     p_values = {
         "marginal": _p_value(found.distance, [one.distance for one in fits]),
         "spectrum": _p_value(found.roughness, [one.roughness for one in fits]),
     }
-    held = lengths_held(found, setting.windows)
+    held = _lengths_held(found, setting.windows)
     doubts = _doubts(found, setting, observed, held)
     doubts += [Doubt(name, p, FAR) for name, p in p_values.items() if p <= FAR]
-    used = sum(len(one.fits) for one in repeated)
-    if used < asked:
-        doubts.append(Doubt("repetitions", used, asked))
-    for doubt in doubts:
-        warn_accuracy(str(doubt))
-    field = found.field(quantity)
-    if interface is not None:
-        field.modes(interface)
-        field.warn_if_inaccurate(interface)
     points = sum(record.values.size for record in records)
     return FieldFit(
-        field=field,
-        parameters=parameters_of(found, setting),
-        interval=intervals(around, ends, setting, confidence, values),
+        field=found.field(quantity),
+        parameters=found.parameters,
+        interval=intervals(repeated, setting, confidence, values),
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in fits),
         families=compared,
@@ -323,8 +225,77 @@ def _result(
         missing=(points - values.size, points),
         quantity=quantity,
         doubts=tuple(doubts),
-        _details=Details(values, tuple(records), found, setting, observed, tuple(fits)),
+        _details=Details(values, found, setting, observed, tuple(fits)),
     )
+
+
+def _families(
+    marginal: Any, spectrum: Any, anisotropy: bool | float, noise: bool | float
+) -> tuple[list[Family], Any]:
+    """The families to fit, or everything that is wrong with them."""
+    several = marginal if isinstance(marginal, list | tuple) else [marginal]
+    # True is estimated; False is none.
+    ratio = None if anisotropy is True else anisotropy or 1.0
+    deviation = None if noise is True else float(noise)
+    calls: list[Any] = [lambda one=one: family_of(one) for one in several]
+    calls.append(lambda: spectrum_family(spectrum, ratio, deviation, (0.0, 0.0)))
+    found, problems = [], [] if several else ["marginal: names no family"]
+    for call in calls:
+        try:
+            found.append(call())
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found[:-1], found[-1]
+
+
+def _windows(records: Sequence[Record], degree: int) -> tuple[Window, ...]:
+    """A window for each record; those of one geometry share it."""
+    made: dict[Any, Window] = {}
+    keys = []
+    for values, spacings in records:
+        measured = np.isfinite(values)
+        keys.append((values.shape, spacings, measured.tobytes()))
+        if keys[-1] not in made:
+            made[keys[-1]] = make_window(values.shape, spacings, measured, degree)
+    return tuple(made[key] for key in keys)
+
+
+def _best(
+    settings: Sequence[Setting], rows: Sequence[Array]
+) -> tuple[Estimate, Setting, dict[str, Goodness]]:
+    """The family that describes the values best, and how well each does."""
+    values = np.concatenate(rows)
+    fitted: list[tuple[float, Estimate, Setting]] = []
+    problems: list[str] = []
+    for setting in settings:
+        family = setting.marginal
+        try:
+            if setting.spectrum.noise == 0.0:
+                family.check(values)
+            found = estimate(rows, setting)
+        except InputError as error:
+            problems += error.problems
+            continue
+        independent = min(_lengths_held(found, setting.windows), values.size)
+        score = independent * mean_log_likelihood(found.marginal, values, found.model.noise)
+        fitted.append((score - len(family.parameters(found.marginal)), found, setting))
+    if not fitted:
+        raise InputError(problems)
+    top, best, chosen = max(fitted, key=lambda one: one[0])
+    compared = {
+        setting.marginal.name: Goodness(found.marginal, found.distance, score - top)
+        for score, found, setting in fitted
+    }
+    return best, chosen, compared
+
+
+def _lengths_held(found: Estimate, windows: Sequence[Window]) -> float:
+    """Correlation lengths, or on a plane areas, that windows hold together."""
+    area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
+    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
+    return area / (length if len(windows[0].shape) == 1 else length * length * ratio)
 
 
 def _p_value(own: float, others: Sequence[float]) -> float:
@@ -348,8 +319,7 @@ def _doubts(
     ):
         near = np.abs(limits - at) < AT_LIMIT * (limits[1] - limits[0])
         if name in ("correlation_length", "exponent", "anisotropy") and near.any():
-            ends = back(name, at), back(name, limits[near.argmax()])
-            doubts.append(Doubt(name, *ends))
+            doubts.append(Doubt(name, back(name, at), back(name, limits[near.argmax()])))
     return doubts
 
 
@@ -361,6 +331,6 @@ def _power_at_cutoff(found: Estimate, observed: Observed) -> float:
     model = found.model
     if model.noise_share <= 0.0:
         return math.inf
-    quiet = replace(model, noise_share=0.0, variance=model.variance * (1.0 - model.noise_share))
-    power = quiet.expectation(observed)[observed.weights > 0.0]
+    power = model.variance * (1.0 - model.noise_share) * model.signal(observed)
+    power = power[observed.weights > 0.0]
     return float(power[power >= 0.25 * power.max()].min())

@@ -1,11 +1,10 @@
 """Marginals by maximum likelihood, with the measurement noise that values carry.
 
-Values with noise are counted in bins; the probability of a bin is that of the marginal, convolved
-with normal noise by Gauss-Hermite quadrature of its distribution function, which stays smooth where
-a density does not. So values that noise carried beyond a bound of the marginal are no trouble.
-Without noise the likelihood is the density at the values. Values along
-a record are correlated; the likelihood takes them for independent, which leaves the estimate
-consistent (a composite likelihood) and its error to the bootstrap.
+Without noise the likelihood is the density at the values. Values with noise are counted in bins;
+the probability of a bin is that of the marginal, its distribution function convolved with that of
+the noise, so that values beyond a bound of the marginal are no trouble. Values along a record are
+correlated; the likelihood takes them for independent, which leaves the estimate consistent (a
+composite likelihood) and its error to the bootstrap.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.stats
-from scipy.special import betainc, betaln, gamma, gammainc, ndtr
+from scipy.special import betainc, betaln, gammainc, ndtr
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
@@ -28,7 +27,6 @@ from stiction.random.marginals import (
     Beta,
     Gamma,
     Lognormal,
-    Marginal,
     ScipyMarginal,
     TruncatedNormal,
     Weibull,
@@ -36,7 +34,8 @@ from stiction.random.marginals import (
 )
 
 BINS = 160
-NODES = 9
+REACH = 5.0
+"""Standard deviations of the noise that count."""
 LEAST = 1e-12
 """Probability of a bin."""
 DIFFERENCE = 1e-5
@@ -47,79 +46,77 @@ INSIDE = 1e-2
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
 MOST_NOISE = 0.95
-ANY = (-30.0, 30.0)
-
-_X, _W = np.polynomial.hermite_e.hermegauss(NODES)
-_W = _W / _W.sum()
-
-KEEPABLE: dict[str, tuple[str, ...]] = {
-    "beta": ("low", "high"),
-    "lognormal": ("low",),
-    "weibull": ("low",),
-    "gamma": ("low",),
-    "truncated_normal": ("low", "high"),
-    "normal": (),
-    "uniform": (),
-}
-"""Families that are fitted here, and which of their parameters may be given."""
 
 
-class Above(NamedTuple):
-    """A family above a bound, as functions of u = (value - bound)/scale and its shape.
-
-    `moments` are, from the shape, the mean above the bound over the scale, and the deviation over
-    that mean.
-    """
+class Kind(NamedTuple):
+    """A family fitted here, by functions of u = (value - loc)/scale and scipy's shapes."""
 
     made: Any
-    distribution: Callable[[Array, float], Array]
-    log_density: Callable[[Array, float], Array]
-    moments: Callable[[float], tuple[float, float]]
+    scipys: Any
+    distribution: Callable[..., Array]
+    log_density: Callable[..., Array]
+    keeps: tuple[str, ...] = ("low",)
+    """Parameters that may be given."""
 
 
-ABOVE = {
-    "lognormal": Above(
+def _positive(u: Array) -> Array:
+    return np.maximum(u, 1e-300)
+
+
+def _between(below: float, above: float) -> float:
+    """Probability of a standard normal number between two bounds."""
+    return max(float(ndtr(above) - ndtr(below)), 1e-300)
+
+
+KINDS = {
+    "lognormal": Kind(
         Lognormal,
-        lambda u, s: ndtr(np.log(u) / s),
+        scipy.stats.lognorm,
+        lambda u, s: ndtr(np.log(_positive(u)) / s),
         lambda u, s: -np.log(u) - math.log(s) - 0.5 * (np.log(u) / s) ** 2,
-        lambda s: (math.exp(0.5 * s * s), math.sqrt(math.expm1(s * s))),
     ),
-    "weibull": Above(
+    "weibull": Kind(
         Weibull,
-        lambda u, k: -np.expm1(-(u**k)),
+        scipy.stats.weibull_min,
+        lambda u, k: -np.expm1(-(_positive(u) ** k)),
         lambda u, k: math.log(k) + (k - 1.0) * np.log(u) - u**k,
-        lambda k: (gamma(1 + 1 / k), math.sqrt(gamma(1 + 2 / k) / gamma(1 + 1 / k) ** 2 - 1)),
     ),
-    "gamma": Above(
+    "gamma": Kind(
         Gamma,
-        lambda u, a: gammainc(a, u),
+        scipy.stats.gamma,
+        lambda u, a: gammainc(a, _positive(u)),
         lambda u, a: (a - 1.0) * np.log(u) - u - math.lgamma(a),
-        lambda a: (a, a**-0.5),
+    ),
+    "beta": Kind(
+        Beta,
+        scipy.stats.beta,
+        lambda u, a, b: betainc(a, b, np.clip(u, 0.0, 1.0)),
+        lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
+        ("low", "high"),
+    ),
+    "truncated_normal": Kind(
+        TruncatedNormal,
+        scipy.stats.truncnorm,
+        lambda u, a, b: (ndtr(np.clip(u, a, b)) - ndtr(a)) / _between(a, b),
+        lambda u, a, b: -0.5 * u * u - math.log(_between(a, b)),
+        ("low", "high"),
     ),
 }
+SCIPYS = {"normal": "norm"}
+"""Names of ours for families of scipy."""
 
 
 class Search(NamedTuple):
-    """A family as a function of a vector between limits."""
+    """Where to begin, between which limits, and scipy's parameters of a vector."""
 
     start: Array
-    limits: Array
-    distribution: Callable[[Array, Array], Array]
-    """From a vector and values to probabilities."""
-    log_density: Callable[[Array, Array], Array]
-    marginal: Callable[[Array], Any]
+    limits: Any
+    parameters: Callable[[Array], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class Family:
-    """A family of marginals, and which of its parameters the user has fixed.
-
-    Attributes
-    ----------
-    name : str
-        As in study files.
-    fixed : tuple of (str, float)
-    """
+    """A family of marginals, and which of its parameters the user has fixed."""
 
     name: str
     fixed: tuple[tuple[str, float], ...] = ()
@@ -127,62 +124,87 @@ class Family:
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
         """Return the marginal of values (points,) that carry noise of a standard deviation.
 
-        Parameters
-        ----------
-        values : (points,) array
-        noise : float
-        start : marginal, optional
-            Of this family, to begin with.
+        `start` is a marginal of this family to begin with.
         """
-        quiet, deviation = self.quiet(values, noise), float(values.std())
-        if noise**2 <= NEGLIGIBLE * deviation**2:
+        quiet = self.quiet(values, noise)
+        if self.name not in KINDS:
+            return self._by_scipy(quiet)
+        if noise**2 <= NEGLIGIBLE * values.var():
             noise, values = 0.0, quiet
+        kind = KINDS[self.name]
         search = self._search(values, quiet, noise, start)
-        if not isinstance(search, Search):
-            return search
-        counts, terms = np.ones(values.size), lambda v: search.log_density(v, values)
+        limits = np.array(search.limits)
+        counts, at, probabilities = np.ones(values.size), values, None
         if noise:
-            counts, edges = np.histogram(values, bins=BINS)
-            shifted = edges[:, None] - noise * _X
+            counts, at, probabilities = _bins(values, noise)
 
-            def terms(v: Array) -> Array:
-                return np.log(_in_bins(search.distribution(v, shifted)))
+        def terms(v: Array) -> Array:
+            *shapes, low, scale = search.parameters(v)
+            u = (at - low) / scale
+            if probabilities is None:
+                found: Array = kind.log_density(u, *shapes) - math.log(scale)
+                return found
+            return np.log(probabilities(kind.distribution(u, *shapes)))
 
         def value_of(v: Array) -> tuple[float, Array]:
-            found: Array = terms(v)
+            found = terms(v)
             return float(counts @ found), found
 
-        def derivatives(v: Array, at: Array) -> tuple[Array, Array]:
-            sides = np.where(v + DIFFERENCE <= search.limits[:, 1], DIFFERENCE, -DIFFERENCE)
-            slopes = np.stack([(terms(v + step) - at) / step.sum() for step in np.diag(sides)])
+        def derivatives(v: Array, found: Array) -> tuple[Array, Array]:
+            sides = np.where(v + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
+            slopes = np.stack([(terms(v + step) - found) / step.sum() for step in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
 
-        found = climb(search.start, search.limits, value_of, derivatives, longest=0.5, settled=1e-5)
-        return search.marginal(found)
+        best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
+        return self._member(search.parameters(best))
 
-    def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Any:
-        """The family as a function of a vector; or the marginal where nothing is searched."""
-        fixed = dict(self.fixed)
-        if self.name == "normal":
-            spread = math.sqrt(max(float(values.var()) - noise**2, float(quiet.var())))
-            return ScipyMarginal("norm", (("loc", float(values.mean())), ("scale", spread)))
-        if self.name == "uniform":
-            ends = (("loc", float(quiet.min())), ("scale", float(np.ptp(quiet))))
-            return ScipyMarginal("uniform", ends)
-        if self.name not in KEEPABLE:
-            return _by_scipy(self.name, quiet, fixed)
+    def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Search:
         if self.name == "beta":
-            return _beta(values, quiet, noise, fixed, start)
-        low, high = fixed.get("low", 0.0), fixed.get("high")
+            return _beta(values, quiet, noise, dict(self.fixed), start)
         if self.name == "truncated_normal":
-            return _truncated_normal(quiet, low, high)
-        return _above(self.name, quiet, low, start)
+            return _truncated_normal(quiet, *self.bounds)
+        low = self.bounds[0]
+        if start is None:
+            mean = float(quiet.mean())
+            start = KINDS[self.name].made(mean=mean, cv=float(quiet.std()) / mean, low=low)
+        shape, _, scale = start.distribution.args
+        shapes = (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)
+        return Search(
+            np.log([scale, shape]),
+            [(-700.0, 700.0), shapes],
+            lambda v: (math.exp(v[1]), low, math.exp(v[0])),
+        )
+
+    def _member(self, parameters: tuple[float, ...]) -> Any:
+        """The marginal of scipy's parameters; most of ours have a mean and a cv instead."""
+        kind = KINDS[self.name]
+        if self.name == "beta":
+            a, b, low, width = parameters
+            return Beta(alpha=a, beta=b, low=low, high=low + width)
+        mean, variance = map(float, kind.scipys.stats(*parameters))
+        bounds = {"low": 0.0} | dict(self.fixed)
+        # A cut normal distribution may tend to an exponential or uniform one: the widest is taken
+        # that its moments still determine.
+        for narrower in 0.97 ** np.arange(60):
+            try:
+                return kind.made(mean=mean, cv=narrower * math.sqrt(variance) / mean, **bounds)
+            except InputError:
+                continue
+        raise InputError(f"marginal: no {self.name!r} distribution resembles the values")
+
+    def _by_scipy(self, values: Array) -> Any:
+        family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
+        fixed = {f"f{key}" if key in ("loc", "scale") else f"fix_{key}": v for key, v in self.fixed}
+        try:
+            return marginal_of(family(*family.fit(values, **fixed)))
+        except Exception as error:  # every family of scipy has its own
+            raise InputError(f"marginal: scipy cannot fit {self.name!r}: {error}") from None
 
     def quiet(self, values: Array, noise: float) -> Array:
         """Return values drawn together to the variance that they would have without noise."""
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
-        low, high = self.bounds()
+        low, high = self.bounds
         margin = INSIDE * float(np.ptp(values))
         values = mean + math.sqrt(1.0 - share) * (values - mean)
         values = np.where(values <= low, low + margin, values)
@@ -195,18 +217,19 @@ class Family:
         else:
             names = [field.name for field in dataclasses.fields(marginal) if field.name != "type"]
             found = {name: getattr(marginal, name) for name in names}
-        known = {"low", *dict(self.fixed)} if self.name != "beta" else dict(self.fixed)
+        known = dict(self.fixed).keys() | (set() if self.name == "beta" else {"low"})
         return {n: float(v) for n, v in found.items() if v is not None and n not in known}
 
+    @property
     def bounds(self) -> tuple[float, float]:
-        """Return the support as far as it is known before anything is fitted."""
-        zero = {"low": 0.0} if self.name in (*ABOVE, "truncated_normal") else {}
+        """The support as far as it is known before anything is fitted."""
+        zero = {"low": 0.0} if self.name in KINDS and self.name != "beta" else {}
         bounds = zero | dict(self.fixed)
         return bounds.get("low", -math.inf), bounds.get("high", math.inf)
 
     def check(self, values: Array) -> None:
         """Refuse values that the family cannot have."""
-        low, high = self.bounds()
+        low, high = self.bounds
         outside = (values <= low) | (values >= high)
         if outside.any():
             raise InputError(
@@ -217,128 +240,59 @@ class Family:
             )
 
 
+def name_and_fixed(what: str, given: Any) -> tuple[str, dict[str, float]]:
+    """Name and given parameters of a family, from the name alone or a table {type, ...}."""
+    table = {"type": given} if isinstance(given, str) else given
+    if not isinstance(table, Mapping):
+        raise InputError(
+            f"{what}: must be a name, or a table with the parameters to keep, such as"
+            f" {{'type': 'beta', 'low': 0.0}}, got {describe(given)}"
+        )
+    fixed = {str(key): value for key, value in table.items() if key != "type"}
+    wrong = [key for key, value in fixed.items() if not is_finite(value)]
+    if wrong:
+        raise InputError([f"{what}.{key}: must be a finite number" for key in wrong])
+    return str(table.get("type")), {key: float(value) for key, value in fixed.items()}
+
+
 def family_of(given: Any) -> Family:
     """Return the family of a name, or of a table with some of its parameters."""
-    if isinstance(given, str):
-        given = {"type": given}
-    if not isinstance(given, Mapping):
-        raise InputError(
-            "marginal: must be the name of a family such as 'beta' or 'lognormal', or a table with"
-            f" parameters to keep, such as {{'type': 'beta', 'low': 0.0, 'high': 2e6}}, got"
-            f" {describe(given)}"
-        )
-    fixed = {str(key): value for key, value in given.items() if key != "type"}
-    name = str(given.get("type"))
-    known = KEEPABLE.get(name, ())
-    if name not in KEEPABLE:
-        family = getattr(scipy.stats, name, None)
+    name, fixed = name_and_fixed("marginal", given)
+    if name in KINDS:
+        known = KINDS[name].keeps
+    else:
+        family = getattr(scipy.stats, SCIPYS.get(name, name), None)
         if not isinstance(family, scipy.stats.rv_continuous):
-            raise InputError(unknown_name("marginal", name, [*KEEPABLE, "norm", "weibull_max"]))
-        shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
-        known = (*shapes, "loc", "scale")
+            raise InputError(unknown_name("marginal", name, [*KINDS, *SCIPYS, "uniform"]))
+        known = (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
     problems = [unknown_name(f"marginal.{name}", key, known) for key in fixed if key not in known]
-    problems += [
-        f"marginal.{key}: must be a finite number, got {describe(value)}"
-        for key, value in fixed.items()
-        if not is_finite(value)
-    ]
     if problems:
         raise InputError(problems)
-    return Family(name, tuple((key, float(value)) for key, value in fixed.items()))
+    return Family(name, tuple(fixed.items()))
 
 
-def _above(name: str, quiet: Array, low: float, start: Any) -> Search:
-    family = ABOVE[name]
-    if start is None:
-        mean = float(quiet.mean())
-        start = family.made(mean=mean, cv=float(quiet.std()) / mean, low=low)
-    shape, _, scale = start.distribution.args
+def _truncated_normal(quiet: Array, low: float, high: float) -> Search:
+    unit, mean = float(quiet.std()), float(quiet.mean())
 
-    def marginal(v: Array) -> Marginal:
-        above, ratio = family.moments(math.exp(v[1]))
-        mean = low + math.exp(v[0]) * above
-        found: Marginal = family.made(mean=mean, cv=ratio * (mean - low) / mean, low=low)
-        return found
+    def parameters(v: Array) -> tuple[float, ...]:
+        middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
+        return (low - middle) / width, (high - middle) / width, middle, width
 
-    def unit(v: Array, y: Array) -> Array:
-        return np.maximum((y - low) * math.exp(-v[0]), 1e-300)
-
-    return Search(
-        np.log([scale, shape]),
-        np.array([(-700.0, 700.0), (-5.0, 5.0) if name == "lognormal" else (-1.6, 7.0)]),
-        lambda v, y: family.distribution(unit(v, y), math.exp(v[1])),
-        lambda v, y: family.log_density(unit(v, y), math.exp(v[1])) - v[0],
-        marginal,
-    )
-
-
-def _truncated_normal(quiet: Array, low: float, high: float | None) -> Search:
-    unit, mean, top = float(quiet.std()), float(quiet.mean()), math.inf if high is None else high
-
-    def parts(v: Array) -> tuple[float, float, float, float]:
-        middle, width = mean + unit * v[0], unit * math.exp(v[1])
-        return middle, width, (low - middle) / width, (top - middle) / width
-
-    def distribution(v: Array, y: Array) -> Array:
-        middle, width, below, above = parts(v)
-        reached = ndtr((np.clip(y, low, top) - middle) / width) - ndtr(below)
-        found: Array = np.clip(reached / max(ndtr(above) - ndtr(below), 1e-300), 0.0, 1.0)
-        return found
-
-    def log_density(v: Array, y: Array) -> Array:
-        middle, width, below, above = parts(v)
-        mass = max(ndtr(above) - ndtr(below), 1e-300)
-        found: Array = -0.5 * ((y - middle) / width) ** 2 - math.log(width * mass)
-        return found
-
-    def marginal(v: Array) -> TruncatedNormal:
-        middle, width, below, above = parts(v)
-        frozen = scipy.stats.truncnorm(below, above, middle, width)
-        mean, cv = float(frozen.mean()), float(frozen.std()) / float(frozen.mean())
-        # Near an exponential or uniform distribution, which the likelihood may tend to, the
-        # widest is taken that its moments still determine.
-        for _ in range(60):
-            try:
-                return TruncatedNormal(mean=mean, cv=cv, low=low, high=high)
-            except InputError:
-                cv *= 0.97
-        raise InputError(
-            "marginal: no normal distribution cut at these bounds resembles the values"
-        )
-
-    return Search(
-        np.zeros(2), np.array([(-8.0, 8.0), (-3.0, 2.5)]), distribution, log_density, marginal
-    )
+    return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
 
 
 def _beta(values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any) -> Search:
+    """Shapes, and the distances of free bounds from the mean, as logarithms."""
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
     room = {"low": mean - float(values.min()), "high": float(values.max()) - mean}
-    widest = WIDEST * float(np.ptp(values))
 
-    def parts(v: Array) -> tuple[float, float, float, float]:
+    def parameters(v: Array) -> tuple[float, ...]:
         ends = fixed | {
             name: mean + side * unit * math.exp(at)
             for (name, side), at in zip(sides.items(), v[2:], strict=True)
         }
-        return math.exp(v[0]), math.exp(v[1]), ends["low"], ends["high"]
-
-    def distribution(v: Array, y: Array) -> Array:
-        a, b, low, high = parts(v)
-        found: Array = betainc(a, b, np.clip((y - low) / (high - low), 0.0, 1.0))
-        return found
-
-    def log_density(v: Array, y: Array) -> Array:
-        a, b, low, high = parts(v)
-        u = (y - low) / (high - low)
-        shapes = (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u)
-        found: Array = shapes - betaln(a, b) - math.log(high - low)
-        return found
-
-    def marginal(v: Array) -> Beta:
-        a, b, low, high = parts(v)
-        return Beta(alpha=a, beta=b, low=low, high=high)
+        return math.exp(v[0]), math.exp(v[1]), ends["low"], ends["high"] - ends["low"]
 
     if start is None:
         ends: dict[str, Any] = {
@@ -349,42 +303,51 @@ def _beta(values: Array, quiet: Array, noise: float, fixed: dict[str, float], st
         start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
     distances = [side * (getattr(start, name) - mean) / unit for name, side in sides.items()]
     # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
-    least = {name: 0.5 if noise else room[name] / unit * (1.0 + 1e-9) for name in sides}
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
-    limits += [(math.log(least[name]), math.log((room[name] + widest) / unit)) for name in sides]
+    for name in sides:
+        least = 0.5 if noise else room[name] / unit * (1.0 + 1e-9)
+        most = (room[name] + WIDEST * float(np.ptp(values))) / unit
+        limits.append((math.log(least), math.log(most)))
     first = np.log([start.alpha, start.beta, *np.maximum(distances, 1e-3)])
-    return Search(first, np.array(limits), distribution, log_density, marginal)
+    return Search(first, limits, parameters)
 
 
-def _by_scipy(name: str, values: Array, fixed: dict[str, float]) -> Any:
-    family = getattr(scipy.stats, name)
-    options = {
-        f"f{key}" if key in ("loc", "scale") else f"fix_{key}": v for key, v in fixed.items()
-    }
-    try:
-        found = family.fit(values, **options)
-    except Exception as error:  # every family of scipy has its own
-        raise InputError(f"marginal: scipy cannot fit {name!r} to this: {error}") from None
-    return marginal_of(family(*found))
+def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
+    """Counts of values in bins, and how their probabilities follow from a distribution function.
 
+    Returns
+    -------
+    counts : (BINS,) array
+    at : array
+        Where the function of the values without noise is needed, at equal distances.
+    probabilities : callable
+        From it to the probabilities of the bins with noise. The convolution is a sum in steps of
+        half a deviation of the noise or less; noise far below the width of a bin does not count.
+    """
+    counts, edges = np.histogram(values, bins=BINS)
+    width = float(edges[1] - edges[0])
+    parts, weight = 1, np.ones(1)
+    if noise > 0.2 * width:
+        parts = math.ceil(2.0 * width / noise)
+        reach = math.ceil(REACH * noise * parts / width)
+        weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * width / parts / noise) ** 2)
+    outside = weight.size // 2
+    at = edges[0] + width / parts * np.arange(-outside, BINS * parts + outside + 1)
 
-def _in_bins(reached: Array) -> Array:
-    """Probabilities of bins from the distribution function at their edges, (bins + 1, nodes)."""
-    below = reached @ _W if reached.shape[1] == NODES else reached[:, 0]
-    found: Array = np.maximum(np.diff(below), LEAST)
-    return found
+    def probabilities(reached: Array) -> Array:
+        below = np.convolve(reached, weight / weight.sum(), "valid")[::parts]
+        return np.maximum(np.diff(below), LEAST)
+
+    return counts, at, probabilities
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     """Of values in bins, marginal and noise together; the width of a bin is left out."""
-    counts, edges = np.histogram(values, bins=BINS)
-    expected = _in_bins(marginal.distribution.cdf(edges[:, None] - noise * _X))
+    counts, at, probabilities = _bins(values, noise)
+    expected = probabilities(marginal.distribution.cdf(at))
     return float(counts @ np.log(expected) / values.size)
 
 
 def distance(marginal: Any, values: Array) -> float:
     """Largest difference between the distribution function and that of the values (Kolmogorov)."""
-    ordered = np.sort(values)
-    expected = marginal.distribution.cdf(ordered)
-    rank = np.arange(1, ordered.size + 1) / ordered.size
-    return float(np.maximum(rank - expected, expected - rank + 1.0 / ordered.size).max())
+    return float(scipy.stats.ks_1samp(values, marginal.distribution.cdf, method="asymp").statistic)

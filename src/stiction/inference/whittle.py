@@ -63,7 +63,9 @@ class Observed:
     ----------
     window : Window
     grid : Grid
-    periodograms : (records, *half) array
+    records : int
+    average : (*half) array
+        Of their periodograms.
     weights : (*half) array
         Of wave vectors: 1, a half where k and -k are both among them or k is its own opposite, 0
         for the mean.
@@ -75,42 +77,33 @@ class Observed:
 
     window: Window
     grid: Grid
-    periodograms: Array
+    records: int
+    average: Array
     weights: Array
     floor: float
     white: Array
 
-    @property
-    def average(self) -> Array:
-        """Over records, (*half)."""
-        mean: Array = self.periodograms.mean(axis=0)
-        return mean
-
 
 def make_observed(window: Window, periodograms: Array) -> Observed:
     """What is needed of periodograms (records, *half) in a window."""
-    smooth = uniform_filter(periodograms.mean(axis=0), NEIGHBOURS, mode="nearest")
+    average = periodograms.mean(axis=0)
+    smooth = uniform_filter(average, NEIGHBOURS, mode="nearest")
     unit = np.zeros(window.padded)
     unit[(0,) * unit.ndim] = 1.0
+    weights = np.ones(average.shape)
+    weights[..., 0] = 0.5
+    if window.shape[-1] % 2 == 0:
+        weights[..., -1] = 0.5
+    weights[(0,) * weights.ndim] = 0.0
     return Observed(
         window=window,
         grid=Grid(window.shape, window.spacings),
-        periodograms=periodograms,
-        weights=weights_of(window),
+        records=len(periodograms),
+        average=average,
+        weights=weights,
         floor=FLOOR * float(smooth.max()),
         white=window.expectation(unit),
     )
-
-
-def weights_of(window: Window) -> Array:
-    """See `Observed.weights`."""
-    half = (*window.shape[:-1], window.shape[-1] // 2 + 1)
-    weights = np.ones(half)
-    weights[..., 0] = 0.5 if len(half) > 1 else 0.0
-    if window.shape[-1] % 2 == 0:
-        weights[..., -1] = 0.5
-    weights[(0,) * len(half)] = 0.0
-    return weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,5 +166,5 @@ def loss(expected: Sequence[Array], observed: Sequence[Observed]) -> float:
         if lifted.min() <= 0.0:
             return math.inf
         terms = np.log(lifted) + (one.average + one.floor) / lifted
-        value += len(one.periodograms) * float(np.sum(one.weights * terms))
+        value += one.records * float(np.sum(one.weights * terms))
     return value

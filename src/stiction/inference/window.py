@@ -28,26 +28,6 @@ EXACT = {1: 16, 2: 2}
 """Wave numbers up to which the trend is in the expectation; the taper hides it from higher ones."""
 
 
-def polynomials(shape: tuple[int, ...], measured: NDArray[np.bool_], degree: int) -> Array:
-    """Orthonormal polynomials of a total degree on the measured points, (points, terms)."""
-    axes = [np.linspace(-1.0, 1.0, n) for n in shape]
-    grids = np.meshgrid(*axes, indexing="ij")
-    terms = [
-        np.prod([g**p for g, p in zip(grids, powers, strict=True)], axis=0)
-        for powers in itertools.product(range(degree + 1), repeat=len(shape))
-        if sum(powers) <= degree
-    ]
-    columns = np.stack([term[measured] for term in terms], axis=1)
-    basis: Array = np.linalg.qr(columns)[0]
-    return basis
-
-
-def without_trend(values: Array, basis: Array) -> Array:
-    """Measured values (points,) less their projection on polynomials."""
-    result: Array = values - basis @ (basis.T @ values)
-    return result
-
-
 @dataclass(frozen=True, eq=False)
 class Window:
     """Taper, gaps and trend of records of one geometry.
@@ -59,7 +39,7 @@ class Window:
         m.
     measured : (*shape) array of bool
     basis : (points, terms) array
-        Of the trend.
+        Orthonormal polynomials of the trend on the measured points.
     taper : (*shape) array
         h, zero in gaps; its squares sum to 1.
     spread : (*padded) array
@@ -87,18 +67,22 @@ class Window:
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
         """Components of the wave vectors of `periodogram`, rad/m; they broadcast."""
-        parts = []
-        for axis, (n, d) in enumerate(zip(self.shape, self.spacings, strict=True)):
-            last = axis == len(self.shape) - 1
-            k = 2.0 * np.pi * (fft.rfftfreq(n, d) if last else fft.fftfreq(n, d))
-            parts.append(k.reshape([-1 if i == axis else 1 for i in range(len(self.shape))]))
-        return tuple(parts)
+        axes = [fft.fftfreq(n, d) for n, d in zip(self.shape, self.spacings, strict=True)]
+        axes[-1] = fft.rfftfreq(self.shape[-1], self.spacings[-1])
+        return tuple(2.0 * np.pi * axis for axis in np.ix_(*axes))
+
+    def without_trend(self, values: Array) -> Array:
+        """Measured values (points,) without their trend but with their mean."""
+        if self.basis.shape[1] == 1:
+            return values
+        result: Array = values - self.basis @ (self.basis.T @ values) + values.mean()
+        return result
 
     def periodogram(self, values: Array) -> Array:
         """|sum h (y - trend) exp(-i k x)|^2 of values (*shape) or of measured ones (points,)."""
         known = values[self.measured] if values.shape == self.shape else values
         field = np.zeros(self.shape)
-        field[self.measured] = without_trend(known, self.basis)
+        field[self.measured] = known - self.basis @ (self.basis.T @ known)
         result: Array = np.abs(fft.rfftn(self.taper * field)) ** 2
         return result
 
@@ -116,55 +100,52 @@ def make_window(
     spacings: tuple[float, ...],
     measured: NDArray[np.bool_],
     degree: int,
-    tapered: float = TAPERED,
 ) -> Window:
     """The window of records of one shape, with gaps where nothing was measured."""
-    basis = polynomials(shape, measured, degree)
-    taper = measured.astype(np.float64)
-    for axis, n in enumerate(shape):
-        one = _cosine(n, tapered)
-        taper = taper * one.reshape([-1 if i == axis else 1 for i in range(len(shape))])
+    basis = _polynomials(measured, degree)
+    tapers = np.ix_(*[_taper(n) for n in shape])
+    taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
     taper /= np.sqrt(np.sum(taper**2))
     padded = tuple(2 * n for n in shape)
     spread = fft.irfftn(np.abs(fft.rfftn(taper, padded)) ** 2, padded)
-    numbers = _low_numbers(shape)
-    exact = np.stack([_spread_of(wave, taper, measured, basis, padded) for wave in numbers.T])
-    low = tuple(np.asarray(index) for index in numbers)
-    return Window(shape, spacings, measured, basis, taper, spread, low, exact)
+    # Wave numbers of the half plane of a real transform.
+    most = [min(EXACT[len(shape)], (n - 1) // 2) for n in shape]
+    numbers = [np.arange(-m, m + 1) for m in most]
+    numbers[-1] = np.arange(min(EXACT[len(shape)], shape[-1] // 2) + 1)
+    low = np.array(list(itertools.product(*numbers)))
+    exact = np.stack([_autocorrelation(wave, taper, measured, basis) for wave in low])
+    return Window(shape, spacings, measured, basis, taper, spread, tuple(low.T), exact)
 
 
-def _cosine(n: int, share: float) -> Array:
+def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
+    """Orthonormal polynomials of a total degree on the measured points, (points, terms)."""
+    axes = np.ix_(*[np.linspace(-1.0, 1.0, n) for n in measured.shape])
+    terms = [
+        np.prod(np.broadcast_arrays(*[x**p for x, p in zip(axes, powers, strict=True)]), axis=0)
+        for powers in itertools.product(range(degree + 1), repeat=len(axes))
+        if sum(powers) <= degree
+    ]
+    basis: Array = np.linalg.qr(np.stack([term[measured] for term in terms], axis=1))[0]
+    return basis
+
+
+def _taper(n: int) -> Array:
     """A cosine (Tukey) taper that is nowhere zero."""
     place = (np.arange(n) + 0.5) / n
-    edge = np.minimum(place, 1.0 - place) / (0.5 * share)
-    result: Array = np.where(edge < 1.0, np.sin(0.5 * np.pi * np.minimum(edge, 1.0)) ** 2, 1.0)
+    edge = np.minimum(np.minimum(place, 1.0 - place) / (0.5 * TAPERED), 1.0)
+    result: Array = np.sin(0.5 * np.pi * edge) ** 2
     return result
 
 
-def _low_numbers(shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """Wave numbers of the half plane of a real transform, (dimensions, count)."""
-    most = EXACT[len(shape)]
-    ranges = [range(-min(most, (n - 1) // 2), min(most, (n - 1) // 2) + 1) for n in shape]
-    ranges[-1] = range(min(most, shape[-1] // 2) + 1)
-    return np.array(list(itertools.product(*ranges)), dtype=np.int64).T
-
-
-def _spread_of(
-    wave: NDArray[np.int64],
-    taper: Array,
-    measured: NDArray[np.bool_],
-    basis: Array,
-    padded: tuple[int, ...],
+def _autocorrelation(
+    wave: NDArray[np.int64], taper: Array, measured: NDArray[np.bool_], basis: Array
 ) -> Array:
     """a_k at all lags, flat."""
-    phase = sum(
-        (2.0 * np.pi * number / n)
-        * np.arange(n).reshape([-1 if i == axis else 1 for i in range(len(padded))])
-        for axis, (number, n) in enumerate(zip(wave, taper.shape, strict=True))
-    )
+    turns = [number * np.arange(n) / n for number, n in zip(wave, taper.shape, strict=True)]
+    phase = 2.0 * np.pi * sum(np.ix_(*turns))
     carried = (taper * np.exp(-1j * phase))[measured]
     field = np.zeros(taper.shape, dtype=np.complex128)
     field[measured] = carried - basis @ (basis.T @ carried)
-    spectrum = np.abs(fft.fftn(field, padded)) ** 2
-    result: Array = fft.ifftn(spectrum).real.ravel()
+    padded = tuple(2 * n for n in taper.shape)
+    result: Array = fft.ifftn(np.abs(fft.fftn(field, padded)) ** 2).real.ravel()
     return result

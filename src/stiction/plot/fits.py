@@ -55,7 +55,7 @@ def fit(found: FieldFit) -> Figure:
     """
     details = found._details
     one = max(details.observed, key=lambda record: record.window.shape[0])
-    setting = replace(details.setting, windows=tuple(one.window for _ in one.periodograms))
+    setting = replace(details.setting, windows=(one.window,) * one.records)
     rng = np.random.default_rng(0)
     simulated = [
         np.mean([one.window.periodogram(r) for r in simulate(details.estimate, setting, rng)], 0)
@@ -138,7 +138,7 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
 
     def averaged(power: Array) -> Array:
         """Return wavenumbers of bands, and a periodogram averaged over them."""
-        return np.array(bands(one, power, 4))[:, [0, 2]].T
+        return bands(one, power, 4)[:, [0, 2]].T
 
     k, expected = averaged(model.expectation(one))
     measured = averaged(one.average)[1]
