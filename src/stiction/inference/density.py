@@ -6,9 +6,8 @@ bound is not far above the least peak. So the kernels stand on v = log(onset - b
 onset itself where there is no bound (Wand, Marron and Ruppert, 1991). Their width is Silverman's
 (1986, section 3.4.2), and what it adds to the variance is taken from the sample (section 6.1.2).
 Densities are tabulated in units in which v has mean 0 and variance 1, where they hardly change from
-node to node. The error of the load cell is integrated: by Gauss and Hermite's rule where it is
-small against the spread of the onset, Legendre's between the bound and where the error ends where
-it reaches the bound, and over the onset's distribution where it is large.
+node to node. The error of the load cell is integrated over v by the midpoint rule, which converges
+faster than any power of the step once that is below the narrower of error and density.
 """
 
 from __future__ import annotations
@@ -25,19 +24,12 @@ from stiction.jit import jit
 
 GROUPS = 256
 """Most groups of neighbouring sorted samples that stand for the sample, by their means."""
-COARSE = 24
-"""Groups over which an error that is not small is integrated."""
 REACH = 10.0
 STEP = 0.05
-LARGE = 0.6
-"""Load-cell error over the spread of the onset from which on it is not small."""
 MODE = 1.0
 """Logarithm of the density of no standardised onset is above this: of a normal one it is -0.9."""
-_ABSCISSAE, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
-_PLACES, _PARTS = np.polynomial.legendre.leggauss(16)
-NEAR = 4.5
-"""Standard deviations of the load cell that matter; nearer to the bound, the rule is Legendre's."""
+ERRORS, SPREADS = 4.0, 6.0
+"""Standard deviations of the load cell, and of v, over which is integrated."""
 
 
 class Densities(NamedTuple):
@@ -51,24 +43,15 @@ class Densities(NamedTuple):
         Of v.
     table : (nodes, points) array
         Logarithm of the density of the standardised v, in steps of `STEP` from -`REACH`.
-    groups, shares : (nodes, COARSE) arrays
-        Standardised v of a few groups of the sample, and their shares of it.
     """
 
     bound: Array
     mean: Array
     spread: Array
     table: Array
-    groups: Array
-    shares: Array
 
 
-def silverman(samples: float) -> float:
-    """Width of the kernel for a sample of unit variance that is nearly normal."""
-    return float(1.06 * samples**-0.2)
-
-
-def grouped(ordered: Array, most: int) -> tuple[Array, Array]:
+def grouped(ordered: Array) -> tuple[Array, Array]:
     """Means and shares of groups of neighbouring sorted values, ever smaller ones in the tails.
 
     Ends of groups are at equal steps of a normal variable, so that no group of a sample that is
@@ -76,7 +59,7 @@ def grouped(ordered: Array, most: int) -> tuple[Array, Array]:
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
-    ends = size * ndtr(np.linspace(-reach, reach, min(most, size) + 1))
+    ends = size * ndtr(np.linspace(-reach, reach, min(GROUPS, size) + 1))
     ends[0], ends[-1] = 0.0, size
     sums = np.concatenate(([0.0], np.cumsum(ordered)))
     share = np.diff(ends)
@@ -122,14 +105,11 @@ def tabulate(peaks: Array, bound: Array) -> Densities:
     spread = np.maximum(spread, 1e-12 * np.maximum(np.abs(mean), 1.0))
     z = np.linspace(-REACH, REACH, round(2.0 * REACH / STEP) + 1)
     table = np.empty((nodes, z.size))
-    groups, shares = np.empty((nodes, COARSE)), np.empty((nodes, COARSE))
-    width = silverman(samples)
-    for node in range(nodes):
-        ordered = np.sort((v[node] - mean[node]) / spread[node])
-        centres, share = grouped(ordered, GROUPS)
-        _log_density(centres * math.sqrt(1.0 - width**2), share, width, z, table[node])
-        groups[node], shares[node] = grouped(ordered, COARSE)
-    return Densities(bound, mean, spread, table, groups, shares)
+    width = 1.06 * samples**-0.2  # Silverman's
+    for row, own in zip(table, (v - mean[:, None]) / spread[:, None], strict=True):
+        centres, share = grouped(np.sort(own))
+        _log_density(centres * math.sqrt(1.0 - width**2), share, width, z, row)
+    return Densities(bound, mean, spread, table)
 
 
 @jit
@@ -158,6 +138,41 @@ def _blend(values: Array, index: NDArray[np.int64], weight: Array) -> float:
 
 
 @jit
+def _with_error(
+    y: float,
+    error: float,
+    bounded: bool,
+    bound: float,
+    mean: float,
+    spread: float,
+    table: Array,
+    near: NDArray[np.int64],
+    share: Array,
+) -> float:
+    """Logarithm of the density of an onset and the error of the load cell together, at y."""
+    low, high = y - ERRORS * error, y + ERRORS * error
+    if bounded:
+        high = math.log(max(y, bound) + ERRORS * error - bound)
+        low = math.log(low - bound) if low > bound else -np.inf
+    first, last = max(low, mean - SPREADS * spread), min(high, mean + SPREADS * spread)
+    if first >= last:  # all that the error reaches is far out
+        first, last = max(low, high - 2.0 * SPREADS * spread), high
+    count = 7 + int(2.0 * (last - first) / spread)
+    step = (last - first) / count
+    top, total = -np.inf, 0.0
+    for k in range(count):
+        v = first + (k + 0.5) * step
+        away = (y - (bound + math.exp(v) if bounded else v)) / error
+        value = _interpolated(table, near, share, (v - mean) / spread) - 0.5 * away * away
+        if value > top:
+            total = total * math.exp(top - value) + 1.0
+            top = value
+        else:
+            total += math.exp(value - top)
+    return top + math.log(total * step / (spread * error * math.sqrt(2.0 * math.pi)))
+
+
+@jit
 def log_likelihoods(
     index: NDArray[np.int64],
     weight: Array,
@@ -175,56 +190,26 @@ def log_likelihoods(
     density. A point whose sum would fall below `floor` even if all peaks to come were at the mode
     is given up, and the rest of its row is -inf.
     """
+    bounded, table = np.isfinite(densities.bound[0]), densities.table
     for i in range(index.shape[0]):
         near, share = index[i], weight[i]
         mean, spread = _blend(densities.mean, near, share), _blend(densities.spread, near, share)
-        bounded = np.isfinite(densities.bound[0])
         bound = _blend(densities.bound, near, share) if bounded else 0.0
         own = error / stretch[i]
         typical = spread * math.exp(mean) if bounded else spread
-        large = own > LARGE * typical
         at_mode = MODE - math.log(stretch[i] * math.hypot(typical, own))
-        hopeless, so_far = False, 0.0
+        out[i] = -np.inf
+        so_far = 0.0
         for j in range(peaks.size):
-            if hopeless:
-                out[i, j] = -np.inf
-                continue
             y = (peaks[j] - shift[i]) / stretch[i]
-            top, total = -np.inf, 0.0
-            near_bound = bounded and own > 0.0 and y - NEAR * own < bound and not large
-            width = max(y, bound) + NEAR * own - bound
-            count = _ABSCISSAE.size if own > 0.0 else 1
-            if large:
-                count = COARSE
-            elif near_bound:
-                count = _PLACES.size
-            for k in range(count):
-                if large:
-                    z = _blend(densities.groups[:, k], near, share)
-                    v = mean + spread * z
-                    away = (y - (bound + math.exp(v) if bounded else v)) / own
-                    mass = _blend(densities.shares[:, k], near, share)
-                    value = math.log(mass / (own * math.sqrt(2.0 * math.pi))) - 0.5 * away * away
-                else:
-                    x = y if own == 0.0 else y - own * _ABSCISSAE[k % _ABSCISSAE.size]
-                    if near_bound:
-                        x = bound + 0.5 * width * (1.0 + _PLACES[k])
-                    if bounded and x <= bound:
-                        continue
-                    v = math.log(x - bound) if bounded else x
-                    value = _interpolated(densities.table, near, share, (v - mean) / spread)
-                    value -= math.log(spread) + (v if bounded else 0.0)
-                    if near_bound:
-                        away = (y - x) / own
-                        part = 0.5 * width * _PARTS[k] / (own * math.sqrt(2.0 * math.pi))
-                        value += math.log(part) - 0.5 * away * away
-                    elif own > 0.0:
-                        value += math.log(_WEIGHTS[k])
-                if value > top:
-                    total = total * math.exp(top - value) + 1.0
-                    top = value
-                elif value > -np.inf:
-                    total += math.exp(value - top)
-            out[i, j] = (top + math.log(total) if total > 0.0 else -np.inf) - math.log(stretch[i])
+            value = -np.inf
+            if own > 0.0:
+                value = _with_error(y, own, bounded, bound, mean, spread, table, near, share)
+            elif not bounded or y > bound:
+                v = math.log(y - bound) if bounded else y
+                value = _interpolated(table, near, share, (v - mean) / spread)
+                value -= math.log(spread) + (v if bounded else 0.0)
+            out[i, j] = value - math.log(stretch[i])
             so_far += out[i, j]
-            hopeless = so_far + (peaks.size - 1 - j) * at_mode < floor
+            if so_far + (peaks.size - 1 - j) * at_mode < floor:
+                break

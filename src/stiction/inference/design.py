@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from pydantic import BeforeValidator
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, Model, make_model
 from stiction.inference.posterior import predicted
-from stiction.inference.prior import Prior, make_prior
+from stiction.inference.prior import make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
-from stiction.model import Count, Positive, Progress, at_least, checked, model
+from stiction.model import Names, Progress, at_least, check, checked, is_whole
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter
 from stiction.random.random_field import RandomField
@@ -36,21 +34,11 @@ VARIABLES = {
 }
 
 
-def _by_length(tests: Any) -> Any:
-    return tests if isinstance(tests, Mapping) else {None: tests}
+class Design(NamedTuple):
+    """One way to spend the tests: their number, by length (m), and which parameters are known."""
 
-
-def _listed(names: Any) -> Any:
-    return (names,) if isinstance(names, str) else names
-
-
-@model(kw_only=True)
-class Design:
-    """One way to spend the tests: their number, by length (m), what is known, and the error, Pa."""
-
-    tests: Annotated[dict[Positive | None, Count], BeforeValidator(_by_length)]
-    known: Annotated[tuple[str, ...], BeforeValidator(_listed)] = ()
-    load_cell_error: NotNegative = 0.0
+    tests: dict[float | None, int]
+    known: tuple[str, ...]
 
 
 @checked
@@ -75,10 +63,10 @@ def design_of_tests(
         As in `infer`.
     designs : mapping
         Of names to designs: a number of tests, a mapping of lengths (m) to numbers of tests, or a
-        table ``{"tests": ..., "known": [...], "load_cell_error": ...}`` in which ``known`` lists
-        parameters of the prior that are known from elsewhere, such as a marginal that was measured.
+        table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of the prior
+        that are known from elsewhere, such as a marginal that was measured.
     load_cell_error : float
-        Pa, of designs that give none.
+        Pa.
     repetitions : int
         Simulated campaigns of each design.
 
@@ -119,18 +107,18 @@ def design_of_tests(
     True
     """
     parameters = make_prior(problem, random, prior)
-    found = _designs(designs, parameters, load_cell_error)
+    found = _designs(designs, parameters.names)
     lengths = list(dict.fromkeys(length for design in found.values() for length in design.tests))
     with Meter("design of tests", show=progress) as meter:
         simulated = make_model(
-            parameters, method=method, lengths=lengths, error=0.0, samples=samples, seed=seed,
-            variable="critical_stress", meter=meter,
+            parameters, method=method, lengths=lengths, error=load_cell_error, samples=samples,
+            seed=seed, variable="critical_stress", meter=meter,
         )  # fmt: skip
         meter.stage("simulated campaigns", repetitions * len(found))
         rows = []
         for design in found.values():
             specimens = tuple(simulated.specimens[lengths.index(one)] for one in design.tests)
-            own = replace(simulated, error=design.load_cell_error, specimens=specimens)
+            own = simulated._replace(specimens=specimens)
             rows.append(_expected(own, design, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
@@ -142,24 +130,23 @@ def design_of_tests(
     return to_dataset(values, variables, coordinates, {"repetitions": repetitions})
 
 
-def _designs(given: dict[str, Any], prior: Prior, error: float) -> dict[str, Design]:
+def _designs(given: dict[str, Any], names: tuple[str, ...]) -> dict[str, Design]:
     """The designs by name, or everything that is wrong with them."""
     problems = [] if given else ["designs: are none"]
     found = {}
     for name, one in given.items():
         table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
-        try:
-            own: dict[str, Any] = {"load_cell_error": error} | dict(table)
-            design = Design(**own)
-        except InputError as mistake:
-            texts = (text.removeprefix("Design.") for text in mistake.problems)
-            problems += [f"designs: {name}: {text}" for text in texts]
-            continue
-        found[name] = design
-        unknown = [key for key in design.known if key not in prior.names]
-        problems += [unknown_name(f"designs: {name}: known", key, prior.names) for key in unknown]
-        if set(design.known) >= set(prior.names):
+        tests = table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
+        known = check("known", table.get("known", ()), Names)
+        if not tests or not all(is_whole(count, 1) for count in tests.values()):
+            problems.append(f"designs: {name}: tests: must be whole numbers >= 1, by length (m)")
+        problems += [unknown_name(f"designs: {name}", str(key), ["tests", "known"])
+                     for key in table if key not in ("tests", "known")]  # fmt: skip
+        problems += [unknown_name(f"designs: {name}: known", k, names) for k in known
+                     if k not in names]  # fmt: skip
+        if set(known) >= set(names):
             problems.append(f"designs: {name}: known: every parameter would be known")
+        found[name] = Design(dict(tests), known)
     if problems:
         raise InputError(problems)
     return found

@@ -20,7 +20,7 @@ MOST_ALONG = 512
 ZOOMS = 6
 NEGLIGIBLE = 1e-6
 """Mass outside that is given up on either side of a parameter when the grid closes in."""
-PIECE = 5_000
+BATCH = 5_000
 FIRST = 500
 """Points that tell how likely it gets."""
 HOPELESS = 40.0
@@ -58,9 +58,7 @@ class Grid:
 
     def marginal(self, axis: int) -> Array:
         """Mass of the cells along one parameter."""
-        others = tuple(i for i in range(self.mass.ndim) if i != axis)
-        result: Array = self.mass.sum(axis=others)
-        return result
+        return _along(self.mass, axis)
 
     def information(self, axis: int) -> float:
         """Divergence of the marginal of one parameter from its prior, nats."""
@@ -84,6 +82,11 @@ class Grid:
         return result
 
 
+def _along(mass: Array, axis: int) -> Array:
+    result: Array = mass.sum(axis=tuple(i for i in range(mass.ndim) if i != axis))
+    return result
+
+
 def _evaluated(function: Function, low: Array, high: Array, along: int, meter: Meter) -> Array:
     """The function at the centres of the cells of a box."""
     dimension = low.size
@@ -92,8 +95,8 @@ def _evaluated(function: Function, low: Array, high: Array, along: int, meter: M
     u = low + (high - low) * mesh.reshape(-1, dimension)
     out = np.empty(u.shape[0])
     top = float(function(u[:: max(1, u.shape[0] // FIRST)], -np.inf).max())
-    for start in range(0, u.shape[0], PIECE):
-        part = slice(start, start + PIECE)
+    for start in range(0, u.shape[0], BATCH):
+        part = slice(start, start + BATCH)
         out[part] = function(u[part], top - HOPELESS)
         top = max(top, float(out[part].max()))
         meter.advance(out[part].size)
@@ -104,22 +107,18 @@ def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """The box without the cells on either side that hold next to nothing."""
     new_low, new_high = low.copy(), high.copy()
     for axis in range(mass.ndim):
-        others = tuple(i for i in range(mass.ndim) if i != axis)
-        along = mass.sum(axis=others)
-        count = along.size
-        below = np.cumsum(along) <= NEGLIGIBLE
-        above = np.cumsum(along[::-1])[::-1] <= NEGLIGIBLE
-        first = max(int(below.sum()) - 1, 0)  # one cell of margin
-        last = min(count - int(above.sum()) + 1, count)
-        width = (high[axis] - low[axis]) / count
-        new_low[axis] = low[axis] + first * width
-        new_high[axis] = low[axis] + last * width
+        along = _along(mass, axis)
+        below = int(np.sum(np.cumsum(along) <= NEGLIGIBLE))
+        above = int(np.sum(np.cumsum(along[::-1]) <= NEGLIGIBLE))
+        width = (high[axis] - low[axis]) / along.size
+        new_low[axis] += max(below - 1, 0) * width  # one cell of margin
+        new_high[axis] -= max(above - 1, 0) * width
     return new_low, new_high
 
 
 def on_grid(likelihood: Likelihood, meter: Meter, points: int = POINTS) -> Grid | None:
     """The posterior of all parameters by sums over a grid; None if it is zero everywhere."""
-    return grid_of(likelihood, likelihood.model.low, likelihood.model.high, meter, points)
+    return grid_of(likelihood.__call__, likelihood.model.low, likelihood.model.high, meter, points)
 
 
 def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: int) -> Grid | None:
@@ -129,8 +128,7 @@ def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: i
     last, until it no longer shrinks by a tenth in any direction. The midpoint rule converges
     faster than any power of the step once a cell is narrower than the density.
     """
-    dimension = low.size
-    along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))
+    along = int(min(MOST_ALONG, max(8, points ** (1.0 / low.size))))
     for zoom in range(ZOOMS):
         values = _evaluated(function, low, high, along, meter)
         top = float(values.max())

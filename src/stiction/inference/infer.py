@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,9 @@ from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.pilot import ON_A_LINE, compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, on_grid
-from stiction.inference.likelihood import Likelihood, local_refused, make_model
+from stiction.inference.likelihood import Likelihood, Model, make_model
 from stiction.inference.onset_table import experiments_at
 from stiction.inference.peaks import Peaks, make_peaks
-from stiction.inference.plausibility import (
-    check_agreement,
-    none_within_reach,
-    out_of_reach,
-    piled_up,
-)
 from stiction.inference.posterior import Posterior, monte_carlo_errors
 from stiction.inference.prior import Prior, make_prior
 from stiction.load import NotNegative
@@ -30,6 +24,7 @@ from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.reliability.limit_state import no_single_length
 from stiction.units import factor_to
 
 DRAWS = 4000
@@ -41,6 +36,10 @@ WIDEN = 0.3
 """Width of the first posterior that is added to the box of the second on either side."""
 NEAR, HELD = 0.05, 1e-3
 """Share of the box at either end, and mass of the posterior there above which the box grows."""
+EDGE, PILED = 0.02, 4.0
+"""Share of a prior at its ends, and how many times that of the posterior is piled up there."""
+RARE = 1e-3
+"""Probability of a gap between peaks below which they are of two kinds."""
 
 
 @checked
@@ -135,102 +134,103 @@ def infer(
     """
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
-    check_pressure(parameters, measured)
-    options: dict[str, Any] = {
-        "lengths": measured.lengths,
-        "error": _load_cell(load_cell_error, unit, measured, si=isinstance(peaks, Peaks)),
-        "seed": seed,
-        "variable": measured.variable,
-    }
-    with Meter("infer", show=progress) as meter:
-        middle = parameters.theta(np.full((1, parameters.dimension), 0.5))
-        (own,) = experiments_at(parameters, middle, method)
-        own.problem.warn_of_units(own.mean("strength"))
-        likelihood, grid = _located(parameters, method, measured, samples, options, meter)
-        return _posterior(likelihood, grid, measured, seed, method, meter)
-
-
-def _load_cell(given: float, unit: str, peaks: Peaks, si: bool) -> float:
-    """The load-cell error in the unit of the checked peaks."""
-    factor = 1.0 if si else factor_to("1" if peaks.coefficients else "Pa", unit)
-    error = given * factor
-    if error > np.concatenate(peaks.values).max():
-        raise InputError(
-            f"load_cell_error: {given:g} {unit} is more than the largest peak; it is a standard"
-            " deviation in the unit of the peaks"
-        )
-    return error
-
-
-def check_pressure(prior: Prior, peaks: Peaks) -> None:
-    """Refuse coefficients of friction where no normal pressure is known."""
-    known = prior.problem.load.normal_pressure is not None
-    if peaks.coefficients and not known and "normal_pressure" not in prior.random.names:
+    known = problem.load.normal_pressure is not None
+    if measured.coefficients and not known and "normal_pressure" not in parameters.random.names:
         raise InputError(
             "peaks: are coefficients of friction, which need a normal pressure: give"
             " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
         )
+    si = "1" if measured.coefficients else "Pa"
+    error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_to(si, unit))
+    if error > np.concatenate(measured.values).max():
+        raise InputError(
+            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
+            " standard deviation in the unit of the peaks"
+        )
+    options: dict[str, Any] = {
+        "lengths": measured.lengths,
+        "error": error,
+        "seed": seed,
+        "variable": measured.variable,
+    }
+    with Meter("infer", show=progress) as options["meter"]:
+        (own,) = experiments_at(parameters, parameters.middle[None], method)
+        own.problem.warn_of_units(own.mean("strength"))
+        likelihood, grid = _located(parameters, method, measured, samples, options)
+        return _posterior(likelihood, grid, measured, seed, options["meter"])
 
 
 def _located(
-    prior: Prior,
-    method: Any,
-    peaks: Peaks,
-    samples: int | None,
-    options: Mapping[str, Any],
-    meter: Meter,
+    prior: Prior, method: Any, peaks: Peaks, samples: int | None, options: Mapping[str, Any]
 ) -> tuple[Likelihood, Grid]:
     """The likelihood in a box of the prior that holds the posterior, and the posterior."""
     low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
-    if method.type != "local_criterion" and not local_refused(prior):
-        low, high = _first_box(prior, peaks, options, meter)
+    if method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle)):
+        low, high = _first_box(prior, peaks, options)
     while True:
-        model = make_model(
-            prior, method=method, samples=samples, low=low, high=high, meter=meter, **options
-        )
+        model = make_model(prior, method=method, samples=samples, low=low, high=high, **options)
         likelihood = Likelihood(model, peaks.values)
         whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
-        if whole and (problems := out_of_reach(likelihood)):
-            raise InputError(problems)
-        meter.stage("posterior")
-        grid = on_grid(likelihood, meter)
+        if whole:
+            _check_reach(likelihood)
+        options["meter"].stage("posterior")
+        grid = on_grid(likelihood, options["meter"])
         if grid is None and whole:
             raise InputError(
                 "peaks: no point of the prior can produce all of them; widen the prior, or give"
                 " the load-cell error if they are not exact"
             )
-        new_low, new_high = (0.0 * low, 0.0 * low + 1.0) if grid is None else grown(grid, low, high)
-        if grid is not None and np.all(new_low == low) and np.all(new_high == high):
+        old = low, high
+        low, high = (0.0 * low, 0.0 * low + 1.0) if grid is None else grown(grid, low, high)
+        if grid is not None and np.array_equal(old, (low, high)):
             return likelihood, grid
-        low, high = new_low, new_high
 
 
-def _first_box(
-    prior: Prior, peaks: Peaks, options: Mapping[str, Any], meter: Meter
-) -> tuple[Array, Array]:
+def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[Array, Array]:
     """Corners, as u, between which the local criterion finds the posterior.
 
     All of the prior if it cannot produce the peaks: where nodes reach their residual strength
     before the onset, the other methods may.
     """
-    model = make_model(prior, method=LocalCriterion(), samples=None, meter=meter, **options)
+    low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
+    model = make_model(prior, method=LocalCriterion(), samples=None, **options)
     likelihood = Likelihood(model, peaks.values)
-    problems = out_of_reach(likelihood)
-    if none_within_reach(likelihood):
-        raise InputError(problems)
-    grid = None if problems else on_grid(likelihood, meter)
+    outside = _outside(likelihood)
+    if np.concatenate(outside).all():  # their unit is wrong, say
+        _check_reach(likelihood)
+    grid = None if np.concatenate(outside).any() else on_grid(likelihood, options["meter"])
     if grid is None:
-        return np.zeros(prior.dimension), np.ones(prior.dimension)
-    low, high = [], []
+        return low, high
     for axis in range(prior.dimension):
         mass, centres = np.cumsum(grid.marginal(axis)), grid.centres(axis)
-        first = float(centres[np.searchsorted(mass, LOST)])
-        end = min(int(np.searchsorted(mass, 1.0 - LOST)), centres.size - 1)
-        last = float(centres[end])
+        ends = np.searchsorted(mass, [LOST, 1.0 - LOST])
+        first, last = centres[np.minimum(ends, centres.size - 1)]
         room = max(WIDEN * (last - first), 1e-3)
-        low.append(max(0.0, first - room))
-        high.append(min(1.0, last + room))
-    return np.array(low), np.array(high)
+        low[axis], high[axis] = max(0.0, first - room), min(1.0, last + room)
+    return low, high
+
+
+def _outside(likelihood: Likelihood) -> list[Any]:
+    """Which peaks of each specimen nothing in the prior can produce."""
+    reaches = [likelihood.model.reach(number) for number in range(len(likelihood.peaks))]
+    pairs = zip(likelihood.peaks, reaches, strict=True)
+    return [(peaks < low) | (peaks > high) for peaks, (low, high, _) in pairs]
+
+
+def _check_reach(likelihood: Likelihood) -> None:
+    """Refuse peaks that nothing in the prior can produce."""
+    problems = []
+    for number, (peaks, far) in enumerate(zip(likelihood.peaks, _outside(likelihood), strict=True)):
+        low, high, places = likelihood.model.reach(number)
+        for value in peaks[far][:1]:
+            side = "below" if value < low else "above"
+            problems.append(
+                f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
+                f" {side} all that the prior can produce, {low:g} to {high:g} ({places}); widen the"
+                " prior, check the unit, or leave out tests of another kind of specimen"
+            )
+    if problems:
+        raise InputError(problems)
 
 
 def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
@@ -246,7 +246,7 @@ def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _posterior(
-    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, method: Any, meter: Meter
+    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, meter: Meter
 ) -> Posterior:
     model = likelihood.model
     prior = model.prior
@@ -263,24 +263,22 @@ def _posterior(
         monte_carlo_error=errors,
         method=model.method.label,
         peaks=peaks,
-        notes=_notes(likelihood, errors, u, method),
+        notes=_notes(likelihood, errors, u),
         likelihood=likelihood,
         u=u,
         seed=seed,
     )
-    check_agreement(peaks, posterior.predicted)
+    _check_agreement(peaks, posterior.predicted)
     return posterior
 
 
-def _notes(
-    likelihood: Likelihood, errors: Mapping[str, float], u: Array, method: Any
-) -> tuple[str, ...]:
+def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tuple[str, ...]:
     """What limits the posterior; what is serious is a warning as well."""
     model = likelihood.model
     worst = max(errors, key=lambda name: errors[name])
-    serious: list[str | None] = [piled_up(model, u)]
+    serious: list[str | None] = [_piled_up(model, u)]
     middle = model.prior.theta(u.mean(axis=0, keepdims=True))
-    (experiment,) = experiments_at(model.prior, middle, method)
+    (experiment,) = experiments_at(model.prior, middle, model.method)
     if pilot := compare(experiment, experiment.draws(0, 0, ON_A_LINE)):
         serious.append(doubt(pilot))
     if errors[worst] > TOLERABLE:
@@ -295,3 +293,42 @@ def _notes(
     if model.scaling.reason:
         notes.append(f"every parameter was simulated: {model.scaling.reason}")
     return tuple(notes)
+
+
+def _piled_up(model: Model, u: Array) -> str:
+    """Where draws (draws, parameters) of the posterior pile up at an end of the prior, or nothing.
+
+    The box that was simulated needs no such look: it grew until it held the posterior.
+    """
+    texts = []
+    for name, own, ends in zip(model.prior.names, u.T, model.prior.ends.T, strict=True):
+        for side, near, end in zip(
+            ("lower", "upper"), (own < EDGE, own > 1.0 - EDGE), ends, strict=True
+        ):
+            if near.mean() > PILED * EDGE:
+                texts.append(f"the {side} end of {name}, {end:g}, holds {near.mean():.0%} of it")
+    if not texts:
+        return ""
+    return (
+        f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within {EDGE:.0%} of"
+        " the prior; where such an end is a guess, so is the result"
+    )
+
+
+def _check_agreement(peaks: Peaks, predicted: Sequence[Array]) -> None:
+    """Warn of peaks with a gap among them that one population would hardly show.
+
+    The largest gap between neighbours, in terms of the predicted distribution; the chance of one
+    so large among n uniform numbers is at most (n - 1) (1 - gap)^n.
+    """
+    for values, own in zip(peaks.values, predicted, strict=True):
+        ordered = np.sort(values)
+        gaps = np.diff(np.searchsorted(np.sort(own), ordered) / own.size)
+        widest = float(gaps.max(initial=0.0))
+        chance = (ordered.size - 1) * (1.0 - widest) ** ordered.size
+        if gaps.size and chance < RARE:
+            first, second = ordered[gaps.argmax() :][:2]
+            warn_accuracy(
+                f"peaks: none lies between {first:g} and {second:g}, where {widest:.0%} are"
+                f" expected (probability {chance:.1g}): are two kinds of specimens mixed?"
+            )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -33,16 +33,17 @@ ALIKE = 0.8
 """Correlation of onsets by two methods from which on one helps the other."""
 SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
+BEYOND = 2.0
+"""Spreads beyond the extremes of all simulated peaks from which on a peak is out of reach."""
+ERRORS = 5.0
+"""Standard deviations of the load cell beyond that."""
 
 
-@dataclass(frozen=True, eq=False)
-class Specimen:
+class Specimen(NamedTuple):
     """What is simulated of one kind of specimen.
 
     Attributes
     ----------
-    length : float or None
-        m; None for the problem's own interface.
     onsets : (nodes, samples) array
         Onsets of the same samples at every node, in the unit of the peaks.
     local : (nodes, more samples) array or None
@@ -55,7 +56,6 @@ class Specimen:
         Of the peaks.
     """
 
-    length: float | None
     onsets: Array
     local: Array | None
     bound: Array
@@ -63,10 +63,10 @@ class Specimen:
     densities: Densities
 
     @classmethod
-    def of(cls, length: float | None, onsets: Array, local: Array | None, bound: Array) -> Self:
+    def of(cls, onsets: Array, local: Array | None, bound: Array) -> Self:
         """Estimate the densities of simulated onsets."""
         peaks = onsets if local is None else moved(onsets, local)
-        return cls(length, onsets, local, bound, peaks, tabulate(peaks, bound))
+        return cls(onsets, local, bound, peaks, tabulate(peaks, bound))
 
     def without(self, batch: int) -> Densities:
         """Densities from all samples but those of one batch."""
@@ -75,11 +75,10 @@ class Specimen:
             return values[:, np.arange(values.shape[1]) % BATCHES != batch]
 
         local = None if self.local is None else kept(self.local)
-        return self.of(self.length, kept(self.onsets), local, self.bound).densities
+        return self.of(kept(self.onsets), local, self.bound).densities
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+class Model(NamedTuple):
     """All that does not depend on the data: made once, used for any number of data sets.
 
     Attributes
@@ -123,6 +122,27 @@ class Model:
         )
         return out
 
+    def reach(self, number: int) -> tuple[float, float, str]:
+        """Least and greatest peak of specimen `number` in the prior, and at which parameters."""
+        own, keys = self.specimens[number], list(self.scaling.keys)
+        spread = BEYOND * own.peaks.std(axis=1)
+        lowest = np.maximum(own.peaks.min(axis=1) - spread, own.densities.bound)
+        highest = own.peaks.max(axis=1) + spread
+        theta, least, most = [], [], []
+        for corner in itertools.product(*self.prior.theta(np.stack([self.low, self.high])).T[keys]):
+            theta.append(nodes_of(self.axes, self.scaling.reference))
+            theta[-1][:, keys] = corner
+            shift, stretch = self.scaling.of(theta[-1])
+            least.append(shift + stretch * lowest - ERRORS * self.error)
+            most.append(shift + stretch * highest + ERRORS * self.error)
+        at = np.concatenate(theta)[[np.argmin(least), np.argmax(most)]]
+        ends = [
+            ", ".join(f"{name} = {v:.6g}" for name, v in zip(self.prior.names, own, strict=True))
+            for own in at
+        ]
+        text = f"the lowest come from {ends[0]}, the highest come from {ends[1]}"
+        return float(np.min(least)), float(np.max(most)), text
+
 
 def make_model(
     prior: Prior,
@@ -159,7 +179,7 @@ def make_model(
     axes = make_axes(prior, scaling, low, high)
     thetas = nodes_of(axes, scaling.reference)
     count = SAMPLES.get(method.type, FEW) if samples is None else samples
-    helped = method.type != "local_criterion" and not local_refused(prior)
+    helped = method.type != "local_criterion" and no_single_length(*prior.at(prior.middle)) is None
     more = max(count, SAMPLES["local_criterion"]) if helped else 0
     meter.stage("simulated onsets", len(thetas) * len(lengths) * (count + more))
     specimens = []
@@ -167,35 +187,28 @@ def make_model(
         experiments = experiments_at(prior, thetas, method, length)
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
-        first = number * SPECIMEN
-        options: Any = {"first": first, "seed": seed, "variable": variable, "meter": meter}
+        options: Any = {"seed": seed, "variable": variable, "meter": meter}
+        options["first"] = number * SPECIMEN
         onsets, local = simulate(experiments, samples=count, **options), None
         if helped:
-            local = simulate([own.by(LocalCriterion()) for own in experiments], samples=more,
-                             **options)  # fmt: skip
-            local = local if alike(onsets, local) else None
+            others = [own.by(LocalCriterion()) for own in experiments]
+            local = simulate(others, samples=more, **options)
+            # What `moved` saves outweighs what it adds from a correlation of 0.63 on.
+            pairs = zip(onsets, local[:, :count], strict=True)
+            if not np.mean([np.corrcoef(*pair)[0, 1] for pair in pairs]) > ALIKE:
+                local = None
         bound = np.array([least_peak(own, variable) for own in experiments])
-        specimens.append(Specimen.of(length, onsets, local, bound))
+        specimens.append(Specimen.of(onsets, local, bound))
     return Model(prior, method, scaling, axes, error, tuple(specimens), low, high)
 
 
 def least_peak(experiment: Experiment, variable: str) -> float:
     """Least possible peak; -inf where none is known."""
-    own = experiment
-    bound = LimitState(own).bounds[0]
+    bound = LimitState(experiment).bounds[0]
     if variable != "friction_coefficient":
         return bound
-    return -np.inf if "normal_pressure" in own.random.names else bound / own.pressure
-
-
-def alike(onsets: Array, local: Array) -> bool:
-    """Whether onsets by the local criterion (points, more) tell those by another method.
-
-    What `moved` saves outweighs what it adds from a correlation of 0.63 on.
-    """
-    pairs = zip(onsets, local, strict=True)
-    found = [np.corrcoef(few, many[: few.size])[0, 1] for few, many in pairs]
-    return bool(np.mean(found) > ALIKE)
+    random_pressure = "normal_pressure" in experiment.random.names
+    return -np.inf if random_pressure else bound / experiment.pressure
 
 
 def moved(few: Array, many: Array) -> Array:
@@ -205,28 +218,14 @@ def moved(few: Array, many: Array) -> Array:
     the quantiles of the few is added to the many.
     """
     result = np.empty_like(many)
-    for row, (exact, local) in enumerate(zip(few, many, strict=True)):
+    for row, exact, local in zip(result, few, many, strict=True):
         known = np.sort(local[: exact.size])
-        result[row] = local + np.interp(local, known, np.sort(exact) - known)
+        row[:] = local + np.interp(local, known, np.sort(exact) - known)
     return result
 
 
-def local_refused(prior: Prior) -> str | None:
-    """Why the local criterion cannot be a first stage, at the middle of the prior."""
-    problem, random = prior.at(prior.theta(np.full((1, prior.dimension), 0.5))[0])
-    return no_single_length(problem, random)
-
-
-@dataclass(frozen=True, eq=False)
-class Likelihood:
-    """A model and data.
-
-    Attributes
-    ----------
-    model : Model
-    peaks : tuple of arrays
-        Of each specimen.
-    """
+class Likelihood(NamedTuple):
+    """A model and data: peaks of each specimen."""
 
     model: Model
     peaks: tuple[Array, ...]
@@ -234,13 +233,11 @@ class Likelihood:
     def each(self, u: Array, floor: float = -np.inf) -> Array:
         """Logarithm of the likelihood of each test at points u (points, parameters)."""
         theta = self.model.prior.theta(u)
-        return np.concatenate(
-            [
-                self.model.log_densities(number, theta, peaks, floor=floor)
-                for number, peaks in enumerate(self.peaks)
-            ],
-            axis=1,
-        )
+        found = [
+            self.model.log_densities(number, theta, peaks, floor=floor)
+            for number, peaks in enumerate(self.peaks)
+        ]
+        return np.concatenate(found, axis=1)
 
     def __call__(self, u: Array, floor: float = -np.inf) -> Array:
         """Logarithm of the likelihood at points u (points, parameters).

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,7 @@ LOG = 3.0
 """Parameters whose prior spans this ratio or more are interpolated in their logarithm."""
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(NamedTuple):
     """Nodes of one simulated parameter.
 
     Attributes
@@ -64,10 +63,9 @@ def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in NODES:
         names = ", ".join(prior.names[i] for i in simulated)
-        why = f" ({scaling.reason})" if scaling.reason else ""
         raise InputError(
-            f"prior: {len(simulated)} parameters would have to be simulated on a grid, {names}"
-            f"{why}; at most {max(NODES)} are possible: give the best known a value"
+            f"prior: {len(simulated)} parameters would have to be simulated on a grid, {names}; at"
+            f" most {max(NODES)} are possible: give the best known a value"
         )
     ends = prior.theta(np.array([low, high]))
     axes = []
@@ -84,11 +82,9 @@ def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
 
     Parameters that scale are at their reference.
     """
-    steps = list(itertools.product(*(axis.values for axis in axes)))
+    steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
-    for row, step in zip(result, steps, strict=True):
-        for axis, value in zip(axes, step, strict=True):
-            row[axis.parameter] = value
+    result[:, [axis.parameter for axis in axes]] = steps
     return result
 
 
@@ -103,26 +99,15 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
     return index, weight
 
 
-def with_length(problem: Any, length: float) -> Any:
-    """The problem of a specimen of another length, m, with the same distance of nodes.
-
-    Raises
-    ------
-    InputError
-        If it is a plane, or has profiles, which belong to its own length.
-    """
+def _with_length(problem: Any, length: float) -> Any:
+    """The problem of a specimen of another length, m, with the same distance of nodes."""
     own = problem.interface
     if own.is_plane:
         raise InputError("peaks: lengths of specimens are of lines; the interface is a plane")
     if np.isclose(length, own.extent, rtol=1e-9):
         return problem
     nodes = 2 * max(4, round(0.5 * length / own.spacing))
-    try:
-        return replace(problem, interface=Interface(length, nodes))
-    except InputError as error:
-        raise InputError(
-            [f"peaks: a specimen of {length:g} m: {t}" for t in error.problems]
-        ) from None
+    return replace(problem, interface=Interface(length, nodes))
 
 
 def experiments_at(
@@ -138,13 +123,11 @@ def experiments_at(
     found = []
     for theta in thetas:
         problem, random = prior.at(theta)
-        problem = problem if length is None else with_length(problem, length)
         try:
+            problem = problem if length is None else _with_length(problem, length)
             found.append(Experiment(problem, random, method))
         except InputError as error:
-            raise InputError(
-                [f"prior: at {prior.text(theta)}: {text}" for text in error.problems]
-            ) from None
+            raise prior.named(error, theta) from None
     return found
 
 

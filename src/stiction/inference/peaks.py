@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,8 +69,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
         return peaks
     factor, coefficients = _unit(unit)
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
-    wrong = [key for key in groups if key is not None and not (is_finite(key) and key > 0.0)]
-    if wrong or not groups:
+    if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
             "peaks: of several specimens must map each length (m) to its peaks, such as"
             f" {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
@@ -83,30 +82,35 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             values.append(factor * _values(name, given, unit))
         except InputError as error:
             problems += error.problems
-    problems = problems or _doubtful(np.concatenate(values), coefficients)
     if problems:
         raise InputError(problems)
+    every = np.concatenate([np.zeros(0), *values])
+    if every.size < FEWEST or np.ptp(every) == 0.0:
+        raise InputError(
+            f"peaks: are {every.size}, {np.unique(every).size} of them different; at least"
+            f" {FEWEST} that scatter are needed, and fewer than about ten constrain little: see"
+            " st.design_of_tests"
+        )
     lengths = tuple(None if length is None else float(length) for length in groups)
     return Peaks(lengths, tuple(values), coefficients)
 
 
 def _unit(unit: Any) -> tuple[float, bool]:
     """Factor to SI, and whether the unit is that of a pure number."""
-    if not isinstance(unit, str):
-        raise InputError(f"unit: must be text such as 'MPa' or '1', got {describe(unit)}")
-    for si, coefficients in (("1", True), ("Pa", False)):
-        try:
-            return factor_to(si, unit), coefficients
-        except InputError as error:
-            problems = error.problems
     try:
-        factor_to("N", unit)
+        return factor_to("1", unit), True
     except InputError:
-        raise InputError([f"unit: {text}" for text in problems]) from None
-    raise InputError(
-        f"unit: peaks are in {unit}, a force; divide by the area of the interface and give a"
-        " stress, or by the normal force and give a coefficient of friction (unit = '1')"
-    )
+        pass
+    try:
+        return factor_to("Pa", unit), False
+    except InputError as error:
+        raise InputError(
+            [
+                f"unit: {text}; divide a force by the area of the interface, or by the normal force"
+                " for a coefficient of friction (unit = '1')"
+                for text in error.problems
+            ]
+        ) from None
 
 
 def _values(name: str, given: Any, unit: str) -> Array:
@@ -115,40 +119,22 @@ def _values(name: str, given: Any, unit: str) -> Array:
     values = np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
     if values.ndim != 1:
         raise InputError(
-            f"{name}: must be one list of numbers for one kind of specimen, got"
-            f" {describe(given)}; of several specimens map each length (m) to its peaks:"
-            " {0.1: [...], 0.2: [...]}"
+            f"{name}: must be one list of numbers for one kind of specimen, got {describe(given)};"
+            " of several map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
-        more = f", and {bad.size - 1} more are not positive" if bad.size > 1 else ""
         raise InputError(
-            f"{name}: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}{more}; leave"
-            " out tests that gave no peak"
+            f"{name}: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
+            " tests that gave no peak"
         )
     stated = getattr(given, "attrs", {}).get("units")
-    if stated is not None:
-        (own, coefficients), (asked, expected) = _unit(str(stated)), _unit(unit)
-        if coefficients != expected:
-            raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
-        values = values * (own / asked)
-    return values
-
-
-def _doubtful(values: Array, coefficients: bool) -> list[str]:
-    if values.size < FEWEST:
-        return [
-            f"peaks: are {values.size}; at least {FEWEST} are needed, and fewer than about ten"
-            " constrain little: see st.design_of_tests"
-        ]
-    if np.ptp(values) == 0.0:
-        return [
-            f"peaks: are all {values[0]:g}; tests scatter, so digits were lost or one test was"
-            " written down many times"
-        ]
-    if coefficients and np.median(values) > 50.0:
-        return [f"peaks: coefficients of friction of {np.median(values):g}? give their unit"]
-    return []
+    if stated is None:
+        return values
+    (own, coefficients), (asked, expected) = _unit(str(stated)), _unit(unit)
+    if coefficients != expected:
+        raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
+    return values * (own / asked)
 
 
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
@@ -191,13 +177,12 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
 
 def _from_table(table: Any, unit: str | None) -> Peaks:
     names = list(table.data_vars)
-    peak = _column(names, PEAK, "peak")
+    peak, length = _column(names, PEAK), _column(names, LENGTH)
     if peak is None and len(names) == 1:
-        peak = 0
+        peak = names[0]
     if peak is None:
         raise InputError(f"no column is called peak [MPa] or the like; found {', '.join(names)}")
-    peaks = table[names[peak]]
-    stated = peaks.attrs.get("units", unit)
+    stated = table[peak].attrs.get("units", unit)
     if stated is None:
         raise InputError(
             "the unit of the peaks is not stated; write it into the heading, 'peak [MPa]', or give"
@@ -205,24 +190,23 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
         )
     if unit is not None and unit != stated:
         raise InputError(f"the peaks are in {stated} by the heading, but unit = {unit!r}")
-    values, column = peaks.values, _column(names, LENGTH, "length")
-    if column is None:
+    values = table[peak].values
+    if length is None:
         return make_peaks(values, stated)
-    length = table[names[column]]
-    if "units" not in length.attrs:
+    if "units" not in table[length].attrs:
         raise InputError("the unit of the length is not stated; write 'length [mm]'")
-    lengths = length.values * factor_to("m", length.attrs["units"])
+    lengths = table[length].values * factor_to("m", table[length].attrs["units"])
     if not np.isfinite(lengths).all():
         line = int(np.argmin(np.isfinite(lengths)))
         raise InputError(f"length: missing in row {line}; specimens of unknown length are mixed in")
     return make_peaks({one: values[lengths == one] for one in np.unique(lengths)}, stated)
 
 
-def _column(names: Any, kinds: tuple[str, ...], what: str) -> int | None:
+def _column(names: Sequence[str], kinds: tuple[str, ...]) -> str | None:
     """The one column whose name begins with one of some words."""
-    words = [str(name or "").lower().split() for name in names]
-    found = [i for i, word in enumerate(words) if word and word[0].strip("_:.") in kinds]
+    words = [(name, name.lower().split()) for name in names]
+    found = [name for name, word in words if word and word[0].strip("_:.") in kinds]
     if len(found) > 1:
-        both = " and ".join(repr(names[i]) for i in found)
-        raise InputError(f"{both} may both be the {what}; rename one")
+        both = " and ".join(map(repr, found))
+        raise InputError(f"{both} may both be the {kinds[0]}; rename one")
     return found[0] if found else None

@@ -15,7 +15,7 @@ from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.onset_table import corners
 from stiction.inference.peaks import Peaks
-from stiction.model import Numbers, check, describe, is_finite
+from stiction.model import Numbers, check, describe
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
@@ -61,18 +61,13 @@ class Posterior:
     u: Array = field(repr=False)
     seed: int = 0
 
-    def _draws(self, name: str) -> Array:
-        if name not in self.draws:
-            raise InputError(f"name: must be one of {', '.join(self.names)}, got {describe(name)}")
-        return self.draws[name]
-
     @property
     def _prior(self) -> Any:
         return self.likelihood.model.prior
 
     def mean(self, name: str) -> float:
         """Return the posterior mean of a parameter."""
-        return float(self._draws(name).mean())
+        return float(self.draws[name].mean())
 
     def interval(self, name: str, confidence: float = 0.9) -> tuple[float, float]:
         """Return the central credible interval of a parameter.
@@ -83,21 +78,16 @@ class Posterior:
         confidence : float
             Between 0 and 1.
         """
-        low, high = np.quantile(self._draws(name), _tails(confidence))
-        return float(low), float(high)
-
-    def prior_interval(self, name: str, confidence: float = 0.9) -> tuple[float, float]:
-        """Return the same interval of the prior."""
-        self._draws(name)
-        u = np.tile(_tails(confidence)[:, None], (1, len(self.names)))
-        low, high = self._prior.theta(u)[:, self.names.index(name)]
+        if not 0.0 < confidence < 1.0:
+            raise InputError(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
+        tail = 0.5 - 0.5 * confidence
+        low, high = np.quantile(self.draws[name], [tail, 1.0 - tail])
         return float(low), float(high)
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and what is random at one draw, to compute with."""
-        found: tuple[Problem, RandomInterface] = self._prior.at(
-            np.array([self.draws[name][draw] for name in self.names])
-        )
+        theta = np.array([self.draws[name][draw] for name in self.names])
+        found: tuple[Problem, RandomInterface] = self._prior.at(theta)
         return found
 
     def prior_transform(self, u: Any) -> Array:
@@ -107,7 +97,7 @@ class Posterior:
         ----------
         u : (parameters,) or (points, parameters) array
         """
-        given = check("u", u, Numbers)
+        given = self._points("u", u)
         found: Array = self._prior.theta(np.atleast_2d(given)).reshape(given.shape)
         return found
 
@@ -124,14 +114,18 @@ class Posterior:
         float or (points,) array
             -inf outside the prior.
         """
-        given = check("theta", theta, Numbers)
-        wanted = len(self.names)
-        if given.ndim not in (1, 2) or given.shape[-1] != wanted:
-            raise InputError(
-                f"theta: must have shape ({wanted},) or (points, {wanted}), got {given.shape}"
-            )
+        given = self._points("theta", theta)
         found = self.likelihood(self._prior.u(np.atleast_2d(given)))
         return float(found[0]) if given.ndim == 1 else found
+
+    def _points(self, name: str, given: Any) -> Array:
+        points: Array = check(name, given, Numbers)
+        wanted = len(self.names)
+        if points.ndim not in (1, 2) or points.shape[-1] != wanted:
+            raise InputError(
+                f"{name}: must have shape ({wanted},) or (points, {wanted}), got {points.shape}"
+            )
+        return points
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
@@ -153,13 +147,10 @@ class Posterior:
             raise InputError(
                 "to_arviz: needs the package arviz; pip install 'stiction[inference]'"
             ) from None
-        count = self.u.shape[0]
         before = self._prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
-        kinds = list(zip(self.peaks.lengths, self.peaks.values, strict=True))
-        lengths = [np.full(own.size, np.nan if at is None else at) for at, own in kinds]
         more = [
-            np.broadcast_to(peaks[:, None], (count, own.size))
-            for peaks, (_, own) in zip(self.predicted, kinds, strict=True)
+            np.repeat(one[:, None], own.size, axis=1)
+            for one, own in zip(self.predicted, self.peaks.values, strict=True)
         ]
         name = "friction_coefficient" if self.peaks.coefficients else "peak"
         return arviz.from_dict(
@@ -168,30 +159,22 @@ class Posterior:
             log_likelihood={name: self.likelihood.each(self.u)[None]},
             posterior_predictive={name: np.concatenate(more, axis=1)[None]},
             observed_data={name: np.concatenate(self.peaks.values)},
-            constant_data={"specimen_length": np.concatenate(lengths)},
             coords={"test": np.arange(self.peaks.count)},
-            dims={name: ["test"], "specimen_length": ["test"]},
-            attrs={"method": self.method},
+            dims={name: ["test"]},
         )
 
     def __str__(self) -> str:
         width = max(map(len, self.names))
         lines = [f"{self.peaks}; onset by {self.method}"]
-        for name in self.names:
+        prior = self._prior.theta(np.repeat([[0.05], [0.95]], len(self.names), axis=1)).T
+        for name, before in zip(self.names, prior, strict=True):
             low, high = self.interval(name)
-            before = self.prior_interval(name)
             lines.append(
                 f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g}"
                 f" (prior {before[0]:.4g} to {before[1]:.4g}), {self.information[name]:.2f} nats"
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
-
-
-def _tails(confidence: float) -> Array:
-    if not (is_finite(confidence) and 0.0 < confidence < 1.0):
-        raise InputError(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
-    return np.array([0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence])
 
 
 def predicted(model: Model, number: int, u: Array, seed: int) -> Array:

@@ -21,8 +21,7 @@ everywhere only if the normal pressure is; where it varies, a must be zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,8 +32,7 @@ MARGINAL = "random.strength.marginal."
 PRESSURE = "problem.load.normal_pressure"
 
 
-@dataclass(frozen=True, eq=False)
-class Scaling:
+class Scaling(NamedTuple):
     """Parameters that shift and stretch the onset, and how.
 
     Attributes
@@ -65,19 +63,10 @@ class Scaling:
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
-    """Find which parameters of a prior scale the onset by a method.
-
-    Parameters
-    ----------
-    prior : Prior
-    method : Method
-    variable : {"critical_stress", "friction_coefficient"}
-        What the peaks are.
-    """
-    middle = prior.theta(np.full((1, prior.dimension), 0.5))[0]
+    """Find which parameters of a prior scale the onset; `variable` is what the peaks are."""
+    middle = prior.middle
     problem, random = prior.at(middle)
-    reason = _no_scaling(prior, problem, random, method)
-    if reason:
+    if reason := _no_scaling(prior, problem, random, method):
         return _none(middle, reason)
     field = random.strength
     names, (location, scale) = field.marginal.affine, field.marginal.location_and_scale

@@ -10,7 +10,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
-from stiction.inference.prior import full_key, with_parameters
+from stiction.inference.prior import with_parameters
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Names, Numbers, at_least, check, checked, describe
@@ -73,15 +73,12 @@ def simulator(
     >>> simulate([2e-3, 0.66e6]).shape
     (25,)
     """
-    names = parameters
-    if not names or len({full_key(name) for name in names}) < len(names):
-        raise InputError(f"parameters: must be different names, got {describe(list(names))}")
     interface = as_random_interface(random)
 
     def simulate(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
         first = check("first", first, at_least(0))
-        changed = with_parameters(problem, interface, names, _values(theta, names))
+        changed = with_parameters(problem, interface, parameters, _values(theta, parameters))
         experiment = Experiment(*changed, method)
         peaks: Array = np.concatenate(
             [

@@ -99,8 +99,9 @@ class SpectrumFamily:
 
     def vector(self, model: Model) -> Array:
         """The parameters of a model."""
-        found = [getattr(model, name, getattr(model.spectrum, name, None)) for name in self.free]
-        return np.array([_forth(n, float(v)) for n, v in zip(self.free, found, strict=True)])
+        of = {name: model.spectrum for name in ("correlation_length", "exponent")}
+        found = [(name, float(getattr(of.get(name, model), name))) for name in self.free]
+        return np.array([_forth(*one) for one in found])
 
 
 def _forth(name: str, value: float) -> float:
