@@ -61,9 +61,9 @@ def test_slip_converges_with_second_order_in_space():
 def test_implicit_steps_approach_the_explicit_solution():
     """The same slow onset by explicit steps only, and by implicit steps of two sizes."""
     solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
-    interface = st.Interface(length=0.1, nodes=256)
+    interface = st.Interface(length=0.05, nodes=128)
     problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=2e11))
-    strength = 1e6 - 3e5 * np.exp(-(((interface.x - 0.05) / 0.01) ** 2))
+    strength = 1e6 - 3e5 * np.exp(-(((interface.x - 0.025) / 0.01) ** 2))
     rows = problem.sample(strength)
 
     def stress(**options):

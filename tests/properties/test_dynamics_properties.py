@@ -114,7 +114,13 @@ def test_the_pass_over_the_memory_meets_whole_cache_lines(tmp_path):
     path = tmp_path / "state.npz"
     write_checkpoint(path, run, state)
     again = read_checkpoint(path, run, run.start(0.0))
-    for array in (state.memory, again.memory, again.carried, run.tables.table, run.tables.packed):
+    for array in (
+        state.memory,
+        again.memory,
+        again.memory_sum,
+        run.tables.table,
+        run.tables.packed,
+    ):
         assert array.ctypes.data % 64 == 0
 
 
@@ -150,7 +156,7 @@ def test_radiated_energy_is_steady_after_arrest():
     held = float(state.now["load"])
     run.history[0][:] = [0.0, 1e9]
     run.history[1][:] = [held, held * (1.0 + 1e-15)]
-    thresholds = run.thresholds._replace(explicit_only=True, calm_count=10**9)
+    thresholds = run.setting.thresholds._replace(explicit_only=True, calm_count=10**9)
     run.setting = run.setting._replace(thresholds=thresholds)
 
     def radiated():

@@ -98,8 +98,8 @@ def test_a_restart_records_the_rest_to_the_bit(case, tmp_path):
         (PLANE, {"a": 0.01}, r"must be a pair \(x, y\)"),
         (PLANE, {"a": (0.01, np.nan)}, r"must be a place x or \(x, y\)"),
         (PLANE, {"a": (-0.01, 0.0)}, "from the first node"),
-        (LINE, {3: 0.01}, "a name must be a text"),
-        (LINE, [0.01], "must be names and places"),
+        (LINE, {3: 0.01}, "stations.*must be text"),
+        (LINE, [0.01], "stations: must be a valid dictionary"),
     ],
 )
 def test_stations_that_are_no_places_are_refused(problem, stations, text):

@@ -85,7 +85,7 @@ def test_a_first_instability_at_a_negative_mean_stress_is_kept(monkeypatch):
     now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
     now.first_stress = now.kinetic_stress = -np.inf
     now.peak_stress = now.local_stress = -9.0
-    now.event_drop, now.peak_width = 1.0, 0.1
+    now.scale = 1e4  # an event is a fall by 1
     events = [(-8.0, 0.0), (-9.5, 1.6), (-9.4, 0.0), (-6.0, 0.0), (-7.5, 2.0), (-5.9, 0.0)]
     for i, (mean, radiated) in enumerate(events):
         step = diagnostics.Step(float(i), 1.0, 0.0, 0.0, radiated, 0.0, 0, radiated, i)

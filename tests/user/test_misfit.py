@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.dynamics.misfit import read_record
 from stiction.statistics import misfit
 
 LENGTH, NODES = 0.1, 200
@@ -62,35 +61,6 @@ def test_units_gaps_and_single_gauges():
     assert misfit(RUN, record().isel(x=0)).by_gauge.shape == (1,)
 
 
-def test_strain_is_half_the_derivative_of_slip():
-    wave = 2.0 * np.pi / LENGTH
-    growth = np.linspace(0.0, 1.0, 60)
-    run = xr.Dataset(
-        {"slip": (("time", "x"), 1e-6 * growth[:, None] * np.sin(wave * X)[None, :])},
-        coords={"time": np.linspace(0.0, 1e-3, 60), "x": X},
-    )
-    times = np.linspace(0.0, 1e-3, 60)
-    strain = 0.5e-6 * wave * growth[:, None] * np.cos(wave * np.array([[0.02, 0.06]]))
-    measured = xr.DataArray(
-        strain, coords={"time": times, "x": [0.02, 0.06]}, dims=("time", "x"), name="strain"
-    )
-    assert misfit(run, measured, align=False).misfit < 1e-9
-
-
-def write(path, text):
-    path.write_text(text)
-    return path
-
-
-def test_a_record_from_a_file(tmp_path):
-    text = "time [us], slip rate at 30 mm [mm/s], slip rate at 5 cm [mm/s]\n0,1,2\n10,3,4\n"
-    found = read_record(write(tmp_path / "gauges.csv", text))
-    assert found.name == "slip_rate"
-    np.testing.assert_allclose(found.x, [0.03, 0.05])
-    np.testing.assert_allclose(found.time, [0.0, 1e-5])
-    np.testing.assert_allclose(found, [[1e-3, 2e-3], [3e-3, 4e-3]])
-
-
 BAD = {
     "no such quantity": (
         lambda: misfit(RUN, record(name="speed")),
@@ -119,21 +89,6 @@ def test_mistakes(name):
         call()
     for text in texts:
         assert text in str(caught.value)
-
-
-FILES = {
-    "no unit of time": ("time, slip at 3 mm [um]\n0,1\n1,2\n", "unit of 'time'"),
-    "no place": ("time [us], slip [um]\n0,1\n1,2\n", "what and where"),
-    "mixed": ("time [us], slip at 3 mm [um], strain at 4 mm [1]\n0,1,1\n1,2,2\n", "one quantity"),
-    "wrong unit": ("time [us], slip at 3 mm [MPa]\n0,1\n1,2\n", "no unit of length"),
-}
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_files_that_are_not_taken(name, tmp_path):
-    text, part = FILES[name]
-    with pytest.raises(st.InputError, match=part):
-        read_record(write(tmp_path / "gauges.csv", text))
 
 
 def test_records_of_stations_are_compared_where_gauges_have_them():

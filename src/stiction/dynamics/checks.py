@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.dynamics.implicit import LARGEST_STEP
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.state import NOT_FINITE, State
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import FEWEST_NODES, Problem, Sample
 
-SLOWEST = 1e20  # s to the first slip, beyond which sizes of implicit steps lose their meaning
 _COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
 
 
@@ -25,13 +25,11 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     # at 8, 16 and 32 nodes.
     percent = 3.0 * (16.0 / resolution) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-    where = ""
-    if not rows.uniform_weakening:
-        where = f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
+    where = f" of the steepest weakening, W = {rows.steepest_rate:.3g} Pa/m,"
+    where = "" if rows.uniform_weakening else where
     warn_accuracy(
         f"the nucleation length{where} spans {resolution:.1f} nodes: expect {expected} error in "
-        "slip just after onset (3 % at 16 nodes, 0.6 % at 32; the critical load is far less "
-        "sensitive)"
+        "slip just after onset (3 % at 16 nodes, 0.6 % at 32); the critical load is less sensitive"
     )
 
 
@@ -44,35 +42,28 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
-            " grid to resolve how they break; take more nodes, or infinite strength for barriers "
-            "that never break"
+            " grid; take more nodes, or infinite strength for barriers that never break"
         )
 
 
 def check_start(run: Run, time: float) -> None:
-    """Refuse or warn of loading that a run from a time (s) cannot follow.
-
-    Raises
-    ------
-    InputError
-    """
-    if time > SLOWEST:
+    """Refuse or warn of loading that a run from a time (s) cannot follow."""
+    if time > LARGEST_STEP:
         raise InputError(
-            f"loading_rate: the first slip would come after {time:.3g} s, more than {SLOWEST:g} s;"
-            " load faster (the onset no longer depends on the rate)"
+            f"loading_rate: the first slip would come after {time:.3g} s, more than "
+            f"{LARGEST_STEP:g} s; load faster (the onset no longer depends on the rate)"
         )
     step = run.medium.step
     if not resolves_steps(run, time):
         warn_accuracy(
             f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
-            f"steps of {step:.2g} s apart: rupture speeds are nan, times rounded; loads "
-            "and energies are not affected"
+            f"steps of {step:.2g} s apart: rupture speeds are nan, times rounded"
         )
     scale = run.scale_at(float(load_at(*run.history, time)))
     if not scale > 0.0:
         raise InputError(
-            "initial_stress: is so far from the strength that no scale of stress is left between"
-            " them; check the units of both"
+            "initial_stress: too far from the strength for any scale of stress between them; "
+            "check the units of both"
         )
     rise = run.slope(time) * step / scale
     if rise > _COARSE:

@@ -1,10 +1,9 @@
 """One implicit step: slip increments u >= 0 with the stress nowhere above the strength.
 
 (M - W) u = g - strength on the slipping set, u = 0 and stress below strength elsewhere; M is a
-circulant with positive symbol, W how fast the strength of each node falls where it goes. The
-slipping set, and the straight line that the strength of each node follows, are found by a
-semismooth Newton iteration, each linear problem by conjugate gradients preconditioned with the
-inverse circulant.
+circulant with positive symbol, W how fast the strength of each node falls. A semismooth Newton
+iteration finds the slipping set and the straight line that the strength of each node follows;
+conjugate gradients, preconditioned with the inverse circulant, solve each linear problem.
 """
 
 from __future__ import annotations
@@ -75,34 +74,25 @@ def solve_increment(
     accuracy: float,
     near: float,
 ) -> Any:
-    """Slip increments of one implicit step; returns whether they were found.
+    """Find the slip increments of one implicit step; return whether they were found.
 
-    Parameters
-    ----------
-    transform, setting
-    slip : (nodes,) array
-        Slip before the step, m.
-    tables : ImplicitTables
-        `symbol`, `inverse` and `pushed`, the stress after the step if nothing slipped in it, are
-        read; `increment` and `slipping` hold the first guess, and then what is found.
-    accuracy : float
-        Pa.
-    near : float
-        Distance (Pa) of the strength from the straight line it is taken for at which that will do.
+    `tables.increment` and `tables.slipping` hold the first guess, and then what is found. The
+    stress is met to `accuracy` (Pa); the strength may be as far as `near` (Pa) from the straight
+    line that it is taken for.
     """
     law, nodes = setting.law, setting.nodes
     strength, floor, weakening = nodes.strength, nodes.residual, nodes.weakening
-    u, slipping, pushed = tables.increment, tables.slipping, tables.pushed
+    u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
     driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size
     for i in range(n):
         limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
-        if slipping[i] == 0 and pushed[i] > limit:
+        if slipping[i] == 0 and trial[i] > limit:
             slipping[i] = 1
         if slipping[i] == 0:
             u[i] = 0.0
         start, falling[i] = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
-        driving[i] = pushed[i] - start
+        driving[i] = trial[i] - start
     for _ in range(60):
         if not _solve(transform, tables, accuracy):
             return False
@@ -111,7 +101,7 @@ def solve_increment(
         for i in range(n):
             if slipping[i] == 0:
                 limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
-                if pushed[i] - product[i] > limit + 10.0 * accuracy:
+                if trial[i] - product[i] > limit + 10.0 * accuracy:
                     slipping[i] = 1
                     changed += 1
             elif u[i] < 0.0:
@@ -120,7 +110,7 @@ def solve_increment(
                 changed += 1
             start, slope = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
             old = driving[i] + falling[i] * u[i]
-            driving[i] = pushed[i] - start
+            driving[i] = trial[i] - start
             if slipping[i] > 0 and abs(driving[i] + slope * u[i] - old) > near:
                 changed += 1
             falling[i] = slope

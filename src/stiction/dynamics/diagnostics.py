@@ -12,6 +12,10 @@ from stiction.dynamics.state import RECORD, History, Nodes, Setting, State
 from stiction.jit import jit_inside
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
+# In units of the stress scale:
+EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
+STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
+_PEAK_WIDTH = 1e-5  # so close below its maximum the mean stress still is at it
 _COLUMNS = len(RECORD)
 
 
@@ -36,10 +40,6 @@ def stress_scale(nodes: Nodes) -> History:
     tau_0 p + tau_i - tau_r, the drop that the load provides there. Where strengths are alike it
     is the mean of tau_p - tau_r; barriers that the load is far from breaking, infinite ones among
     them, do not raise it, and it grows with the load that comes to break them.
-
-    Parameters
-    ----------
-    nodes : Nodes
     """
     strength, residual = nodes.strength, nodes.residual
     profile, initial = nodes.profile, nodes.initial
@@ -53,15 +53,6 @@ def stress_scale(nodes: Nodes) -> History:
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
     return loads, scales
-
-
-@jit_inside
-def follow_scale(now: Any, setting: Setting, load: float) -> None:
-    """Raise the stress scale to that of a load, Pa; sizes of events follow it."""
-    scale = max(now.scale, load_at(setting.scale_loads, setting.scales, load))
-    now.scale = scale
-    now.event_drop = setting.thresholds.event_drop * scale
-    now.peak_width = setting.thresholds.peak_width * scale
 
 
 @jit_inside
@@ -81,7 +72,7 @@ def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> A
 
     The fall counts from the last local maximum, and only as far as waves carry it away: where the
     load itself goes down, nothing has become unstable. An event begins when the fall exceeds
-    `event_drop`, and ends when the mean stress rises above that maximum again or everything creeps.
+    EVENT_DROP, and ends when the mean stress rises above that maximum again or everything creeps.
     It was an arrested instability if a node slipped faster than `unstable_rate` in it: waves that
     an earlier one has left behind, and creep that they modulate, also make the mean stress fall,
     but stay slower.
@@ -94,7 +85,7 @@ def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> A
         now.peak_stress, now.peak_time, now.peak_load = mean_stress, step.time, step.load
         now.peak_node = step.node
     fall = min(now.local_stress - mean_stress, step.radiated - now.local_radiated)
-    if now.peak_stress - mean_stress < now.peak_width and fall > 0.0:
+    if now.peak_stress - mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
         now.peak_node = step.node
     if now.in_event:
         now.event_rate = max(now.event_rate, step.top)
@@ -102,7 +93,7 @@ def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> A
             end_event(now, unstable_rate, mean_stress, step.radiated)
     elif mean_stress > now.local_stress:
         now.local_stress, now.local_radiated = mean_stress, step.radiated
-    elif fall > now.event_drop:
+    elif fall > EVENT_DROP * now.scale:
         now.in_event, now.event_rate = 1, step.top
         if now.first_stress == -np.inf:
             now.first_stress = now.local_stress
@@ -124,7 +115,7 @@ def finish_step(state: State, setting: Setting, record: Array, row: int, step: S
     now.top_rate, now.slid = step.top, step.slid
     now.work += step.work
     now.step = step.size
-    follow_scale(now, setting, step.load)
+    now.scale = max(now.scale, load_at(setting.scale_loads, setting.scales, step.load))
     fall = observe(now, setting.thresholds.unstable_rate, mean_stress, step)
     if step.slid >= setting.thresholds.breakable and now.kinetic_stress == -np.inf:
         now.kinetic_stress = mean_stress

@@ -10,28 +10,13 @@ from stiction.friction.laws import FrictionLaw
 
 
 def fracture_energy(friction: FrictionLaw, slip: Floats, nodes: Nodes) -> Floats:
-    """Return the energy dissipated above the residual strength at each node, J/m2.
-
-    Parameters
-    ----------
-    friction : FrictionLaw
-    slip : (..., nodes) array
-        m.
-    nodes : Nodes
-    """
+    """Return the energy dissipated above the residual strength at each node, J/m2."""
     drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
     return friction.dissipated(slip, drop, nodes.weakening)
 
 
 def strain_energy(slip_hat: NDArray[np.complex128], grid: Grid) -> float:
-    """Return the static strain energy of a slip: sum over modes of K(k)|delta_k|^2/2; J/m or J.
-
-    Parameters
-    ----------
-    slip_hat : (modes,) complex array
-        Real transform of the slip, unnormalised, m.
-    grid : Grid
-    """
+    """Return the static strain energy of a slip: sum over modes of K(k)|delta_k|^2/2; J/m or J."""
     half = grid.transform.half
     share = np.full(half, 2.0)  # each mode, and its conjugate that the transform leaves out
     share[..., 0] = share[..., -1] = 1.0  # which these do not have

@@ -8,7 +8,13 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.dynamics.complementarity import solve_increment
-from stiction.dynamics.diagnostics import Step, arrived, finish_step
+from stiction.dynamics.diagnostics import (
+    EVENT_DROP,
+    STEADY_STRESS,
+    Step,
+    arrived,
+    finish_step,
+)
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.dynamics.state import (
@@ -25,36 +31,35 @@ from stiction.dynamics.state import (
 )
 from stiction.elasticity.operator import backward, forward
 from stiction.friction.kernels import strength_at
-from stiction.jit import jit, jit_inside
+from stiction.jit import ZERO, jit, jit_inside
 
+LARGEST_STEP = 1e20  # s
 _ROUND_OFF = 1e-14  # of the largest stress: what a few transforms leave, ten times over
+# In units of the stress scale:
+_SOLVED = 1e-9  # stress at which a step counts as solved
+_SMALL_DROP = 0.1  # weakening below that is not resolved
+_NOTICED = 1e-7  # Z <V> from which its growth in a step is limited, and by which factor
+_GROWTH = 1.3
+_NEGLIGIBLE = 5e-7  # rise of the load in a step for which growth does not matter
 
 
 class _Attempt(NamedTuple):
     """One step that is tried.
 
-    V at its end is mean + share (mean - past mean); its slope in the step, a second difference of
-    slip, is (mean - past mean) bend.
+    V at its end is mean + ratio (mean - past mean); in it, V rises at (mean - past mean) rise, a
+    second difference of slip.
     """
 
     size: float
     time: float
     load: float
-    share: float
-    bend: float
-
-
-class _Outcome(NamedTuple):
-    """What a step that was tried does: the strength that a node loses, the total slip, Z <V>."""
-
-    largest: float
-    total: float
-    radiated: float
+    ratio: float
+    rise: float
 
 
 @jit_inside
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
-    """Return (size to try, step to go on with, whether cut short, whether the last one)."""
+    """Return (size to try, size to go on with, whether cut short, whether the last one)."""
     thresholds, time, clipped, size = setting.thresholds, now.time, False, step
     smallest = thresholds.smallest_step
     small = thresholds.load_step * now.scale
@@ -64,8 +69,8 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
             break
         size /= np.sqrt(2.0)
         step = size
-    for turn_time in setting.turns:  # land on each peak of the load, or creep would miss its top
-        ahead = turn_time - time
+    for turning_time in setting.turning_times:  # land on each peak of the load
+        ahead = turning_time - time
         if 1e-6 * smallest < ahead < size:
             size = ahead
             clipped = True
@@ -82,87 +87,79 @@ def _assemble(
     state: State, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
     """Matrix, stress if nothing slipped, and first guess; return the accuracy to ask for, Pa."""
-    stiffness, entry, fresh, ramp = grid.stiffness, grid.entry, tables.fresh, tables.fresh_ramp
-    symbol, pushed_hat, past_hat = tables.symbol, tables.work, tables.past_hat
-    size, share, bend, impedance = attempt.size, attempt.share, attempt.bend, grid.impedance
-    if size != tables.made[0]:
+    stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
+    response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
+    size, ratio, rise, impedance = (
+        attempt.size,
+        attempt.ratio,
+        attempt.rise,
+        grid.impedance,
+    )
+    if size != tables.valid_for[0]:
         tabulate(grid, size, tables)
-    if size != tables.made[0] or share != tables.made[1]:
-        symbol[0] = impedance * (1.0 + share) / size
+    if size != tables.valid_for[0] or ratio != tables.valid_for[1]:
+        symbol[0] = impedance * (1.0 + ratio) / size
         for q in range(1, symbol.size):
-            fading = stiffness[1, q] * (fresh[entry[q]] + bend * ramp[entry[q]]) / size
+            fading = stiffness[1, q] * (response[entry[q]] + rise * ramp[entry[q]]) / size
             symbol[q] = symbol[0] + stiffness[0, q] - fading
         for q in range(symbol.size):
             tables.inverse[q] = 1.0 / symbol[q]
-        tables.made[0], tables.made[1] = size, share
+        tables.valid_for[0], tables.valid_for[1] = size, ratio
     fading_memory(grid, state.memory, tables)
     forward(grid.transform, state.past, past_hat)
-    pushed_hat[0] = impedance * share * past_hat[0]
-    for q in range(1, pushed_hat.size):
-        pushed_hat[q] = (
-            stiffness[1, q] * (tables.carried[q] - bend * ramp[entry[q]] * past_hat[q])
+    trial_hat, trial = tables.work, tables.trial_stress
+    trial_hat[0] = impedance * ratio * past_hat[0]
+    for q in range(1, trial_hat.size):
+        trial_hat[q] = (
+            stiffness[1, q] * (tables.memory_sum[q] - rise * ramp[entry[q]] * past_hat[q])
             - stiffness[0, q] * state.slip_hat[q]
-            + impedance * share * past_hat[q]
+            + impedance * ratio * past_hat[q]
         )
-    backward(grid.transform, pushed_hat, tables.pushed)
-    pushed, profile, initial = tables.pushed, setting.nodes.profile, setting.nodes.initial
+    backward(grid.transform, trial_hat, trial)
+    profile, initial = setting.nodes.profile, setting.nodes.initial
     level = 0.0
-    for i in range(pushed.size):
-        pushed[i] += attempt.load * profile[i] + initial[i]
-        level = max(level, abs(pushed[i]))
+    for i in range(trial.size):
+        trial[i] += attempt.load * profile[i] + initial[i]
+        level = max(level, abs(trial[i]))
         tables.increment[i] = state.past[i] * size
         tables.slipping[i] = 1 if state.rate[i] > 0.0 else 0
     # Round-off of the transforms bounds what can be asked for.
-    asked = setting.thresholds.residual * state.diagnostics[0].scale
-    return max(asked, _ROUND_OFF * level)
+    return max(_SOLVED * state.diagnostics[0].scale, _ROUND_OFF * level)
 
 
 @jit_inside
-def _try(
-    state: State, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
-) -> Any:
-    """Solve for the slip increments; return whether that succeeded and the outcome."""
-    thresholds, nodes, law, u = setting.thresholds, setting.nodes, setting.law, tables.increment
-    accuracy = _assemble(state, grid, setting, tables, attempt)
-    near = accuracy if thresholds.curved else 0.0
-    solved = solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
-    slip, past, scale = state.slip, state.past, state.diagnostics[0].scale
+def _effect(state: State, setting: Setting, u: Array, impedance: float, attempt: _Attempt) -> Any:
+    """Return (largest loss of strength of a node, total slip, Z <V>) of slip increments u."""
+    nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
-    critical, size, share = nodes.critical, attempt.size, attempt.share
-    largest, total = 0.0, 0.0
-    if solved:
-        least = thresholds.small_drop * scale
-        creep = thresholds.steady_stress * scale * size / grid.impedance
-        for i in range(u.size):
-            if slip[i] < critical[i] and u[i] > 0.0:
-                lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
-                lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
-                largest = max(largest, lost / max(peak[i] - residual[i], least))
-            elif u[i] > creep and critical[i] > 0.0:
-                largest = max(largest, u[i] / critical[i])
-            total += u[i]
-    radiated = 0.0
+    critical, size, ratio = nodes.critical, attempt.size, attempt.ratio
+    scale = state.diagnostics[0].scale
+    largest, total, radiated = 0.0, 0.0, 0.0
+    least, creep = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
-        radiated += max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
-    return solved, _Outcome(largest, total, radiated * (grid.impedance / u.size))
+        if slip[i] < critical[i] and u[i] > 0.0:
+            lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+            lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
+            largest = max(largest, lost / max(peak[i] - residual[i], least))
+        elif u[i] > creep and critical[i] > 0.0:
+            largest = max(largest, u[i] / critical[i])
+        total += u[i]
+        radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
+    return largest, total, radiated * (impedance / u.size)
 
 
 @jit_inside
-def _races(now: Any, thresholds: Thresholds, attempt: _Attempt, outcome: _Outcome) -> Any:
+def _accelerates(
+    now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
+) -> Any:
     """Whether the interface accelerates too much for the load at onset to be accurate."""
-    scale, radiated = now.scale, outcome.radiated
     # A step that raises the load by next to nothing cannot put the onset wrong.
-    rise = abs(attempt.load - now.load)
-    matters = rise > thresholds.negligible * scale
-    noticed = thresholds.noticed * scale
-    before = max(now.radiated, noticed)
-    racing = radiated > noticed and radiated > thresholds.growth * before
+    matters = abs(attempt.load - now.load) > _NEGLIGIBLE * now.scale
+    noticed = _NOTICED * now.scale
+    growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
-    shorter = (
-        0.5 * attempt.size >= thresholds.smallest_step
-        or outcome.largest > 0.1 * thresholds.slip_step
-    )
-    return racing and matters and shorter and attempt.share > 0.0
+    shorter = 0.5 * attempt.size >= thresholds.smallest_step or largest > 0.1 * thresholds.slip_step
+    return growing and matters and shorter and attempt.ratio > 0.0
 
 
 @jit_inside
@@ -174,23 +171,23 @@ def _accept(
     attempt: _Attempt,
     radiated: float,
 ) -> Any:
-    """Take the step; return it as what is told to the"""
-    size, share, bend, load = attempt.size, attempt.share, attempt.bend, attempt.load
-    nodes, u, moved = setting.nodes, tables.increment, tables.pushed
-    rate_hat, past_hat, moved_hat = tables.rate_hat, tables.past_hat, tables.work
+    """Take the step in place and return it."""
+    size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
+    nodes, u, transfer = setting.nodes, tables.increment, tables.trial_stress
+    rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
     stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
     forward(grid.transform, u, rate_hat)
     for q in range(rate_hat.size):
         slip_hat[q] += rate_hat[q]
         rate_hat[q] /= size
-        past_hat[q] = bend * (rate_hat[q] - past_hat[q])
+        past_hat[q] = rise * (rate_hat[q] - past_hat[q])
     advance_with_ramp(grid, state.memory, tables)
-    moved_hat[0] = 0.0
-    for q in range(1, moved_hat.size):
-        fresh, ramp = tables.fresh[entry[q]], tables.fresh_ramp[entry[q]]
-        memory_part = tables.carried[q] + fresh * rate_hat[q] + ramp * past_hat[q]
-        moved_hat[q] = stiffness[1, q] * memory_part - stiffness[0, q] * slip_hat[q]
-    backward(grid.transform, moved_hat, moved)
+    transfer_hat[0] = 0.0
+    for q in range(1, transfer_hat.size):
+        response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
+        memory_part = tables.memory_sum[q] + response * rate_hat[q] + ramp * past_hat[q]
+        transfer_hat[q] = stiffness[1, q] * memory_part - stiffness[0, q] * slip_hat[q]
+    backward(grid.transform, transfer_hat, transfer)
     slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
     critical, profile, initial = nodes.critical, nodes.profile, nodes.initial
     half = setting.thresholds.arrival
@@ -199,9 +196,9 @@ def _accept(
     for i in range(u.size):
         work += u[i] * (mean_load * profile[i] + initial[i])
         slip[i] += u[i]
-        rate[i] = max(u[i] / size * (1.0 + share) - share * past[i], 0.0)
+        rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
-        stress[i] = moved[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
+        stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
         slip_sum += slip[i]
         if slip[i] >= critical[i]:
             slid += 1
@@ -214,15 +211,15 @@ def _accept(
 
 
 @jit_inside
-def _next_size(thresholds: Thresholds, size: float, largest: float, growing: bool) -> Any:
+def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
     """Sizes change by powers of sqrt 2, so that tables are reused while the size stays."""
-    root, asked = np.sqrt(2.0), thresholds.slip_step
+    root = np.sqrt(2.0)
     if largest > asked:
         return size / root
     if largest < 0.25 * asked and not growing:
-        return min(2.0 * size, thresholds.largest_step)
+        return min(2.0 * size, LARGEST_STEP)
     if largest < 0.7 * asked and not growing:
-        return min(root * size, thresholds.largest_step)
+        return min(root * size, LARGEST_STEP)
     return size
 
 
@@ -242,51 +239,56 @@ def implicit_steps(
     first. Second order: the slip rate at the end of a step follows from the mean rates of this
     step and of the one before (`past`, m/s; none if `past_step` is 0), as in the two-step backward
     differences, and the memory sees it rise or fall linearly.
-    A step is repeated at half the size if no slip increments are found (negative curvature: the
+    A step is repeated at half the size if no slip increments are found (negative rise: the
     patches are unstable at this size), a node weakens too much, or the interface accelerates too
     much. Creep of nodes at their residual strength does not count, nor the weakening of nodes that
     weaken by next to nothing.
     """
-    now, thresholds = state.diagnostics[0], setting.thresholds
+    now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = thresholds.smallest_step
-    taken = 0
+    taken, reason = ZERO, DONE  # one way out: each costs the compiler as much as the rest
     while taken < count:
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:
-            return taken, step, TO_EXPLICIT
+            reason = TO_EXPLICIT
+            break
         past_step = now.past_step
-        share = size / (size + past_step) if past_step > 0.0 else 0.0
+        ratio = size / (size + past_step) if past_step > 0.0 else 0.0
         time = now.time + size
         load = load_at(setting.load_times, setting.load_values, time)
-        attempt = _Attempt(size, time, load, share, 2.0 * share / size)
-        solved, outcome = _try(state, grid, setting, tables, attempt)
-        if not np.isfinite(outcome.total):
+        attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
+        accuracy = _assemble(state, grid, setting, tables, attempt)
+        near = accuracy if thresholds.curved else 0.0
+        failed = not solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
+        largest, total, radiated = 0.0, 0.0, 0.0
+        if not failed:
+            largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
+        if not np.isfinite(total):
             now.bad_node = 0
-            return taken, step, NOT_FINITE
-        too_much = outcome.largest > 2.0 * thresholds.slip_step
-        if not solved or too_much or _races(now, thresholds, attempt, outcome):
+            reason = NOT_FINITE
+            break
+        too_much = largest > 2.0 * thresholds.slip_step
+        if failed or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
             now.rejected_steps += 1
             step = size / 2.0
             if step < smallest:
-                return taken, step, TO_EXPLICIT
+                reason = TO_EXPLICIT
+                break
             continue
-        noticed = thresholds.noticed * now.scale
-        steady = np.sqrt(thresholds.growth) * now.radiated
-        growing = outcome.radiated > noticed and outcome.radiated > steady
-        done = _accept(state, grid, setting, tables, attempt, outcome.radiated)
+        growing = radiated > _NOTICED * now.scale and radiated > np.sqrt(_GROWTH) * now.radiated
+        done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
-        now.past_step, now.radiated = size, outcome.radiated
+        now.past_step, now.radiated = size, radiated
         fall = finish_step(state, setting, record, taken, done)
         taken += 1
+        if not clipped:
+            step = _next_size(thresholds.slip_step, size, largest, growing)
         if done.slid >= thresholds.slid_stop:
-            return taken, step, ALL_SLID
-        if thresholds.event_stop and fall > now.event_drop:
-            return taken, step, DROPPED
-        if last or now.time >= thresholds.end_time:
-            return taken, step, DONE
-        if clipped:
-            continue
-        step = _next_size(thresholds, size, outcome.largest, growing)
-        if step < smallest:
-            return taken, step, TO_EXPLICIT
-    return taken, step, DONE
+            reason = ALL_SLID
+        elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
+            reason = DROPPED
+        elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
+            reason = TO_EXPLICIT
+        if reason != DONE or last or now.time >= thresholds.end_time:
+            break
+    return taken, step, reason

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from stiction.dynamics.energies import fracture_energy
 from stiction.dynamics.explicit import explicit_steps
-from stiction.dynamics.implicit import implicit_steps
+from stiction.dynamics.implicit import LARGEST_STEP, implicit_steps
 from stiction.dynamics.loading import first_reach, load_at
 from stiction.dynamics.medium import Medium
 from stiction.dynamics.memory import (
-    carry_memory,
     empty_memory,
     explicit_tables,
     implicit_tables,
     scale_memory,
+    sum_memory,
 )
 from stiction.dynamics.state import (
     ALL_SLID,
@@ -36,51 +36,33 @@ from stiction.dynamics.state import (
     ImplicitTables,
     Setting,
     State,
-    Thresholds,
 )
 from stiction.friction.kernels import strengths
 from stiction.friction.laws import FrictionLaw
 
 _OVERSTRESSED = 1e-6  # of the stress scale: above the strength by so much, slip begins with waves
+_NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
 _MARGIN = 1.5  # on the length from which on nothing stops a rupture: the same as equilibrium's
 _RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
 
+_ENDINGS = {ALL_SLID: "sliding", DROPPED: "onset", AT_REST: "rest"}
 NOTHING = np.empty((0, len(RECORD)))
 
 
 @dataclasses.dataclass(eq=False)
 class Run:
-    """One interface under one load history: what does not change in a run, and tables of steps.
-
-    Attributes
-    ----------
-    medium : Medium
-    friction : FrictionLaw
-    setting : Setting
-    stop : str
-        Where it ends, as `Rupture.stop`.
-    steepest_rate : float
-        Largest rate, Pa/m, at which a node that may break weakens at any slip.
-    least_load : float
-        Load below which nothing runs away: the mean strength of the weakest nodes that make up
-        half a nucleation length, Pa. A few nodes of next to no strength do not count, nor do
-        nodes that do not weaken.
-    tables : ExplicitTables, ImplicitTables or None
-        Of the kind of step that was taken last: one kind at a time is enough, and they are large.
-    """
+    """One interface under one load history: what does not change in a run, and tables of steps."""
 
     medium: Medium
     friction: FrictionLaw
     setting: Setting
-    stop: str
-    steepest_rate: float
+    stop: str  # as `Rupture.stop`
+    steepest_rate: float  # largest, Pa/m, at which a node that may break weakens at any slip
+    # Load below which nothing runs away: the mean strength of the weakest nodes that make up half a
+    # nucleation length, Pa; a few nodes of next to no strength do not make it low.
     least_load: float
+    # Of the kind of step that was taken last: they are large, and one kind at a time is enough.
     tables: ExplicitTables | ImplicitTables | None = None
-
-    @property
-    def thresholds(self) -> Thresholds:
-        """When steps change or end."""
-        return self.setting.thresholds
 
     @property
     def history(self) -> History:
@@ -127,12 +109,12 @@ class Run:
 
         Where the stress is above the strength by more than round-off, explicit steps come first.
         """
-        interface, nodes, thresholds = self.medium.interface, self.setting.nodes, self.thresholds
-        impedance = self.medium.impedance
+        interface, impedance = self.medium.interface, self.medium.impedance
+        nodes, thresholds = self.setting.nodes, self.setting.thresholds
         delta = np.zeros(interface.size)
         if slip is not None:
             delta = np.array(slip, dtype=np.float64).ravel()
-        memory, carried = empty_memory(self.medium.grid)
+        memory, memory_sum = empty_memory(self.medium.grid)
         load = float(load_at(*self.history, time))
         slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
         stress = self.elastic_stress(slip_hat, load)
@@ -154,28 +136,33 @@ class Run:
         now["slid"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale
-        now["event_drop"], now["peak_width"] = (
-            thresholds.event_drop * scale,
-            thresholds.peak_width * scale,
-        )
         front = thresholds.arrival * nodes.critical
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
         explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESSED * scale
-        phase = np.array([float(explicit), min(max(size, first), thresholds.largest_step)])
+        phase = np.array([float(explicit), min(max(size, first), LARGEST_STEP)])
         return State(
-            delta, rate, stress, slip_hat, rate.copy(), memory, carried, arrival, diagnostics, phase
+            slip=delta,
+            rate=rate,
+            stress=stress,
+            slip_hat=slip_hat,
+            past=rate.copy(),
+            memory=memory,
+            memory_sum=memory_sum,
+            arrival=arrival,
+            diagnostics=diagnostics,
+            phase=phase,
         )
 
     def ended(self, state: State) -> bool:
         """Return whether the end time is reached, up to the rounding of a sum of many steps."""
-        return bool(self.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step)
+        return bool(self.setting.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step)
 
     def ending(self, state: State, reason: int) -> str | None:
         """Return why a run ends here, in a word; None if it goes on."""
-        if reason in (ALL_SLID, DROPPED, AT_REST):
-            return {ALL_SLID: "sliding", DROPPED: "onset", AT_REST: "rest"}[reason]
+        if reason in _ENDINGS:
+            return _ENDINGS[reason]
         if self.stop == "runaway" and self._runs_away(state):
             return "runaway"
         if self.ended(state):
@@ -191,8 +178,7 @@ class Run:
             not state.explicit
             and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
-            and self.medium.impedance * state.rate.max()
-            <= self.thresholds.residual * state.now["scale"]
+            and self.medium.impedance * state.rate.max() <= _NO_SLIP * state.now["scale"]
         )
 
     @functools.cached_property
@@ -208,7 +194,7 @@ class Run:
 
         A crack of half-length a with the stress drop D releases pi a D²/(2 G*) at each tip
         (Griffith), and more as it grows or the load rises; the largest fracture energy of the
-        interface is what it has to pay. Barriers that never break pay any price.
+        interface, infinite with barriers that never break, is the most that it needs.
         """
         nodes, medium, now = self.setting.nodes, self.medium, state.now
         if not (now["slid"] > 0 and now["in_event"]):
@@ -226,14 +212,11 @@ class Run:
         The word is None if it has not ended: the code is then NOT_FINITE, or DONE after the steps.
         """
         portion = _RUNAWAY_STEPS if self.stop == "runaway" else _STEPS
-        reason = DONE
-        while state.steps < most:
+        word, reason = None, DONE
+        while word is None and reason != NOT_FINITE and state.steps < most:
             _, reason = self.advance(state, min(portion, most - state.steps))
-            if reason == NOT_FINITE:
-                return None, reason
-            if word := self.ending(state, reason):
-                return word, reason
-        return None, reason
+            word = self.ending(state, reason)
+        return word, reason
 
     def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
@@ -251,15 +234,13 @@ class Run:
                 self._to_explicit(state)
             elif reason == TO_IMPLICIT:
                 self._to_implicit(state)
-            elif reason != DONE or taken >= count:
+            elif reason != DONE or self.ended(state):
                 return taken, reason
-            elif self.ended(state):
-                return taken, DONE
         return taken, DONE
 
     def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
         medium = self.medium
-        left = self.thresholds.end_time - state.now["time"]
+        left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
         taken, reason = explicit_steps(
@@ -268,9 +249,11 @@ class Run:
         return int(taken), int(reason)
 
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
-        tables = self._implicit_tables()
+        if not isinstance(self.tables, ImplicitTables):
+            self.tables = None  # let go of the others before these are made
+            self.tables = implicit_tables(self.medium.grid)
         taken, size, reason = implicit_steps(
-            count, float(state.phase[1]), state, self.medium.grid, self.setting, tables, record
+            count, float(state.phase[1]), state, self.medium.grid, self.setting, self.tables, record
         )
         state.phase[1] = size
         return int(taken), int(reason)
@@ -278,28 +261,22 @@ class Run:
     def _to_explicit(self, state: State) -> None:
         grid, tables = self.medium.grid, self._explicit_tables()
         scale_memory(grid, state.memory, tables.step, divide=True)
-        carry_memory(grid, state.memory, tables.table, state.carried)
+        sum_memory(grid, state.memory, tables.table, state.memory_sum)
         state.phase[0] = 1.0
         state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
 
     def _to_implicit(self, state: State) -> None:
         scale_memory(self.medium.grid, state.memory, self.medium.step, divide=False)
         state.past[:] = state.rate
-        state.phase[:] = 0.0, 2.0 * self.thresholds.smallest_step
+        state.phase[:] = 0.0, 2.0 * self.setting.thresholds.smallest_step
         state.now["past_step"] = 0.0  # the first implicit step is one of first order
         state.now["radiated"] = self.medium.impedance * state.rate.mean()
 
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):
-            self.tables = None  # let go of the others before these are made
+            self.tables = None
             medium = self.medium
             self.tables = explicit_tables(medium.grid, medium.step, *medium.step_table())
-        return self.tables
-
-    def _implicit_tables(self) -> ImplicitTables:
-        if not isinstance(self.tables, ImplicitTables):
-            self.tables = None
-            self.tables = implicit_tables(self.medium.grid)
         return self.tables
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from contextlib import suppress
 
 import numpy as np
 
-from stiction.dynamics.memory import phi, places, step_table
+from stiction.dynamics.memory import offsets, phi, step_table
 from stiction.dynamics.state import Floats, Grid
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.kernel_cache import kernel_sum
@@ -27,27 +28,14 @@ _GROWTH = 1e-5  # of a wave in a step; a rupture takes thousands
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Medium:
-    """Elastic half-spaces on a grid, with a fixed explicit time step. Read-only, shared by threads.
-
-    Attributes
-    ----------
-    interface : Interface
-    grid : Grid
-        Stiffness, impedance and memory kernel, as kernels take them.
-    step : float
-        Explicit time step, s.
-    largest_step : float
-        Limit of stability of the explicit step, s.
-    shear_modulus, effective_modulus : float
-        G and G*, Pa.
-    """
+    """Elastic half-spaces on a grid, with a fixed explicit step. Read-only, shared by threads."""
 
     interface: Interface
     grid: Grid
-    step: float
-    largest_step: float
-    shear_modulus: float
-    effective_modulus: float
+    step: float  # explicit time step, s
+    largest_step: float  # limit of stability of the explicit step, s
+    shear_modulus: float  # G, Pa
+    effective_modulus: float  # G*, Pa
 
     @property
     def impedance(self) -> float:
@@ -68,12 +56,9 @@ class Medium:
 
 def refused_laws(problem: Problem) -> list[str]:
     """Why the friction law of a problem cannot be followed; nothing if it can."""
-    try:
-        known = registered(problem.friction.parameters)
-    except NotImplementedError:
-        known = False
-    if known:
-        return []
+    with suppress(NotImplementedError):
+        if registered(problem.friction.parameters):
+            return []
     return [
         f"friction: {type(problem.friction).__name__} has no compiled strength; give its"
         " `parameters` a type that stiction.friction.kernels.register knows"
@@ -81,36 +66,25 @@ def refused_laws(problem: Problem) -> list[str]:
 
 
 def prepare_medium(
-    problem: Problem,
-    *,
-    tolerance: float,
-    memory_range: float,
-    courant: float,
-    time_step: float | None,
+    problem: Problem, tolerance: float, courant: float, time_step: float | None
 ) -> Medium:
     """Return tables for a problem; refuse a time step above the stability limit."""
-    if refused := refused_laws(problem):
-        raise InputError(refused)
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
-        valid = (
-            "nu <= 0.49 in plane strain (the dilatational wave becomes infinitely fast at 0.5)"
-            if solid.plane == "strain"
-            else "nu >= -0.99 in plane stress (the solid loses its stiffness at -1)"
-        )
+        valid = "nu <= 0.49" if solid.plane == "strain" else "nu >= -0.99"
         raise InputError(
-            f"solid.poisson_ratio: elastodynamics in mode II needs {valid}, got "
-            f"{solid.poisson_ratio}"
+            f"solid.poisson_ratio: elastodynamics in mode II needs {valid} in plane {solid.plane}, "
+            f"got {solid.poisson_ratio}"
         )
     eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
     modes = ("II", "III") if interface.is_plane else (mode,)
-    kernels = [kernel_sum(each, eta, tolerance, memory_range) for each in modes]
+    kernels = [kernel_sum(each, eta, tolerance) for each in modes]
     check_memory(
         "interface.nodes",
         bytes_needed(interface, sum(kernel.poles.size for kernel in kernels)),
         "take fewer nodes, or a larger kernel_tolerance",
     )
-    limit = largest_step(modes, eta, tolerance, memory_range, interface.spacings) / speed
+    limit = largest_step(modes, eta, tolerance, interface.spacings) / speed
     if limit == 0.0:
         error = max(kernel.error for kernel in kernels)
         raise InputError(
@@ -121,17 +95,10 @@ def prepare_medium(
     if step > limit:
         raise InputError(
             f"time_step: {step:.6g} s is above the stability limit {limit:.6g} s of this grid "
-            f"and solid (c_s dt/dx = {limit * speed / interface.spacing:.3f}); use at most "
-            f"{0.9 * limit:.6g} s"
+            f"and solid; use at most {0.9 * limit:.6g} s"
         )
-    return Medium(
-        interface=interface,
-        grid=_grid(problem, kernels),
-        step=step,
-        largest_step=limit,
-        shear_modulus=solid.shear_modulus,
-        effective_modulus=problem.effective_modulus,
-    )
+    grid = _grid(problem, kernels)
+    return Medium(interface, grid, step, limit, solid.shear_modulus, problem.effective_modulus)
 
 
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
@@ -142,7 +109,7 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """
     solid, interface = problem.solid, problem.interface
     k = interface.wavenumbers
-    entry, place, copies = places(k.shape)
+    entry, offset, multiplicity = offsets(k.shape)
     share = interface.in_plane_share
     if share is None:
         modulus, wavenumbers, own = problem.effective_modulus * k, k[1:], np.ones(k.size - 1)
@@ -156,8 +123,8 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
         cell=interface.cell,
         stiffness=0.5 * np.stack([modulus.ravel(), solid.shear_modulus * k.ravel()]),
         entry=entry,
-        place=place,
-        copies=copies,
+        offset=offset,
+        multiplicity=multiplicity,
         frequency=wavenumbers * solid.shear_wave_speed,
         mode_two=own,
         poles=np.concatenate([kernel.poles for kernel in kernels]),
@@ -169,8 +136,7 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
 def bytes_needed(interface: Interface, pairs: int) -> float:
     """Memory of one run at its largest, while it takes implicit steps; without frames.
 
-    Memory variables and tables (see `memory_layout`), on a line those of explicit steps too, and
-    some forty arrays of one value a node.
+    Memory variables and tables, on a line those of explicit steps too, and forty arrays of nodes.
     """
     modes = interface.wavenumbers.size
     tables = 6 * modes / 2 if interface.is_plane else 10 * modes
@@ -179,11 +145,7 @@ def bytes_needed(interface: Interface, pairs: int) -> float:
 
 @functools.lru_cache(maxsize=64)
 def largest_step(
-    modes: tuple[str, ...],
-    eta: float,
-    tolerance: float,
-    memory_range: float,
-    spacings: tuple[float, ...],
+    modes: tuple[str, ...], eta: float, tolerance: float, spacings: tuple[float, ...]
 ) -> float:
     """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
 
@@ -193,7 +155,7 @@ def largest_step(
     mode II: the limit is that of the two axes and of the corner, shortened until waves in between
     do not grow either. It is 0 where the error of the kernel makes waves grow whatever the step.
     """
-    kernels = [kernel_sum(mode, eta, tolerance, memory_range) for mode in modes]
+    kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
     static = static_stiffness(modes[0], eta)
     if len(modes) == 1:
         return _largest(kernels[0], static) / np.pi * spacings[0]
@@ -220,17 +182,17 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
     pairs = kernel.poles.size
     z = kernel.poles * kappa
     decay, gain = np.exp(z), kappa * phi(z)
-    fresh = float(np.sum(kernel.weights * gain).real)
+    response = float(np.sum(kernel.weights * gain).real)
     state = np.eye(2 + 2 * pairs)
     rate, slip = state[0], state[1]
     memory = state[2 : 2 + pairs] + 1j * state[2 + pairs :]
-    carried = ((kernel.weights * decay) @ memory).real
-    guess = -stiffness * (slip + kappa * rate) + carried + fresh * rate
-    mean = 0.5 * (rate + guess)
-    moved = slip + kappa * mean
+    memory_sum = ((kernel.weights * decay) @ memory).real
+    predicted = -stiffness * (slip + kappa * rate) + memory_sum + response * rate
+    mean = 0.5 * (rate + predicted)
+    slip = slip + kappa * mean
     memory = decay[:, None] * memory + gain[:, None] * mean
-    rate = -stiffness * moved + carried + fresh * mean
-    return np.vstack([rate, moved, memory.real, memory.imag])
+    rate = -stiffness * slip + memory_sum + response * mean
+    return np.vstack([rate, slip, memory.real, memory.imag])
 
 
 def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:

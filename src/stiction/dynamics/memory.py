@@ -2,8 +2,8 @@
 
 Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an entry for
 each wave vector that differs in what waves do: on a line k > 0, on a plane kx >= 0 and ky >= 0,
-because (kx, ky) and (-kx, ky), two copies, share |k| and the share of mode II. Entries are padded
-to whole blocks. Tables are packed as [block][pair][row][64], Fourier arrays as
+because (kx, ky) and (-kx, ky) share |k| and the share of mode II: such an entry has multiplicity 2.
+Entries are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier arrays as
 [block][copy][real, imaginary][64] and memory variables as [block][copy][pair][4][64] with the four
 rows real and imaginary part of the memory of the real signal, then of the imaginary signal. The
 constant row length lets the compiler vectorise without run-time checks of overlap.
@@ -39,17 +39,18 @@ def phi(z: Spectrum) -> Spectrum:
     return np.where(small, series, np.expm1(safe) / safe)
 
 
-def places(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
-    """Return entry and place of each mode of a transform of this shape, and copies of an entry."""
+def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
+    """Return entry and offset of each mode of a transform, and the multiplicity of entries."""
     if len(half) == 1:
         entry = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
-        copy, copies = np.zeros_like(entry), 1
+        copy, multiplicity = np.zeros_like(entry), 1
     else:
         row = np.arange(half[0])
         folded = np.minimum(row, half[0] - row)
         entry = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
-        copy, copies = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
-    return entry, (entry // LANES * copies + copy) * (2 * LANES) + entry % LANES, copies
+        copy, multiplicity = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
+    offset = (entry // LANES * multiplicity + copy) * (2 * LANES) + entry % LANES
+    return entry, offset, multiplicity
 
 
 def blocks(entries: int) -> int:
@@ -80,67 +81,61 @@ def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
 
 
 def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
-    """Memory variables and the array carried from one explicit step to the next, all zero."""
-    count = blocks(grid.frequency.size) * grid.copies * LANES
+    """Memory variables and their sum for the next explicit step, all zero."""
+    count = blocks(grid.frequency.size) * grid.multiplicity * LANES
     return zeros(count * grid.poles.size * 4), zeros(count * 2)
 
 
-def _weights(grid: Grid, some: slice) -> Spectrum:
-    """Weights of some entries, (pairs, entries)."""
-    in_plane = (np.arange(grid.poles.size) < grid.split)[:, None]
-    share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
-    weights: Spectrum = grid.weights[:, None] * share
-    return weights
-
-
 def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
-    """Tables of one fixed explicit step h: `table` and `fresh` of `ExplicitTables`."""
+    """Tables of one fixed explicit step h: `table` and `response` of `ExplicitTables`."""
     pairs, count = grid.poles.size, blocks(grid.frequency.size)
     table = zeros(count * pairs * 4 * LANES).reshape(count, pairs, 4, LANES)
-    fresh = np.empty(grid.frequency.size)
+    response = np.empty(grid.frequency.size)
+    in_plane = (np.arange(pairs) < grid.split)[:, None]
     for block in range(count):  # one by one: their exponentials together would take more than it
         some = slice(block * LANES, (block + 1) * LANES)
         z = np.multiply.outer(grid.poles, grid.frequency[some] * step)
-        decay, gain, weights = np.exp(z), step * phi(z), _weights(grid, some)
-        carry = weights * decay * gain
-        rows = (decay.real, decay.imag, carry.real, carry.imag)
+        share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
+        decay, gain, weights = np.exp(z), step * phi(z), grid.weights[:, None] * share
+        product = weights * decay * gain
+        rows = (decay.real, decay.imag, product.real, product.imag)
         for row, values in enumerate(rows):
             table[block, :, row, : values.shape[1]] = values
-        fresh[some] = np.sum((weights * gain).real, axis=0)
-    return table.ravel(), fresh[grid.entry]
+        response[some] = np.sum((weights * gain).real, axis=0)
+    return table.ravel(), response[grid.entry]
 
 
-def explicit_tables(grid: Grid, step: float, table: Floats, fresh: Floats) -> ExplicitTables:
+def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) -> ExplicitTables:
     """Tables from `step_table` with arrays to work in, which belongs to one run."""
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
-    packed = zeros(blocks(grid.frequency.size) * grid.copies * 2 * LANES)
+    packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * LANES)
     spectra, fields = work_arrays(2, modes, complex), work_arrays(2, nodes, float)
-    return ExplicitTables(step, table, fresh, packed, *spectra, *fields)
+    return ExplicitTables(step, table, response, packed, *spectra, *fields)
 
 
 @jit_inside
-def pack(place: Array, spectrum: Array, packed: Array) -> None:
+def pack(offset: Array, spectrum: Array, packed: Array) -> None:
     """All modes of a transform but the mean into packed order."""
     for q in range(1, spectrum.size):
-        o = place[q]
+        o = offset[q]
         packed[o] = spectrum[q].real
         packed[o + 64] = spectrum[q].imag
 
 
-@jit
+@jit_inside
 def advance_memory(
-    memory: Array, table: Array, rate: Array, carried: Array, pairs: int, copies: int
+    memory: Array, table: Array, rate: Array, memory_sum: Array, pairs: int, multiplicity: int
 ) -> None:
-    """y <- E y + V and carried = Re sum w E B y, for all modes and pairs: the one pass."""
+    """y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs: the one pass."""
     size = pairs * 256
     for own in range(table.size // size):
         # Views that begin at zero: the compiler then knows that no index is negative. One of each
         # a block and none a pair: making a view costs as much as a few modes.
         e = table[own * size :][:size]
-        for copy in range(copies):
-            block = own * copies + copy
+        for copy in range(multiplicity):
+            block = own * multiplicity + copy
             y = memory[block * size :][:size]
-            v, c = rate[block * 128 :][:128], carried[block * 128 :][:128]
+            v, c = rate[block * 128 :][:128], memory_sum[block * 128 :][:128]
             for j in range(128):
                 c[j] = 0.0
             for p in range(pairs):
@@ -162,23 +157,23 @@ def advance_memory(
                     c[64 + j] += cr * ar - ci * ai
 
 
-def carry_memory(grid: Grid, memory: Floats, table: Floats, carried: Floats) -> None:
-    """Put Re sum w E B y into `carried` without advancing: where an explicit phase begins."""
+def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) -> None:
+    """Put Re sum w E B y into `memory_sum` without advancing: where an explicit phase begins."""
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, LANES)
-    y = memory.reshape(count, grid.copies, pairs, 2, 2, LANES)  # of real signal and imaginary
+    y = memory.reshape(count, grid.multiplicity, pairs, 2, 2, LANES)  # of both signals
     for block in range(count):
         real, imaginary = rows[block, :, 2, None, :], rows[block, :, 3, None, :]
-        for copy in range(grid.copies):
+        for copy in range(grid.multiplicity):
             own = y[block, copy]
             terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
-            carried.reshape(count, grid.copies, 2, LANES)[block, copy] = terms.sum(axis=0)
+            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(axis=0)
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
     """psi = B y, or y = psi/B with `divide`, in place: at the switch between kinds of step."""
     count = blocks(grid.frequency.size)
-    y = memory.reshape(count, grid.copies, grid.poles.size, 4, LANES)
+    y = memory.reshape(count, grid.multiplicity, grid.poles.size, 4, LANES)
     for block in range(count):
         frequency = grid.frequency[block * LANES : (block + 1) * LANES]
         factor = step * phi(np.multiply.outer(grid.poles, frequency * step))
@@ -191,7 +186,11 @@ def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> No
 
 @jit_inside
 def _phi(z: Any) -> Any:
-    return 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0 * (1.0 + z / 6.0))))
+    """(exp(z) - 1)/z near z = 0."""
+    value = 1.0 + 0.0j
+    for k in range(6, 1, -1):
+        value = 1.0 + z / k * value
+    return value
 
 
 @jit_inside
@@ -210,7 +209,7 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
         *work_arrays(4, modes, complex),
         *work_arrays(8, nodes, float),
         np.zeros(nodes, dtype=np.int64),
-        *np.zeros((2, count * grid.copies * 2 * LANES)),
+        *np.zeros((2, count * grid.multiplicity * 2 * LANES)),
         np.empty((2, 2 * LANES)),
     )
     return ImplicitTables(np.array([-1.0, -1.0]), *arrays)
@@ -218,25 +217,26 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
 
 @jit_inside
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
-    """E and B = int_0^h exp(s |k| c_s t') dt' into `table`, packed as in `memory_layout`.
+    """E and B = int_0^h exp(s |k| c_s t') dt' into `table`.
 
     `ramp`, [block][pair][2][64], gets the counterpart of B for a slip rate that rises linearly with
-    zero mean; `fresh` and `fresh_ramp` get their sums Re sum w B. On a line |k| c_s is j + 1 times
-    the lowest, so the exponentials of a pole are powers of one number: a product each, with a
+    zero mean; `response` and `ramp_response` get their sums Re sum w B. On a line |k| c_s is j + 1
+    times the lowest, so the exponentials of a pole are powers of one number: a product each, with a
     relative error of 1e-16 j.
     """
-    table, ramp, fresh, fresh_ramp = tables.table, tables.ramp, tables.fresh, tables.fresh_ramp
-    for j in range(fresh.size):
-        fresh[j] = fresh_ramp[j] = 0.0
+    table, ramp = tables.table, tables.ramp
+    response, ramp_response = tables.response, tables.ramp_response
+    for j in range(response.size):
+        response[j] = ramp_response[j] = 0.0
     pairs = grid.poles.size
     for p in range(pairs):
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.frequency[0] * step)
         base = np.exp(unit)
-        inverse = 1.0 / unit if grid.copies == 1 else 0.0j  # on a plane the first is 0
+        inverse = 1.0 / unit if grid.multiplicity == 1 else 0.0j  # on a plane the first is 0
         decay = 1.0 + 0.0j
-        for j in range(fresh.size):
-            if grid.copies == 1:
+        for j in range(response.size):
+            if grid.multiplicity == 1:
                 decay = decay * base
                 z = unit * (j + 1)
                 part = 1.0
@@ -245,24 +245,24 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
                 decay = np.exp(z)
                 part = grid.mode_two[j] if p < grid.split else 1.0 - grid.mode_two[j]
             if z.real * z.real + z.imag * z.imag < 4e-4:
-                gain, lean = step * _phi(z), step * step * _ramp(z)
+                gain, ramp_gain = step * _phi(z), step * step * _ramp(z)
             else:
-                per_z = inverse * (1.0 / (j + 1)) if grid.copies == 1 else 1.0 / z
+                per_z = inverse * (1.0 / (j + 1)) if grid.multiplicity == 1 else 1.0 / z
                 ratio = (decay - 1.0) * per_z
-                gain, lean = step * ratio, step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
+                gain, ramp_gain = step * ratio, step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
             o = ((j // 64) * pairs + p) * 128 + j % 64
-            ramp[o], ramp[o + 64] = lean.real, lean.imag
-            fresh[j] += part * (weight * gain).real
-            fresh_ramp[j] += part * (weight * lean).real
+            ramp[o], ramp[o + 64] = ramp_gain.real, ramp_gain.imag
+            response[j] += part * (weight * gain).real
+            ramp_response[j] += part * (weight * ramp_gain).real
 
 
 @jit_inside
 def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Put Re sum w E psi of all modes into `carried`: what the past leaves after the step."""
-    pairs, copies, split = grid.poles.size, grid.copies, grid.split
+    """Put Re sum w E psi of all modes into `memory_sum`: what the past leaves after the step."""
+    pairs, multiplicity, split = grid.poles.size, grid.multiplicity, grid.split
     sums = tables.sums  # of the pairs before `split`, and of those from there on
     for block in range(memory.size // (256 * pairs)):
         for j in range(128):
@@ -270,7 +270,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for p in range(pairs):
             # Views that begin at zero: the compiler then knows that no index is negative.
             y = memory[(block * pairs + p) * 256 :][:256]
-            e = tables.table[(block // copies * pairs + p) * 256 :][:256]
+            e = tables.table[(block // multiplicity * pairs + p) * 256 :][:256]
             out = sums[0 if p < split else 1]
             wr, wi = grid.weights[p].real, grid.weights[p].imag
             for j in range(64):
@@ -280,10 +280,10 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(128):
             tables.packed[block * 128 + j] = sums[0, j]
             tables.others[block * 128 + j] = sums[1, j]
-    for q in range(1, tables.carried.size):
-        o, share = grid.place[q], grid.mode_two[grid.entry[q]]
+    for q in range(1, tables.memory_sum.size):
+        o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
         rest = 1.0 - share
-        tables.carried[q] = complex(
+        tables.memory_sum[q] = complex(
             share * tables.packed[o] + rest * tables.others[o],
             share * tables.packed[o + 64] + rest * tables.others[o + 64],
         )
@@ -292,14 +292,14 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
 @jit_inside
 def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
     """psi <- E psi + B V, V = `rate_hat`, with a slip rate that changes by `past_hat` in it."""
-    pairs, copies = grid.poles.size, grid.copies
-    pack(grid.place, tables.rate_hat, tables.packed)
-    pack(grid.place, tables.past_hat, tables.others)
+    pairs, multiplicity = grid.poles.size, grid.multiplicity
+    pack(grid.offset, tables.rate_hat, tables.packed)
+    pack(grid.offset, tables.past_hat, tables.others)
     for block in range(memory.size // (256 * pairs)):
         v, a = tables.packed[block * 128 :][:128], tables.others[block * 128 :][:128]
         for p in range(pairs):
             y = memory[(block * pairs + p) * 256 :][:256]
-            own = block // copies * pairs + p
+            own = block // multiplicity * pairs + p
             e, s = tables.table[own * 256 :][:256], tables.ramp[own * 128 :][:128]
             for j in range(64):
                 er, ei, gr, gi, lr, li = e[j], e[64 + j], e[128 + j], e[192 + j], s[j], s[64 + j]
@@ -318,7 +318,7 @@ def grown_memory(grid: Grid, memory: Array, rate_hat: Array, growth: float) -> A
     pairs = grid.poles.size
     for q in range(1, rate_hat.size):
         v, entry = rate_hat[q], grid.entry[q]
-        o = grid.place[q] // 128 * pairs * 256 + grid.place[q] % 64
+        o = grid.offset[q] // 128 * pairs * 256 + grid.offset[q] % 64
         for p in range(pairs):
             part = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
             gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from stiction.dynamics.checks import (
-    SLOWEST,
     check_finite,
     check_start,
     warn_if_coarse,
@@ -19,7 +18,7 @@ from stiction.dynamics.checks import (
 )
 from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.loading import load_history, turns
+from stiction.dynamics.loading import load_history, turning_times
 from stiction.dynamics.medium import Medium, prepare_medium, refused_laws
 from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.state import Nodes, Setting, State, Thresholds
@@ -35,13 +34,9 @@ Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_in
 
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300
-_CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
-_STEADY_STRESS = 1e-2  # Z V of creep, likewise
 # Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
 # those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
 _UNSTABLE_STRESS = 0.075
-_SMALL_DROP = 0.1  # of the stress scale: weakening below that is not resolved in implicit steps
-_GROWTH = 1.3  # of the slip rate in one implicit step, once it shows in the mean stress
 
 Start = Literal["equilibrium", "rest"]
 Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
@@ -52,18 +47,12 @@ _LATER = (
 )  # fmt: skip
 
 
-def _history(value: Any, info: pydantic.ValidationInfo) -> Any:
-    """Times and values of a load, or None."""
-    return None if value is None else load_history(value, info.data.get("end_time"))
-
-
 LoadHistory = Annotated[
     Any,
-    BeforeValidator(_history),
+    BeforeValidator(lambda value: None if value is None else load_history(value)),
     PlainSerializer(lambda value: None if value is None else [one.tolist() for one in value]),
     WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
 ]
-"""tau_0(t): (times, values), or a function that is sampled up to the end time."""
 
 
 @model(kw_only=True)
@@ -81,12 +70,10 @@ class Rupture:
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
     kernel_tolerance : float
-        Error allowed in the memory kernel C(T) by its sum of exponentials (1). The sum is fitted
-        once a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
+        Error allowed in the memory kernel C(T) by its sum of exponentials (1), up to
+        T = |k| c_s t = 1e5; older slip rate decays faster than it should. The sum is fitted once
+        a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
         Refused where the error makes waves grow at any time step, from some 1e-3 on.
-    memory_range : float
-        That error holds up to T = |k| c_s t of this size (1); older slip rate decays faster than
-        it should.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     time_step : float, optional
@@ -95,21 +82,18 @@ class Rupture:
         Slip of any node in one implicit step, in units of its d_c, as long as it weakens.
     load_step : float
         Rise of the load in one implicit step, in units of the stress scale (see Notes).
-    event_drop : float
-        Fall of the mean stress that counts as an instability, in the same units.
     start : {"equilibrium", "rest"}
         "rest": at the first slip. "equilibrium": on the quasi-static path, as close below the
-        first instability as an estimate of the error allows; `start_load` says where, and
-        `start_error` (Pa) what the estimate is. Where there is no such state, the run begins at
-        the first slip and `start_error` is 0: at a loading rate too fast for it, on planes, with
-        laws without straight pieces, barriers or stress above the strength, where a node loses
-        half of its strength before.
+        first instability as an estimate of the error allows; `start_load` is the load there, and
+        `start_error` (Pa) the estimate. Where there is no such state, the run begins at the first
+        slip and `start_error` is 0: at a loading rate too fast for it, on planes, with laws
+        without straight pieces, barriers or stress above the strength, where a node loses half
+        of its strength before.
     end_time : float, optional
         s; a run never goes beyond it, except for a part of the last explicit step.
-    load : (times, values) or function, optional
-        tau_0(t), Pa, for t >= 0 in s, instead of a constant rate; samples are joined by straight
-        lines, and the last slope goes on. A function needs `end_time`, up to which it is sampled.
-        It must not fall before the first slip, and runs begin there.
+    load : (times, values), optional
+        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate; straight lines join
+        them, and the last slope goes on. It must not fall before the first slip, where runs begin.
     arrival : float
         Share of its way to the residual that the strength of a node has lost when the front has
         arrived there, in (0, 1]: 0.5 is the middle of the cohesive zone, 1e-3 its tip.
@@ -141,10 +125,10 @@ class Rupture:
     factor that carries it statically (nan where nothing became unstable, or where an overstressed
     patch slipped at the start and the mean stress was never as high again), `applied_load` the one
     applied at that moment, somewhat higher; the difference is radiated. An instability begins when
-    the mean stress has fallen by `event_drop` below its last maximum, not counting what the load
-    itself goes down. `arrested_events` counts those in which a node slips so fast that Z V exceeds
-    7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all is calm:
-    the waves after an event, and the creep that they modulate, stay slower at any loading rate.
+    the mean stress has fallen by 1e-4 of the stress scale below its last maximum, not counting what
+    the load itself goes down. `arrested_events` counts those in which a node slips so fast that
+    Z V exceeds 7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all
+    is calm: the waves after an event, and the creep that they modulate, stay slower.
     `Equilibrium` also counts jumps too small to reach that slip rate.
     The stress scale is the mean over nodes of tau_p - tau_r, no node counting for more than three
     times the drop tau_0 p + tau_i - tau_r that the largest load so far provides there: barriers
@@ -160,12 +144,10 @@ class Rupture:
     end_time: Positive | None = None
     load: LoadHistory = None
     kernel_tolerance: Positive = 1e-6
-    memory_range: Positive = 1e5
     courant: Fraction = 0.9
     time_step: Positive | None = None
     slip_step: Fraction = 0.02
     load_step: Fraction = 1e-3
-    event_drop: Fraction = 1e-4
     implicit: Flag = True
     arrival: Fraction = 0.5
     start: Start = "equilibrium"
@@ -174,6 +156,8 @@ class Rupture:
     type: Literal["rupture"] = "rupture"
     # What else `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
+    chunk_size: ClassVar[int] = 8
+    label: ClassVar[str] = "rupture"
 
     @pydantic.model_validator(mode="after")
     def _consistent(self) -> Rupture:
@@ -185,16 +169,6 @@ class Rupture:
         if problems:
             raise InputError(problems)
         return self
-
-    @property
-    def chunk_size(self) -> int:
-        """Samples that make a good piece of work in an ensemble."""
-        return 8
-
-    @property
-    def label(self) -> str:
-        """Its name in figures and tables."""
-        return "rupture"
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """About how long a sample takes on one core, s."""
@@ -209,9 +183,7 @@ class Rupture:
         """Reasons why it cannot take a problem; none if it can."""
         refused = refused_laws(problem)
         if self.stop == "runaway" and problem.interface.is_plane:
-            refused.append(
-                "stop: 'runaway' is known of lines only; on a plane stop at 'sliding' or 'onset'"
-            )
+            refused.append("stop: 'runaway' is known of lines only; stop at 'sliding' or 'onset'")
         return refused
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
@@ -220,30 +192,21 @@ class Rupture:
 
     def medium(self, problem: Problem) -> Medium:
         """Return kernel and tables for a problem."""
-        return prepare_medium(
-            problem,
-            tolerance=self.kernel_tolerance,
-            memory_range=self.memory_range,
-            courant=self.courant,
-            time_step=self.time_step,
-        )
+        return prepare_medium(problem, self.kernel_tolerance, self.courant, self.time_step)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver of samples of this problem; the kernel is fitted here, once."""
-        medium = self.medium(problem)
-        static = None
-        if self.start == "equilibrium" and self.implicit and self.loading_rate is not None:
-            static = static_setting(problem)
+        medium, rate = self.medium(problem), self.loading_rate
+        from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
+        static = static_setting(problem) if from_equilibrium else None
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             warn_if_coarse(problem, rows)
             found = []
             for i in range(rows.samples):
                 run = make_run(self, problem.friction, medium, rows, i)
-                state = None
-                if static is not None and self.loading_rate is not None:
-                    state = slow_start(static, run, rows, i, self.loading_rate)
-                found.append(self._one(problem, run, state))
+                start = slow_start(static, run, rows, i, rate) if static and rate else None
+                found.append(self._one(problem, run, start))
             return {
                 name: np.array([one[name] for one in found]) for name in self.variables(problem)
             }
@@ -257,13 +220,11 @@ class Rupture:
         ended, reason = run.follow(state, self.max_steps)
         check_finite(run, state, reason)
         if ended is None:
-            now = state.now
             raise InputError(
-                f"max_steps: {self.max_steps} steps were taken before the run came to stop="
-                f"{self.stop!r} (at t = {now['time']:.6g} s, tau_0 = {now['load']:.6g} Pa, with "
-                f"{now['slid']} of {run.thresholds.breakable} nodes at their residual strength);"
-                " raise max_steps or the loading rate, stop at 'onset', 'rest' or 'runaway', or "
-                "give barriers that never break an infinite strength"
+                f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa, and "
+                f"{state.now['slid']} nodes to their residual strength, but not to stop="
+                f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset', 'rest' "
+                "or 'runaway'"
             )
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
@@ -315,7 +276,7 @@ def make_run(
         mean_initial=float(nodes.initial.mean()),
         load_times=history[0],
         load_values=history[1],
-        turns=turns(history),
+        turning_times=turning_times(history),
         scale_loads=scale[0],
         scales=scale[1],
         thresholds=_thresholds(method, friction, medium, nodes),
@@ -342,22 +303,12 @@ def _thresholds(method: Rupture, friction: FrictionLaw, medium: Medium, nodes: N
         rest_stop=method.stop == "rest",
         end_time=np.inf if method.end_time is None else method.end_time,
         breakable=breakable,
-        calm_stress=_CALM_STRESS,
         calm_slip=max(medium.interface.lengths) / medium.effective_modulus,
-        steady_stress=_STEADY_STRESS,
         calm_count=max(_CALM_STEPS, int(np.ceil(crossing))),
         slip_step=method.slip_step,
-        small_drop=_SMALL_DROP,
         load_step=method.load_step,
         smallest_step=_SWITCH * medium.step,
-        largest_step=SLOWEST,
-        residual=1e-9,
-        event_drop=method.event_drop,
         unstable_rate=_UNSTABLE_STRESS * typical / medium.impedance,
-        noticed=1e-7,
-        growth=_GROWTH,
-        peak_width=1e-5,
-        negligible=5e-7,
         arrival=float(arrival),
         curved=not friction.linear,
         explicit_only=not method.implicit,

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.errors import InputError, prefixed
-from stiction.model import FilePath, Flag, checked, describe
-from stiction.tables import read_table
+from stiction.errors import InputError
 from stiction.units import factor_to
 
 if TYPE_CHECKING:
     import xarray as xr
 
-UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa", "strain": "1"}
-"""What can be compared; strain is that along the interface, of the upper solid's face."""
+UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa"}
+"""What can be compared."""
 FEWEST = 5
 FINEST = 60
 """Steps of the search for the shift, each with 0.6 times as far to go on either side."""
-_HEADING = re.compile(
-    r"(?P<what>slip[ _]rate|slip|shear[ _]stress|strain)\s+at\s+(?P<x>[\d.eE+-]+)\s*(?P<unit>\w+)$"
-)
 
 
 class Misfit(NamedTuple):
@@ -46,70 +39,17 @@ class Misfit(NamedTuple):
     by_gauge: Array
 
 
-@checked
-def read_record(path: FilePath) -> xr.DataArray:
-    """Read a record of gauges from a text file.
-
-    Parameters
-    ----------
-    path : path
-        A table with a heading: ``time [ms]``, then a column for each gauge, such as
-        ``slip rate at 30 mm [m/s]``. One quantity a file: slip, slip rate, shear stress or strain.
-
-    Returns
-    -------
-    xarray.DataArray
-        Over ('time', 'x'), in SI units, named by the quantity.
-
-    Raises
-    ------
-    InputError
-        If a unit or a place is missing, or quantities are mixed.
-    """
-    import xarray as xr
-
-    with prefixed(str(path)):
-        table: Any = read_table(path)
-    if not next(iter(table.data_vars)).lower().startswith("t"):
-        raise InputError(f"{path}: the first column must be the time, with its unit: 'time [ms]'")
-    columns: list[Array] = []
-    places: list[float] = []
-    kinds: list[str] = []
-    for name, column in table.data_vars.items():
-        unit, values = column.attrs.get("units"), column.values
-        if unit is None:
-            raise InputError(f"{path}: the unit of {name!r} is not stated; write it in brackets")
-        if not columns:
-            columns.append(values * factor_to("s", unit))
-            continue
-        found = _HEADING.match(str(name).strip())
-        if found is None:
-            raise InputError(
-                f"{path}: {name!r} does not say what and where; write 'slip rate at 30 mm [m/s]'"
-            )
-        kinds.append(found["what"].replace(" ", "_"))
-        places.append(float(found["x"]) * factor_to("m", found["unit"]))
-        columns.append(values * factor_to(UNITS[kinds[-1]], unit))
-    if len(set(kinds)) != 1:
-        raise InputError(f"{path}: must hold one quantity, got {', '.join(sorted(set(kinds)))}")
-    coordinates = {"time": columns[0], "x": places}
-    values = np.stack(columns[1:], axis=1)
-    return xr.DataArray(values, coords=coordinates, dims=("time", "x"), name=kinds[0])
-
-
-def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: Flag = True) -> Misfit:
-    """Return how far a simulated rupture is from what gauges recorded.
+def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Misfit:
+    """Return how far a simulated rupture on a line is from what gauges recorded.
 
     Parameters
     ----------
     run : xarray.Dataset
         From `simulate_rupture`, with stations at the gauges, or with the quantity that was
-        measured among its fields ('slip' for strain) and frames dense enough in time.
-    measured : xarray.DataArray or path
-        Over 'time' (s) and 'x' (m), named 'slip', 'slip_rate', 'shear_stress' or 'strain', in SI
-        units or those that its attributes state; or a file for `read_record`. NaN where nothing
-        was recorded. Strain is that along the interface on the face of the upper solid, half the
-        derivative of slip.
+        measured among its fields and frames dense enough in time.
+    measured : xarray.DataArray
+        Over 'time' (s) and 'x' (m), named 'slip', 'slip_rate' or 'shear_stress', in SI units or
+        those that its attributes state. NaN where nothing was recorded.
     align : bool
         Shift the record in time for the best fit, the same for all gauges; otherwise its times are
         those of the run.
@@ -132,13 +72,12 @@ def misfit(run: xr.Dataset, measured: xr.DataArray | str | Path, *, align: Flag 
     before the first and after the last. The search begins at every shift that puts the steepest
     moment of the record on a step or frame, and closes in on the best three.
     """
-    record = read_record(Path(measured)) if isinstance(measured, str | Path) else measured
-    kind = str(getattr(record, "name", None))
+    kind = str(getattr(measured, "name", None))
     if kind not in UNITS:
         raise InputError(
             f"measured: must be a DataArray named one of {', '.join(UNITS)}, got {kind!r}"
         )
-    times, values, places = _checked(record)
+    times, values, places = _checked(measured)
     clock, simulated = _at_gauges(run, kind, places)
     held = np.isfinite(values)
     weight = float(np.sum(values[held] ** 2))
@@ -165,9 +104,11 @@ def _best_shift(squares: Any, clock: Array, times: Array, values: Array) -> floa
     starts = clock - anchor
     found = np.array([squares(shift).sum() for shift in starts])
     step = float(np.diff(times).min())
+    gaps = np.diff(clock)
     best, least = 0.0, np.inf
-    for start in starts[np.argsort(found)[:3]]:
-        shift, reach, lowest = float(start), max(10.0 * step, _gap(clock, start + anchor)), np.inf
+    for first in np.argsort(found)[:3]:
+        beside = gaps[max(0, first - 2) : first + 1].max()
+        shift, reach, lowest = float(starts[first]), max(10.0 * step, beside), np.inf
         for _ in range(FINEST):
             around = shift + reach * np.linspace(-1.0, 1.0, 9)
             sums = np.array([squares(one).sum() for one in around])
@@ -180,15 +121,9 @@ def _best_shift(squares: Any, clock: Array, times: Array, values: Array) -> floa
     return best
 
 
-def _gap(clock: Array, moment: float) -> float:
-    """Return the larger distance of a moment from those beside it."""
-    i = int(np.clip(np.searchsorted(clock, moment), 1, clock.size - 1))
-    return float(np.diff(clock)[max(0, i - 2) : i + 1].max())
-
-
 def _checked(record: xr.DataArray) -> tuple[Array, Array, Array]:
     """Return times, values (times, gauges) and places of a record, SI."""
-    if "time" not in record.dims or "time" not in record.coords or "x" not in record.coords:
+    if "time" not in record.dims or "x" not in record.coords:
         raise InputError(
             "measured: must have a dimension 'time' with coordinates (s) and a coordinate 'x' (m),"
             f" got dimensions {', '.join(map(str, record.dims))}"
@@ -222,26 +157,19 @@ def _at_gauges(run: xr.Dataset, kind: str, places: Array) -> tuple[Array, Array]
     if outside.size:
         raise InputError(
             f"measured: a gauge at x = {outside[0]:g} m is not on the interface, 0 to {length:g} m;"
-            f" check its unit, got {describe(places.tolist())}"
+            " check its unit"
         )
-    recorded = f"station_{kind}"
-    if recorded in run:
+    if f"station_{kind}" in run:
         away = np.abs(run["station_x"].values - places[:, None])
-        nearest = away.argmin(axis=1)
         if np.all(away.min(axis=1) <= 0.5 * spacing * (1.0 + 1e-9)):
-            values = run[recorded].transpose("step", "station").values[:, nearest]
-            return run["step_time"].values, values
-    name = "slip" if kind == "strain" else kind
-    if name not in run or "x" not in run[name].dims:
+            recorded = run[f"station_{kind}"].transpose("step", "station").values
+            return run["step_time"].values, recorded[:, away.argmin(axis=1)]
+    if kind not in run or "x" not in run[kind].dims:
         raise InputError(
-            f"run: holds no {name} at the gauges; give save=st.Save([{name!r}]), or stations at "
+            f"run: holds no {kind} at the gauges; give save=st.Save([{kind!r}]), or stations at "
             "the gauges, to st.simulate_rupture"
         )
-    field = np.asarray(run[name].transpose("time", "x").values, dtype=np.float64)
-    if kind == "strain":
-        waves = 2.0j * np.pi * np.fft.rfftfreq(x.size, spacing)
-        waves[-1] = 0.0  # the highest wave of the grid has no derivative
-        field = 0.5 * np.fft.irfft(waves * np.fft.rfft(field, axis=1), x.size, axis=1)
+    field = np.asarray(run[kind].transpose("time", "x").values, dtype=np.float64)
     around = np.concatenate([x, [length]])
     closed = np.concatenate([field, field[:, :1]], axis=1)
     values = np.stack([[np.interp(p, around, row) for row in closed] for p in places], axis=1)

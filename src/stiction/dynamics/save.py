@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,16 +19,7 @@ from stiction.dynamics.summary import per_area
 from stiction.errors import InputError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_atomically
 from stiction.interface import Interface
-from stiction.model import (
-    Count,
-    FilePath,
-    Names,
-    Positive,
-    checked,
-    describe,
-    model,
-    real_array,
-)
+from stiction.model import Count, FilePath, Names, Text, checked, model, real_array
 from stiction.results import Variable, along, coordinate, to_dataset
 
 if TYPE_CHECKING:
@@ -38,8 +28,7 @@ if TYPE_CHECKING:
 FRAMES = 64
 """Frames in a file of a folder."""
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
-_NEAR_ONSET = 0.02  # fall of the mean stress, in stress scales, that counts as 'around'
-_CHECKPOINT, _SUMMARY = "checkpoint.npz", "summary.nc"
+_CHECKPOINT, _SUMMARY, _CHUNKS = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
 FIELDS: dict[str, Variable] = {
     "slip": Variable("m", "slip", ("time",)),
@@ -58,8 +47,6 @@ SCALARS: dict[str, Variable] = {
     "strain_energy": Variable("J/m", "static strain energy of the slip", ("time",)),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual", ("time",)),
     "radiated_energy": Variable("J/m", "work less friction less strain energy", ("time",)),
-    "time_step": Variable("s", "size of the last step", ("time",)),
-    "step_number": Variable("1", "steps taken so far", ("time",)),
 }
 STEPS: dict[str, Variable] = {  # in the order of RECORD
     "step_time": Variable("s", "time after each step", ("step",)),
@@ -79,33 +66,20 @@ STATIONS: dict[str, Variable] = {  # in the order of a station's columns
     ),
 }
 TIME = Variable("s", "time from zero load", ("time",))
+_WATCHED = ("time", "load", "mean_stress", "work")
 
 
-def _stations(given: Any) -> dict[str, tuple[float, ...]]:
-    """Names and places, a number or a pair each."""
-    if not isinstance(given, Mapping):
-        raise InputError(
-            "must be names and places in m, such as {'centre': 0.05}, on a plane {'centre': "
-            f"(0.05, 0.02)}}, got {describe(given)}"
-        )
-    found, problems = {}, []
-    for name, place in given.items():
-        try:
-            values = real_array(place)
-        except TypeError:
-            values = np.array([np.nan])
-        if not isinstance(name, str) or not name:
-            problems.append(f"a name must be a text, got {describe(name)}")
-        elif values.size not in (1, 2) or not np.all(np.isfinite(values)):
-            problems.append(f"{name}: must be a place x or (x, y) in m, got {describe(place)}")
-        else:
-            found[name] = tuple(values.ravel().tolist())
-    if problems:
-        raise InputError(problems)
-    return found
+def _place(value: Any) -> tuple[float, ...]:
+    try:
+        place = real_array(value).ravel()
+    except TypeError:
+        place = np.empty(0)
+    if place.size not in (1, 2) or not np.all(np.isfinite(place)):
+        raise ValueError("must be a place x or (x, y) in m")
+    return tuple(place.tolist())
 
 
-Stations = Annotated[dict[str, tuple[float, ...]], BeforeValidator(_stations)]
+Place = Annotated[tuple[float, ...], BeforeValidator(_place)]
 
 
 @model
@@ -118,12 +92,8 @@ class Save:
         Fields to keep in frames.
     every : int
         Explicit steps between frames; while the interface creeps, a tenth as many implicit steps
-        (at least one). Since steps shorten as it accelerates, frames are dense in time around the
-        onset anyhow.
-    interval : float, optional
-        s; at most one frame in each interval of this length, counted from zero load.
-    near_onset : int, optional
-        Explicit steps between frames until the mean stress has fallen by 2 % of the stress scale.
+        (at least one). Steps shorten as it accelerates, so that frames are dense in time around
+        the onset.
     stations : mapping of str to float or (float, float)
         Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
         (traction) are recorded after every step. The node nearest to a place is taken.
@@ -142,9 +112,7 @@ class Save:
 
     fields: Names = ("slip", "slip_rate", "shear_stress")
     every: Annotated[Count, pydantic.Field(le=10**6)] = 10
-    interval: Positive | None = None
-    near_onset: Annotated[Count, pydantic.Field(le=10**6)] | None = None
-    stations: Stations = pydantic.Field(default_factory=dict)
+    stations: dict[Text, Place] = pydantic.Field(default_factory=dict)
     to: FilePath | None = None
 
     @pydantic.model_validator(mode="after")
@@ -164,53 +132,34 @@ class Save:
         InputError
             Naming every station that is not on the interface.
         """
+        wanted = "a pair (x, y)" if interface.is_plane else "a number x"
+        reach = " x ".join(f"{length:g}" for length in interface.lengths)
         problems, numbers = [], []
         for name, place in self.stations.items():
             if len(place) != len(interface.shape):
-                wanted = "a pair (x, y)" if interface.is_plane else "a number x"
                 problems.append(f"stations[{name!r}]: must be {wanted} in m, got {place}")
-                continue
-            if not all(0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)):
-                reach = " x ".join(f"{length:g}" for length in interface.lengths)
+            elif not all(0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)):
                 problems.append(
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m; places "
                     "are in m, from the first node"
                 )
-                continue
-            cells = zip(place, interface.spacings, interface.shape, strict=True)
-            index = tuple(round(x / spacing) % n for x, spacing, n in cells)
-            numbers.append(int(np.ravel_multi_index(index, interface.shape)))
+            else:
+                cells = zip(place, interface.spacings, interface.shape, strict=True)
+                index = tuple(round(x / spacing) % n for x, spacing, n in cells)
+                numbers.append(int(np.ravel_multi_index(index, interface.shape)))
         if problems:
             raise InputError(problems)
         return np.array(numbers, dtype=np.int64)
 
-    def steps(self, state: State) -> int:
-        """Return the number of steps to the next frame."""
-        if not state.explicit:
-            return max(1, self.every // 10)
-        falling = state.now["local_stress"] - state.now["mean_stress"]
-        if self.near_onset is not None and falling < _NEAR_ONSET * state.now["scale"]:
-            return self.near_onset
-        return self.every
-
 
 class Recorder:
-    """Frames and step records gathered so far, and their folder if there is one.
-
-    Parameters
-    ----------
-    run : Run
-    save : Save
-    attributes : mapping
-        Of the datasets.
-    """
+    """Frames and step records gathered so far, and their folder if there is one."""
 
     def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
         self._columns = len(RECORD) + len(STATIONS) * len(save.stations)
-        most = max(save.every, save.near_onset or 1)
-        self._record = np.empty((most, self._columns))
+        self._record = np.empty((save.every, self._columns))
         self._frames: list[dict[str, Any]] = []
         self._steps: list[Floats] = []
         self.variables = (
@@ -233,21 +182,15 @@ class Recorder:
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             strain = strain_energy(state.slip_hat, medium.grid)
         friction = fracture + float((nodes.residual * state.slip).sum()) * cell
-        work = float(now["work"])
-        frame: dict[str, Any] = {
-            "time": float(now["time"]),
-            "load": float(now["load"]),
-            "mean_stress": float(now["mean_stress"]),
+        frame: dict[str, Any] = {name: float(now[name]) for name in _WATCHED}
+        frame |= {
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
             "weakened_fraction": float(now["slid"]) / state.slip.size,
             "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
-            "work": work,
             "strain_energy": strain,
             "fracture_energy": fracture,
-            "radiated_energy": work - friction - strain,
-            "time_step": float(now["step"]),
-            "step_number": state.steps,
+            "radiated_energy": frame["work"] - friction - strain,
         }
         fields = {
             "slip": state.slip,
@@ -262,10 +205,8 @@ class Recorder:
     def take(self) -> xr.Dataset:
         """Return all that was gathered since the last time, labelled."""
         interface, save = self.run.medium.interface, self.save
-        data = {
-            name: np.array([frame[name] for frame in self._frames])
-            for name in ("time", *SCALARS, *save.fields)
-        }
+        names = ("time", *SCALARS, *save.fields)
+        data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
         if not self._frames:
             data |= {name: np.empty((0, *interface.shape)) for name in save.fields}
         record = np.concatenate([np.empty((0, self._columns)), *self._steps])
@@ -276,51 +217,42 @@ class Recorder:
         if save.stations:
             own = record[:, len(RECORD) :].reshape(-1, len(save.stations), len(STATIONS))
             data |= {name: own[..., i].copy() for i, name in enumerate(STATIONS)}
-            names = Variable("", "name of a station", ("station",))
-            coordinates["station"] = (np.array(list(save.stations), dtype=str), names)
+            label = Variable("", "name of a station", ("station",))
+            coordinates["station"] = (np.array(list(save.stations), dtype=str), label)
             index = np.unravel_index(self.run.setting.stations, interface.shape)
             for dim, i, spacing in zip(interface.dims, index, interface.spacings, strict=True):
                 place = Variable("m", f"{dim} of a station's node", ("station",))
                 coordinates[f"station_{dim}"] = (i * spacing, place)
         return to_dataset(data, self.variables, coordinates, self.attributes)
 
-    def begin(self, state: State) -> None:
-        """Open the folder; if it holds this run, let the state be where that was last written.
+    def begin(self, state: State) -> bool:
+        """Open the folder; return whether it holds this very run up to its end.
 
-        Raises
-        ------
-        InputError
-            If the folder holds anything else.
+        If it holds a part of the run, the state becomes that which was written last.
         """
-        folder = self.save.to
-        if folder is None:
-            return
-        checkpoint = folder / _CHECKPOINT
-        if checkpoint.exists():
-            read_checkpoint(checkpoint, self.run, state, self._others)
-            if self.finished:
-                return
-            (folder / _SUMMARY).unlink(missing_ok=True)  # of a run that goes on, to another end
-            for path in _chunks(folder):
-                if int(path.stem.removeprefix("frames-")) > state.steps:
-                    path.unlink()
-            return
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise InputError(
-                f"to: {str(folder)!r} exists, is not empty and holds no rupture; give a new folder"
-            )
-        folder.mkdir(parents=True, exist_ok=True)
-        write_checkpoint(checkpoint, self.run, state, self._others)
-
-    @property
-    def finished(self) -> bool:
-        """Whether the folder holds this very run up to its end."""
         import xarray as xr
 
-        if self.save.to is None or not (self.save.to / _SUMMARY).exists():
+        folder = self.save.to
+        if folder is None:
             return False
-        with xr.open_dataset(self.save.to / _SUMMARY, engine="netcdf4") as whole:
-            return bool(whole.attrs["study"] == json.dumps(self.attributes["study"]))
+        checkpoint, whole = folder / _CHECKPOINT, folder / _SUMMARY
+        if not checkpoint.exists():
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                raise InputError(
+                    f"to: {str(folder)!r} is not empty and holds no rupture; give a new folder"
+                )
+            write_checkpoint(checkpoint, self.run, state, self._others)
+            return False
+        read_checkpoint(checkpoint, self.run, state, self._others)
+        if whole.exists():
+            with xr.open_dataset(whole, engine="netcdf4") as summary:
+                if summary.attrs["study"] == json.dumps(self.attributes["study"]):
+                    return True
+            whole.unlink()  # of a run that goes on, to another end
+        for path in folder.glob(_CHUNKS):
+            if int(path.stem.removeprefix("frames-")) > state.steps:
+                path.unlink()
+        return False
 
     @property
     def _others(self) -> str:
@@ -331,11 +263,6 @@ class Recorder:
         """Write what was gathered, if there is enough or by force, and then the state.
 
         Not that of an interrupted run, which steps may have left in the middle of anything.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written (disk full); the files before it stay readable.
         """
         folder = self.save.to
         steps = sum(record.size for record in self._steps) // len(RECORD)
@@ -374,7 +301,7 @@ def _digest(run: Run, others: str) -> str:
     law = np.concatenate([run.friction.fraction(slips), *map(np.ravel, setting.law)])
     digest = hashlib.sha256(repr([medium.interface, float(medium.step), others]).encode())
     for values in (
-        *setting.nodes, law, setting.load_times, setting.load_values, np.array(thresholds, float),
+        *setting.nodes, law, *run.history, np.array(thresholds, float),
         grid.impedance, grid.stiffness, grid.poles, grid.weights,
     ):  # fmt: skip
         digest.update(np.ascontiguousarray(values).tobytes())
@@ -388,16 +315,11 @@ def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> No
 
 
 def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> State:
-    """Fill a state of this very run with what a checkpoint holds, and return it.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or belongs to another problem, strength, load or method.
-    """
+    """Fill a state of this very run with what a checkpoint holds, and return it."""
     try:
         arrays = read_arrays(path)
-        digest = arrays.pop("digest").tobytes().decode()
+        digest = arrays["digest"].tobytes().decode()
+        saved = [arrays[name] for name in state._fields]
     except UNREADABLE as error:
         raise InputError(f"to: {str(path)!r} is not a readable checkpoint: {error}") from None
     if digest != _digest(run, others):
@@ -405,16 +327,9 @@ def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> Sta
             f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
             "the method, or what is kept differs; give a new folder"
         )
-    for name, values in state._asdict().items():
-        saved = arrays.get(name)
-        if saved is None or saved.dtype != values.dtype or saved.shape != values.shape:
-            raise InputError(f"to: {str(path)!r} is damaged: {name} is not what it must be")
-        values[...] = saved  # the arrays stay where steps want them
+    for own, values in zip(state, saved, strict=True):
+        own[...] = values  # in place: the arrays lie where steps want them
     return state
-
-
-def _chunks(folder: Path) -> list[Path]:
-    return sorted(folder.glob("frames-*.nc"))
 
 
 @checked
@@ -440,7 +355,7 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     import xarray as xr
 
     parts = []
-    for path in _chunks(folder):
+    for path in sorted(folder.glob(_CHUNKS)):
         with xr.open_dataset(path, engine="netcdf4") as data:
             unwanted = [f for f in FIELDS if f in data and fields is not None and f not in fields]
             parts.append(data.drop_vars(unwanted).load())
@@ -451,8 +366,7 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
         data_vars="minimal", coords="minimal", compat="override", join="override",
     )  # fmt: skip
     names = [name for name in parts[0] if "step" in parts[0][name].dims]
-    places = [*parts[0]["x"].dims, *(["y"] if "y" in parts[0].dims else []), "time"]
-    steps = [part[names].drop_vars(places, errors="ignore") for part in parts]
+    steps = [part[names].drop_vars(["x", "y", "time"], errors="ignore") for part in parts]
     framed = framed.merge(xr.concat(steps, dim="step", join="override"))
     framed.attrs = parts[-1].attrs
     if (folder / _SUMMARY).exists():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,8 +122,7 @@ def simulate_rupture(
         "stopped": "running",
     }
     recorder = Recorder(run, save, attributes)
-    recorder.begin(state)
-    if save.to is not None and recorder.finished:
+    if recorder.begin(state) and save.to is not None:
         result = open_rupture(save.to, fields=())
         return with_gaps(problem, result, measured)
     if state.steps == 0:
@@ -173,27 +173,24 @@ def _initial(run: Run, slip: Any, load: float | None) -> State:
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
     """Take steps and keep frames until the run ends; return why it did."""
-    save, reversed_ = recorder.save, False
+    every, reversed_ = recorder.save.every, False
     while state.steps < most:
-        before = state.now["time"]
-        count = min(save.steps(state), most - state.steps)
-        taken, reason = recorder.advance(state, count)
+        count = every if state.explicit else max(1, every // 10)
+        taken, reason = recorder.advance(state, min(count, most - state.steps))
         try:
             check_finite(run, state, reason)
         except FloatingPointError as error:
             warn_accuracy(str(error))
             return f"not finite: {error}"
         reversed_ = reversed_ or warn_if_reversed(run, state)
-        stopped, interval = run.ending(state, reason), save.interval
-        if stopped or interval is None or state.now["time"] // interval > before // interval:
-            recorder.add(state)
+        recorder.add(state)
         now = state.now
         meter.note = (
             f"t = {now['time']:.6g} s, mean stress {now['mean_stress'] * 1e-6:.4f} MPa, "
             f"{now['slid'] / state.slip.size:.0%} weakened"
         )
         meter.advance(taken)
-        if stopped:
+        if stopped := run.ending(state, reason):
             return stopped
         recorder.flush(state)
     return "max_steps"
@@ -204,23 +201,22 @@ def _complete(
 ) -> xr.Dataset:
     """Add what belongs to the run as a whole."""
     interface = problem.interface
-    fields = {
-        "peak_strength": run.setting.nodes.strength,
-        "arrival_time": state.arrival,
+    found: dict[str, Any] = {
+        "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
+        "arrival_time": state.arrival.reshape(interface.shape),
         "front_speed": front_speed(problem, run, state),
     }
-    for name, values in fields.items():
-        variable = along(interface, _ALONG[name])
-        attrs = {"units": variable.units, "long_name": variable.long_name}
-        dataset[name] = (variable.dims, values.reshape(interface.shape), attrs)
+    variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
+    for name, variable in method.variables(problem).items():
+        variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
-        scalars = summary(problem, run, state)
-    for name, value in scalars.items():
-        variable = method.variables(problem)[name]
-        label = {"units": variable.units, "long_name": variable.long_name}
+        found |= summary(problem, run, state)
+    for name, value in found.items():
+        variable = variables[name]
         # Energies and moment are already there over 'time'; their last value is the total.
         if name not in dataset or "time" not in dataset[name].dims:
-            dataset[name] = (variable.dims[1:], value, label)
+            label = {"units": variable.units, "long_name": variable.long_name}
+            dataset[name] = (variable.dims, value, label)
     if interface.is_plane:
         names, what = coordinate(interface, DIRECTION)
         dataset = dataset.assign_coords({DIRECTION: (DIRECTION, names)})

@@ -40,19 +40,7 @@ def static_setting(problem: Problem) -> LineProgram | None:
 def slow_start(
     setting: LineProgram, run: Run, rows: Sample, number: int, rate: float
 ) -> State | None:
-    """The state closest to the onset whose error is small enough, None if there is none.
-
-    Parameters
-    ----------
-    setting : LineProgram
-        From `static_setting`.
-    run : Run
-    rows : Sample
-    number : int
-        Of the sample in `rows`.
-    rate : float
-        R, Pa/s.
-    """
+    """The state closest to the onset whose error is small enough, None if there is none."""
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
         return None
@@ -89,12 +77,10 @@ def _at(
     nodes, grid = run.setting.nodes, run.medium.grid
     load, back = onset - distance, _BACK * distance
     here, before = (setting.programme(static, cap) for cap in (load, load - back))
-    if here is None or before is None:
-        return None
-    if exceeds(static, here.slip):
+    if here is None or before is None or exceeds(static, here.slip):
         return None
     weakens = nodes.critical > 0.0
-    half = run.thresholds.arrival * nodes.critical
+    half = run.setting.thresholds.arrival * nodes.critical
     if np.any(here.slip[weakens] >= half[weakens]) or np.any(here.slip[~weakens] > 0.0):
         return None
     interval, growth = back / rate, 0.5 * rate / distance
@@ -105,8 +91,8 @@ def _at(
     state = run.start(applied / rate, here.slip)
     rate_hat = run.medium.interface.transform(slip_rate)
     memory = grown_memory(grid, state.memory, rate_hat, growth)
-    pushed = run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
-    stress = run.elastic_stress(state.slip_hat, applied) + pushed
+    stress = run.elastic_stress(state.slip_hat, applied)
+    stress += run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
     stress -= run.medium.impedance * slip_rate
     missed = np.abs(stress - run.strength_after(here.slip))[here.slip > 0.0]
     state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress

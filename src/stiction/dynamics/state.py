@@ -38,7 +38,7 @@ DIAGNOSTICS = np.dtype(
         ("peak_node", "i8"),
         ("local_stress", "f8"),  # last local maximum of the mean stress
         ("local_radiated", "f8"),  # Z <V> there
-        ("in_event", "i8"),  # whether the mean stress has fallen from there by `event_drop`
+        ("in_event", "i8"),  # whether the mean stress has fallen from there by EVENT_DROP
         ("event_rate", "f8"),  # largest slip rate since then, m/s
         ("first_stress", "f8"),  # mean stress at the first instability; -inf before
         ("arrested", "i8"),  # instabilities that have stopped
@@ -55,8 +55,6 @@ DIAGNOSTICS = np.dtype(
         ("calm_steps", "i8"),  # in a row, and the largest slip rate when the row began, m/s
         ("calm_rate", "f8"),
         ("scale", "f8"),  # stress scale of the largest load so far
-        ("event_drop", "f8"),  # fall of the mean stress that counts as an event
-        ("peak_width", "f8"),  # so close below its maximum the mean stress still is at it
         ("start_load", "f8"),  # where the run began, and what that may cost
         ("start_error", "f8"),
     ]
@@ -65,207 +63,81 @@ DIAGNOSTICS = np.dtype(
 
 
 class Thresholds(NamedTuple):
-    """When steps change or end; stresses in units of the stress scale.
+    """When steps change or end: what depends on the method and the problem."""
 
-    Attributes
-    ----------
-    slid_stop : float
-        Nodes at the residual strength at which to return.
-    event_stop, rest_stop : bool
-        Return at an event; when all is at rest after an event.
-    end_time : float
-        s.
-    breakable : int
-        Nodes that can break at all.
-    calm_stress, calm_slip, steady_stress, calm_count : float
-        A step is calm if the fastest node radiates less than Z V = `calm_stress`, or slips less
-        than `calm_slip` (m/Pa) times the rise of the load, or less than `steady_stress` if V has
-        not changed by a factor of 2; after so many in a row, implicit steps take over.
-    slip_step, small_drop : float
-        Loss of strength of a node in one implicit step, in units of tau_p - tau_r, which counts
-        as `small_drop` where it is less.
-    load_step : float
-        Largest rise of the load in one implicit step.
-    smallest_step, largest_step : float
-        Of implicit steps, s; below it explicit steps take over.
-    residual : float
-        Stress at which an implicit step counts as solved.
-    event_drop : float
-        Fall of the mean stress that begins an event.
-    unstable_rate : float
-        Slip rate, m/s, that only an instability reaches.
-    noticed, growth : float
-        Z <V> from which its growth in one implicit step is limited, and the factor.
-    peak_width : float
-        So close below its maximum the mean stress still is at it.
-    negligible : float
-        Rise of the load in a step for which growth does not matter.
-    arrival : float
-        Slip at which a front has arrived, in units of that at the residual strength.
-    curved : bool
-        Whether a friction law is other than linear, whose pieces are met to the bit.
-    explicit_only : bool
-    """
-
-    slid_stop: float
-    event_stop: bool
-    rest_stop: bool
-    end_time: float
-    breakable: int
-    calm_stress: float
-    calm_slip: float
-    steady_stress: float
-    calm_count: int
-    slip_step: float
-    small_drop: float
-    load_step: float
-    smallest_step: float
-    largest_step: float
-    residual: float
-    event_drop: float
-    unstable_rate: float
-    noticed: float
-    growth: float
-    peak_width: float
-    negligible: float
-    arrival: float
-    curved: bool
+    slid_stop: float  # nodes at the residual strength at which to return
+    event_stop: bool  # return at an event
+    rest_stop: bool  # return when all is at rest after an event
+    end_time: float  # s
+    breakable: int  # nodes that can break at all
+    calm_slip: float  # slip (m/Pa) of calm steps, times the rise of the load; see `explicit._calm`
+    calm_count: int  # calm steps in a row after which implicit steps take over
+    slip_step: float  # loss of strength of a node in one implicit step, in tau_p - tau_r
+    load_step: float  # largest rise of the load in one implicit step, in stress scales
+    smallest_step: float  # of implicit steps, s; below it explicit steps take over
+    unstable_rate: float  # slip rate, m/s, that only an instability reaches
+    arrival: float  # slip at which a front has arrived, in units of that at the residual strength
+    curved: bool  # whether the law is other than linear, whose pieces are met to the bit
     explicit_only: bool
 
 
 class Grid(NamedTuple):
-    """Elastic half-spaces on a grid. Read-only, shared by threads.
-
-    Attributes
-    ----------
-    transform : Transform
-    impedance : float
-        Z = G/(2 c_s), Pa s/m.
-    cell : float
-        What a node stands for: dx (m), on a plane dx dy (m²).
-    stiffness : (2, modes) array
-        Static stiffness K(k) and G|k|/2, Pa/m; zero for the mean.
-    entry, place : (modes,) int arrays
-        Which entry of the tables a mode uses, and where its real part is in packed arrays; see
-        `memory`.
-    copies : int
-        Modes that share one entry of the tables: 2 on a plane, kx and -kx, else 1.
-    frequency : (entries,) array
-        |k| c_s of each entry, rad/s.
-    mode_two : (entries,) array
-        How much of it is mode II, (kx/k)²; 1 on a line, whatever its mode.
-    poles, weights : (pairs,) complex arrays
-        Of the sums of exponentials: first those that weigh with `mode_two`, then, on a plane,
-        those of mode III, which weigh with 1 - mode_two.
-    split : int
-        How many of the pairs weigh with `mode_two`.
-    """
+    """Elastic half-spaces on a grid. Read-only, shared by threads."""
 
     transform: Transform
-    impedance: float
-    cell: float
-    stiffness: Array
-    entry: Ints
-    place: Ints
-    copies: int
-    frequency: Array
-    mode_two: Array
-    poles: Spectrum
-    weights: Spectrum
-    split: int
+    impedance: float  # Z = G/(2 c_s), Pa s/m
+    cell: float  # what a node stands for: dx (m), on a plane dx dy (m²)
+    stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
+    entry: Ints  # (modes,): which entry of the tables a mode uses
+    offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
+    multiplicity: int  # modes that share one entry of the tables: 2 on a plane, kx and -kx, else 1
+    frequency: Array  # |k| c_s of each entry, rad/s
+    mode_two: Array  # how much of it is mode II, (kx/k)²; 1 on a line, whatever its mode
+    poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`, then,
+    weights: Spectrum  # on a plane, those of mode III, which weigh with 1 - mode_two
+    split: int  # how many of the pairs weigh with `mode_two`
 
 
 class Nodes(NamedTuple):
-    """What differs between nodes and does not change in a run, each (nodes,).
+    """What differs between nodes and does not change in a run, each (nodes,)."""
 
-    Attributes
-    ----------
-    strength, residual : arrays
-        tau_p (infinite where nothing breaks) and tau_r, Pa.
-    weakening : array
-        W at zero slip, Pa/m.
-    critical : array
-        Slip from which on a node counts as at its residual strength, m.
-    profile : array
-        p (1).
-    initial : array
-        tau_i, Pa.
-    """
-
-    strength: Array
-    residual: Array
-    weakening: Array
-    critical: Array
-    profile: Array
-    initial: Array
+    strength: Array  # tau_p, Pa; infinite where nothing breaks
+    residual: Array  # tau_r, Pa
+    weakening: Array  # W at zero slip, Pa/m
+    critical: Array  # slip from which on a node counts as at its residual strength, m
+    profile: Array  # p
+    initial: Array  # tau_i, Pa
 
 
 class Setting(NamedTuple):
-    """What drives and holds an interface, and how it is stepped. Does not change in a run.
+    """What drives and holds an interface, and how it is stepped. Does not change in a run."""
 
-    Attributes
-    ----------
-    law : NamedTuple
-        ``friction.parameters``.
-    nodes : Nodes
-    mean_profile, mean_initial : float
-        <p>, <tau_i> (Pa).
-    load_times, load_values : arrays
-        Load history, s and Pa.
-    turns : array
-        Times at which the load begins to fall or to rise again, s.
-    scale_loads, scales : arrays
-        Stress scale against the load, Pa.
-    thresholds : Thresholds
-    stations : array of int
-        Nodes whose slip, slip rate and stress the record of steps holds.
-    """
-
-    law: Any
+    law: Any  # ``friction.parameters``
     nodes: Nodes
-    mean_profile: float
-    mean_initial: float
-    load_times: Array
+    mean_profile: float  # <p>
+    mean_initial: float  # <tau_i>, Pa
+    load_times: Array  # load history, s and Pa
     load_values: Array
-    turns: Array
-    scale_loads: Array
+    turning_times: Array  # when the load begins to fall or to rise again, s
+    scale_loads: Array  # stress scale against the load, Pa
     scales: Array
     thresholds: Thresholds
-    stations: Ints
+    stations: Ints  # nodes whose slip, slip rate and stress the record of steps holds
 
 
 class State(NamedTuple):
-    """What changes in a run; two runs from equal states are the same run, bit by bit.
+    """What changes in a run; two runs from equal states are the same run, bit by bit."""
 
-    Attributes
-    ----------
-    slip, rate, stress : (nodes,) arrays
-        m, m/s, Pa; flat, also on a plane.
-    slip_hat : (modes,) complex array
-        Real transform of the slip.
-    past : (nodes,) array
-        Mean slip rate in the last implicit step, m/s.
-    memory : flat array
-        Memory variables as in `memory`: psi/B while explicit, psi while implicit.
-    carried : flat array
-        The memory's part of the next explicit step.
-    arrival : (nodes,) array
-        When the front arrived, s; nan before.
-    diagnostics : (1,) array of DIAGNOSTICS
-    phase : (2,) array
-        1 if explicit steps come next, else 0; size that the next implicit step tries, s.
-    """
-
-    slip: Floats
-    rate: Floats
-    stress: Floats
-    slip_hat: Spectrum
-    past: Floats
-    memory: Floats
-    carried: Floats
-    arrival: Floats
-    diagnostics: NDArray[Any]
-    phase: Floats
+    slip: Floats  # (nodes,), m; flat, also on a plane
+    rate: Floats  # m/s
+    stress: Floats  # Pa
+    slip_hat: Spectrum  # (modes,) real transform of the slip
+    past: Floats  # mean slip rate in the last implicit step, m/s
+    memory: Floats  # as in `memory`: psi/B while explicit, psi while implicit
+    memory_sum: Floats  # weighted sum of the memory variables for the next explicit step
+    arrival: Floats  # when the front arrived, s; nan before
+    diagnostics: NDArray[Any]  # (1,) array of DIAGNOSTICS
+    phase: Floats  # 1 if explicit steps come next, else 0; size that the next implicit one tries, s
 
     @property
     def now(self) -> Any:
@@ -293,18 +165,18 @@ class ExplicitTables(NamedTuple):
     table : flat array
         [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h); the memory
         is kept as psi/B.
-    fresh : (modes,) array
+    response : (modes,) array
         Re sum_p w B, weight of the current slip rate, s.
     """
 
     step: float
     table: Array
-    fresh: Array
+    response: Array
     packed: Array
     rate_hat: Spectrum
     shared: Spectrum
-    moved: Array
-    guess: Array
+    transfer: Array
+    predicted: Array
 
 
 class ImplicitTables(NamedTuple):
@@ -312,33 +184,32 @@ class ImplicitTables(NamedTuple):
 
     Attributes
     ----------
-    made : (2,) array
-        Size (s) and share of the last step that `table` and `symbol` are for; -1 if none.
-    table, ramp : flat arrays
+    valid_for : (2,) array
+        Size (s) and ratio of the last step that `table` and `symbol` are for; -1 if none.
+    table, ramp, response, ramp_response
         See `memory.tabulate`.
-    fresh, fresh_ramp : (entries,) arrays
     symbol, inverse : (modes,) arrays
         Eigenvalues of the matrix of a step, Pa/m, and their inverses.
-    carried, past_hat, rate_hat, work : (modes,) complex arrays
-    pushed, increment, driving, falling, residual, direction, product, other : (nodes,) arrays
+    memory_sum to work : (modes,) complex arrays
+    trial_stress to other : (nodes,) arrays
     slipping : (nodes,) int array
         0 stuck, 1 slipping.
-    packed, others : arrays in packed order, see `memory`
+    packed, others : arrays in packed order
     sums : (2, 128) array
     """
 
-    made: Array
+    valid_for: Array
     table: Array
     ramp: Array
-    fresh: Array
-    fresh_ramp: Array
+    response: Array
+    ramp_response: Array
     symbol: Array
     inverse: Array
-    carried: Spectrum
+    memory_sum: Spectrum
     past_hat: Spectrum
     rate_hat: Spectrum
     work: Spectrum
-    pushed: Array
+    trial_stress: Array
     increment: Array
     driving: Array
     falling: Array

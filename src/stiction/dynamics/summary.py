@@ -52,6 +52,13 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return found
 
 
+def _arrival(run: Run, state: State) -> Floats:
+    """When the front arrived, s, of the interface's shape; nan where times are too coarse."""
+    arrival = state.arrival.reshape(run.medium.interface.shape)
+    resolved = resolves_steps(run, float(state.now["time"]))
+    return arrival if resolved else np.full_like(arrival, np.nan)
+
+
 def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
     """Return the lengths, m, of which speeds are means, in units of the shortest h_n there."""
     interface = problem.interface
@@ -64,19 +71,13 @@ def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
 
 def front_speed(problem: Problem, run: Run, state: State) -> Floats:
     """Apparent speed of the front, m/s, over half of the shortest h_n, of the interface's shape."""
-    interface = problem.interface
-    if not resolves_steps(run, float(state.now["time"])):
-        return np.full(interface.shape, np.nan)
-    arrival = state.arrival.reshape(interface.shape)
-    return rupture_speed(arrival, interface.spacings, _windows(problem, run, 0.5))
+    windows = _windows(problem, run, 0.5)
+    return rupture_speed(_arrival(run, state), problem.interface.spacings, windows)
 
 
 def _axis_speeds(problem: Problem, run: Run, state: State, lengths: float) -> list[Floats]:
     """Apparent speeds of the front along each axis, on the lines through where it began."""
-    interface = problem.interface
-    if not resolves_steps(run, float(state.now["time"])):
-        return [np.full(n, np.nan) for n in interface.shape]
-    arrival = state.arrival.reshape(interface.shape)
+    interface, arrival = problem.interface, _arrival(run, state)
     began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
     windows = _windows(problem, run, lengths)
     found = []
@@ -103,8 +104,9 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
     of an overstressed start: no load carries it.
     """
     medium, now, setting = run.medium, state.now, run.setting
-    peak, first = float(now["peak_stress"]), float(now["first_stress"])
-    kinetic = float(now["kinetic_stress"])
+    peak, first, kinetic = (
+        float(now[name]) for name in ("peak_stress", "first_stress", "kinetic_stress")
+    )
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
     far, near = (_axis_speeds(problem, run, state, lengths) for lengths in (2.0, 0.5))
     dissipated = fracture_energy(run.friction, state.slip, setting.nodes)
@@ -143,20 +145,12 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
 def rupture_speed(arrival: Floats, spacings: Sequence[float], windows: Sequence[float]) -> Floats:
     """Return the apparent speed of the front at each node, m/s; nan where no front passed.
 
-    Parameters
-    ----------
-    arrival : (nodes,) or (nx, ny) array
-        When the front arrived (periodic in the nodes), s; nan where it never did.
-    spacings, windows : sequences of float
-        Along each direction: distance of nodes, and length over which the speed is taken, m.
-
-    Returns
-    -------
-    array of the same shape
-        1/|gradient of arrival|, each component as a difference over its window around the node,
-        where arrival is strictly monotone over the window in some direction, so that the birth of
-        patches and the meeting of fronts do not count as motion. Patches that grow ahead of the
-        front still raise the apparent speed.
+    `arrival` is when the front arrived, s, periodic and nan where it never did; `spacings` of the
+    nodes and `windows` over which speeds are taken, m, hold one number a direction. The speed is
+    1/|gradient of arrival|, each component as a difference over its window around the node, where
+    arrival is strictly monotone over the window in some direction, so that the birth of patches
+    and the meeting of fronts do not count as motion. Patches that grow ahead of the front still
+    raise the apparent speed.
     """
     slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
     for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):

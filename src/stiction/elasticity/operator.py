@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rocket_fft import c2c, c2r, r2c
 
 from stiction.arrays import Array
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 
 
 def stiffness_symbol(
@@ -67,7 +67,7 @@ def make_transform(shape: tuple[int, ...]) -> Transform:
     return Transform((rows, columns), (rows, columns // 2 + 1), axes, axes[:-1], axes[-1:])
 
 
-@jit
+@jit_inside
 def forward(transform: Transform, field: Array, spectrum: Array) -> None:
     """`spectrum` = the unscaled transform of a field; both flat."""
     if transform.first.size == 0:  # rows of one are a fifth slower than flat arrays
@@ -77,7 +77,7 @@ def forward(transform: Transform, field: Array, spectrum: Array) -> None:
         r2c(field.reshape(transform.shape), modes, transform.every, True, 1.0, 1)
 
 
-@jit
+@jit_inside
 def backward(transform: Transform, spectrum: Array, field: Array) -> None:
     """`field` = the inverse transform of a spectrum, which is overwritten; both flat."""
     if transform.first.size == 0:
@@ -88,7 +88,7 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
         c2r(modes, field.reshape(transform.shape), transform.last, False, 1.0 / field.size, 1)
 
 
-@jit
+@jit_inside
 def convolve(
     transform: Transform, multiplier: Array, field: Array, spectrum: Array, out: Array
 ) -> None:
