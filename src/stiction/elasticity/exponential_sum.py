@@ -1,11 +1,11 @@
 """The memory kernel as a short, validated sum of decaying exponentials.
 
-C(T) ~ Re sum_p w_p exp(s_p T) turns the convolution with the whole history into one recursion a
-pair. The arc quadrature already is such a sum, of some 280 terms; balanced truncation shortens it
-(Moore 1981; its Gramians are Cauchy matrices, factorised to high relative accuracy as in Demmel
-1999), variable projection polishes the poles (Golub and Pereyra 1973), and reweighting in the way
-of Lawson (1961) levels the error. A fit counts only if its error on another, denser set of times
-is below the tolerance.
+C(T) ~ Re sum_p w_p exp(s_p T) turns the convolution with the whole history into one
+recursion a pair. The arc quadrature already is such a sum, of some 280 terms; balanced
+truncation shortens it (Moore 1981; its Gramians are Cauchy matrices, factorised to high
+relative accuracy as in Demmel 1999), variable projection polishes the poles (Golub and
+Pereyra 1973), and reweighting in the way of Lawson (1961) levels the error. A fit counts
+only if its error on another, denser set of times is below the tolerance.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _LOOSE, _TIGHT = (10.0, 1.0), (1.0, 0.3)
 class ExponentialSum:
     """Poles and weights of a validated fit, and what was found when it was validated.
 
-    `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the largest
-    |C - sum| found on 0 <= T = |k| c_s t <= t_max.
+    `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the
+    largest |C - sum| found on 0 <= T = |k| c_s t <= t_max.
     """
 
     poles: Complex

@@ -22,8 +22,8 @@ def kernel_sum(
 ) -> ExponentialSum:
     """Return the validated sum of exponentials, from memory, from disk, or built now (about 1 s).
 
-    Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel at once
-    both succeed: each writes aside and renames.
+    Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel
+    at once both succeed: each writes aside and renames.
     """
     return stored_kernel(mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max))
 

@@ -1,10 +1,10 @@
 """The static stiffness K of a line on its nodes: the first column in closed form, its product.
 
-K is the circulant matrix of the symbol (G*/2)|k|. For an even number of nodes n its entries are
+K is the circulant matrix of the symbol (G*/2)|k|. For an even number n of nodes it has
 
-    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,   0 for even j,
+    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,
 
-so that nodes of one parity act on those of the other only: half of each product can be left out.
+0 for even j > 0: nodes of one parity act on those of the other only, which halves products.
 """
 
 from __future__ import annotations
@@ -101,8 +101,9 @@ def apply_stiffness(
 def griffith_length(drop: float, energy: float, modulus: float) -> float:
     """Critical length of a crack (m), infinite without a stress drop.
 
-    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip (Griffith,
-    1921), and grows where that is more than the fracture energy (J/m²); the modulus is G* (Pa).
+    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip
+    (Griffith, 1921), and grows where that is more than the fracture energy (J/m²); the
+    modulus is G* (Pa).
     """
     if drop <= 0.0:
         return np.inf

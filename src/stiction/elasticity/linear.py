@@ -1,9 +1,9 @@
 """Linear algebra with K - W cut to a set of nodes: conjugate gradients, the lowest eigenvector.
 
-The slip of given nodes solves A d = drive with A = K - W cut to them. A spring may hold a patch:
-A + spring phi phi^T is positive definite also where A has one direction phi of negative curvature,
-so that states on and beyond the turning point of the load can be solved for. The preconditioner is
-1/(K(k) + W/2), cut too.
+The slip of given nodes solves A d = drive with A = K - W cut to them. A spring may hold a
+patch: A + spring phi phi^T is positive definite also where A has one direction phi of
+negative curvature, so that states on and beyond the turning point of the load can be solved
+for. The preconditioner is 1/(K(k) + W/2), cut too.
 """
 
 from __future__ import annotations
@@ -119,8 +119,8 @@ def solve_inside(
     """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
 
     x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
-    outside. Of the three fields of the workspace the second is the direction of negative curvature
-    if one is met.
+    outside. Of the three fields of the workspace the second is the direction of negative
+    curvature if one is met.
 
     Returns
     -------
@@ -170,8 +170,9 @@ def lowest_eigenvector(
 ) -> tuple[float, int]:
     """Smallest eigenvalue of A on the nodes `inside`, by single-vector LOBPCG (Knyazev 2001).
 
-    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. It stops
-    where the norm of A y - lambda y is below the tolerance. Returns lambda (Pa/m) and iterations.
+    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. It
+    stops where the norm of A y - lambda y is below the tolerance. Returns lambda (Pa/m) and
+    iterations.
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction

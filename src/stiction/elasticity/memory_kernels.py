@@ -1,13 +1,15 @@
 """The elastodynamic memory kernel of a half-space, as a quadrature over arcs.
 
-With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along the
-interface between two identical half-spaces is (velocity form, Breitenfeld and Geubelle 1998)
+With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along
+the interface between two identical half-spaces is (velocity form, Breitenfeld and Geubelle
+1998)
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.
 
-Everything follows from the Laplace symbol D(s): its inverse transform is taken along arcs in
-Re s < 0 that join the branch points, where the integrand is smooth and decays, so that one set of
-nodes is accurate for every T. The closed forms by Bessel functions cancel badly beyond T of 7.
+Everything follows from the Laplace symbol D(s): its inverse transform is taken along arcs
+in Re s < 0 that join the branch points, where the integrand is smooth and decays, so that
+one set of nodes is accurate for every T. The closed forms by Bessel functions cancel badly
+beyond T of 7.
 """
 
 from __future__ import annotations
@@ -23,10 +25,10 @@ _CHUNK = 2048
 def symbol(s: ArrayLike, mode: str, eta: float) -> NDArray[np.complex128]:
     """Laplace symbol D(s) of the traction per slip, in units of G|k|/2; s in units of |k| c_s.
 
-    Mode II: [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta =
-    c_d/c_s; mode III: sqrt(1 + s^2). Both are s + O(1/s) for large s (radiation damping) and reach
-    the static stiffness G*/G at s = 0 (Geubelle and Rice 1995, in Laplace space). Cuts run from the
-    branch points +-i and +-i eta straight to the left.
+    Mode II: [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta
+    = c_d/c_s; mode III: sqrt(1 + s^2). Both are s + O(1/s) for large s (radiation damping)
+    and reach the static stiffness G*/G at s = 0 (Geubelle and Rice 1995, in Laplace space).
+    Cuts run from the branch points +-i and +-i eta straight to the left.
     """
     z = np.asarray(s, dtype=np.complex128)
     shear = np.sqrt(z - 1j) * np.sqrt(z + 1j)
@@ -53,8 +55,8 @@ def _half_arc() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def arc_quadrature(mode: str, eta: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Nodes s, Re s < 0, and weights w, some 140 an arc, with C(T) = Re sum w exp(s T), T >= 0.
 
-    The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across the arc |s| = 1
-    (the shear root) and |s| = eta (the dilatational root) contribute.
+    The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across the arc
+    |s| = 1 (the shear root) and |s| = eta (the dilatational root) contribute.
     """
     angle, weight = _half_arc()
     turn = np.exp(1j * angle)

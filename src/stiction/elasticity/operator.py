@@ -1,12 +1,12 @@
 """K - W of an interface by fast Fourier transform, inside compiled kernels and without allocating.
 
-Slip has one component, along x, the direction of the load. With a wave vector (kx, ky) of length k
-and a = (kx/k)^2, the static stiffness of two half-spaces is
+Slip has one component, along x, the direction of the load. With a wave vector (kx, ky) of
+length k and a = (kx/k)^2, the static stiffness of two half-spaces is
 
     K(k) = (G* a + G (1 - a)) k/2,
 
-mode II along x and mode III along y (Geubelle and Rice 1995); a line has the modulus of its mode.
-Kernels take flat arrays, so that the same code serves lines and planes.
+mode II along x and mode III along y (Geubelle and Rice 1995); a line has the modulus of its
+mode. Kernels take flat arrays, so that the same code serves lines and planes.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class Transform(NamedTuple):
     half : (int, int)
         Of its real transform.
     every, first, last : int arrays
-        All axes that are transformed, all but the last of them, the last; of a line counted on
-        flat arrays.
+        All axes that are transformed, all but the last of them, the last; of a line counted
+        on flat arrays.
     """
 
     shape: tuple[int, int]

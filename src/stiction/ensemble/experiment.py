@@ -7,9 +7,10 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
@@ -268,9 +269,9 @@ class Ensemble:
     10000
     """
 
-    samples: Count
+    samples: Annotated[Count, Field(le=10**10)]
     seed: Number = 0
-    first: Number = 0
+    first: Annotated[Number, Field(le=2**62)] = 0
     keep: Names = ()
 
     def of(self, problem: Problem, random: Any, method: Any) -> Experiment:

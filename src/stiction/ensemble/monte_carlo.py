@@ -17,12 +17,11 @@ from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
 from stiction.ensemble.table import Table
-from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
+from stiction.errors import collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
 from stiction.model import Count, Flag, Names, Number, Progress, Seconds, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
-from stiction.random.random_field import too_many_samples
 
 FEW = 4
 HOPELESS = 16
@@ -238,8 +237,6 @@ def monte_carlo(
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
     """
-    if problems := too_many_samples(samples, first):
-        raise InputError(problems)
     ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
     experiment = ensemble.of(problem, random, method)
     about = study_attributes(

@@ -15,18 +15,17 @@ from stiction.model import to_plain
 class OneOf(NamedTuple):
     """Annotation of such a field.
 
-    `kinds` are the classes by `type`: one that is added may be named in study files. `convert` and
-    `plain` map what was given to an object of one of them, and that to what a file holds; `also`
-    tells editors what else a table may hold.
+    `kinds` are the classes by `type`: one that is added may be named in study files.
+    `convert` maps what was given to an object of one of them; `also` tells editors what
+    else a table may hold.
     """
 
     kinds: Mapping[str, Any]
     convert: Callable[[Any], Any]
-    plain: Callable[[Any], Any] = to_plain
     also: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        plain = core_schema.plain_serializer_function_ser_schema(self.plain)
+        plain = core_schema.plain_serializer_function_ser_schema(_plain)
         return core_schema.no_info_plain_validator_function(self.convert, serialization=plain)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
@@ -35,6 +34,10 @@ class OneOf(NamedTuple):
             own = {"type": {"type": "string", "description": self.also}}
             found.append({"type": "object", "properties": own})
         return {"anyOf": [one | {"required": [*one.get("required", ()), "type"]} for one in found]}
+
+
+def _plain(value: Any) -> Any:
+    return value.plain() if hasattr(value, "plain") else to_plain(value)
 
 
 def from_table(kinds: Mapping[str, Any], given: Mapping[str, Any]) -> Any:

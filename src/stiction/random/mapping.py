@@ -1,11 +1,11 @@
 """The map z -> F^-1(Phi(z)) from the Gaussian field to the marginal F, and what it does to
 correlation.
 
-The map is tabulated, which is a thousand times faster than scipy's quantile: cubic Hermite pieces
-on a uniform grid of [-8, 8]. Every piece is checked against the quantile when the table is built.
-Pieces that miss the tolerance (at a kink of the density, say) and all z outside are left to scipy.
-So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the standard
-deviation where the value is smaller than that.
+The map is tabulated, which is a thousand times faster than scipy's quantile: cubic Hermite
+pieces on a uniform grid of [-8, 8]. Every piece is checked against the quantile when the
+table is built. Pieces that miss the tolerance (at a kink of the density, say) and all z
+outside are left to scipy. So the result is accurate everywhere: to 1e-9 of the value, or of
+a millionth of the standard deviation where the value is smaller than that.
 """
 
 from __future__ import annotations
@@ -34,8 +34,7 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
     """Compute F^-1(Phi(z)) of a frozen scipy.stats distribution (Grigoriu, 1995).
 
     Phi(z) rounds to 1 long before z = 8. The upper tail keeps its digits only through
-    1 - Phi(z) = Phi(-z), and only where scipy computes the inverse survival function of the family
-    directly.
+    Phi(-z), and only where scipy inverts the survival function of the family directly.
     """
     z = np.asarray(z, dtype=np.float64)
     tail = ndtr(-np.abs(z))
@@ -110,12 +109,13 @@ def from_normal(marginal: Any, z: Array) -> Array:
 def hermite_coefficients(marginal: Any) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
-    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). Evaluated by
-    a fine trapezoidal rule on |z| <= 8: unlike Gauss-Hermite quadrature it stays accurate where
-    the map has kinks, and its error for smooth maps is round-off. Heavy tails have their variance
-    further out and in high orders: then on |z| <= 37, and up to order 1000. The last coefficient
-    stands for all the rest of the variance, so that the correlation is 1 at zero lag. An
-    `InputError` if scipy's quantile and moments disagree.
+    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995).
+    Evaluated by a fine trapezoidal rule on |z| <= 8: unlike Gauss-Hermite quadrature it
+    stays accurate where the map has kinks, and its error for smooth maps is round-off.
+    Heavy tails have their variance further out and in high orders: then on |z| <= 37, and
+    up to order 1000. The last coefficient stands for all the rest of the variance, so that
+    the correlation is 1 at zero lag. An `InputError` if scipy's quantile and moments
+    disagree.
     """
     coefficients, tail = _expand(marginal.distribution, REACH)
     if tail > SMALL:

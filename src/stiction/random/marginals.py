@@ -1,9 +1,9 @@
 """Marginal distributions: how strength is distributed at a point.
 
-In the families that are given by mean and coefficient of variation, `mean` is the mean of the field
-and `cv` its standard deviation over its mean, whatever the bound `low`. scipy's own parameters
-(shapes, loc, scale) follow from them. To add a family, write one class with a `distribution` and
-add it to `MARGINALS`.
+In the families that are given by mean and coefficient of variation, `mean` is the mean of
+the field and `cv` its standard deviation over its mean, whatever the bound `low`. scipy's
+own parameters (shapes, loc, scale) follow from them. To add a family, write one class with
+a `distribution` and add it to `MARGINALS`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
 from stiction.errors import InputError, unknown_name
-from stiction.model import Positive, Real, describe, is_finite, model, to_plain
+from stiction.model import Positive, Real, describe, is_finite, model
 from stiction.random.kinds import OneOf, from_table
 
 
@@ -226,8 +226,8 @@ class TruncatedNormal(_ByMoments):
     Raises
     ------
     InputError
-        If the bounds are not in order, or no cut normal distribution has these moments: it is less
-        scattered than an exponential, or between two bounds a uniform, distribution.
+        If the bounds are not in order, or no cut normal distribution has these moments: it is
+        less scattered than an exponential, between two bounds than a uniform, distribution.
 
     Examples
     --------
@@ -284,7 +284,7 @@ class ScipyMarginal(Marginal):
     parameters : tuple of (str, float)
         Shapes, loc and scale that were given.
     frozen : optional
-        A distribution that scipy has no name for: for Python only, and equal to itself only.
+        A distribution that scipy has no name for: for Python only, equal to itself only.
     """
 
     type: str
@@ -304,13 +304,15 @@ class ScipyMarginal(Marginal):
         own = dict(self.parameters)
         return own.get("loc", 0.0), own.get("scale", 1.0)
 
+    def plain(self) -> dict[str, Any]:
+        """Return what a study file holds."""
+        if self.frozen is not None:
+            raise ValueError(f"marginal is the Python distribution {self.type!r}, not a named one")
+        return {"type": self.type, **dict(self.parameters)}
+
 
 MARGINALS: dict[str, Any] = {
-    "beta": Beta,
-    "lognormal": Lognormal,
-    "weibull": Weibull,
-    "gamma": Gamma,
-    "truncated_normal": TruncatedNormal,
+    kind.type: kind for kind in (Beta, Lognormal, Weibull, Gamma, TruncatedNormal)
 }
 """By their names in study files. 'beta' and 'gamma' are scipy's where its parameters are given."""
 
@@ -379,22 +381,6 @@ def _with_moments(marginal: ScipyMarginal) -> Marginal:
     return marginal
 
 
-def _plain(value: Any) -> dict[str, Any]:
-    if not isinstance(value, ScipyMarginal):
-        found: dict[str, Any] = to_plain(value)
-        return found
-    if value.frozen is not None:
-        raise ValueError(
-            f"marginal is the Python distribution {value.type!r}; use one that scipy names"
-        )
-    return {"type": value.type, **dict(value.parameters)}
-
-
-AnyMarginal: TypeAlias = Annotated[
-    Any,
-    OneOf(
-        MARGINALS, marginal_of, _plain,
-        "the name of a continuous scipy.stats distribution with its shapes, loc and scale",
-    ),
-]  # fmt: skip
+_ALSO = "the name of a continuous scipy.stats distribution with its shapes, loc and scale"
+AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, _ALSO)]
 """`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""

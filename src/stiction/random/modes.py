@@ -25,13 +25,13 @@ class Modes:
     Attributes
     ----------
     sigma : (J + 1,) array
-        Standard deviations sigma_j of modes 0..J; their squares sum to 1. sigma_0 is zero without
-        the mean mode.
+        Standard deviations sigma_j of modes 0..J; their squares sum to 1. sigma_0 is zero
+        without the mean mode.
     numbers : (dimensions, J + 1) array of int
         Their wave vectors in units of 2 pi/length; of k and -k, one.
     ranks : (J,) array of int
-        Place of modes 1..J in the order of draws, rising: a mode has its draws by this, whatever
-        the spectrum leaves out. On a line it is the number of the wave.
+        Place of modes 1..J in the order of draws, rising: a mode has its draws by this,
+        whatever the spectrum leaves out. On a line it is the number of the wave.
     dimension : int
         Number of standard normal draws a sample.
     """
@@ -103,8 +103,8 @@ def make_modes(spectrum: Any, mean_mode: bool, anisotropy: float, interface: Int
 def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
     """Wave vectors in units of 2 pi/length among which the modes are, in the order of draws.
 
-    On a plane this is the order of growing rectangles of its proportions, so that a mode has the
-    same draws whatever the spectrum, its truncation and the grid.
+    On a plane this is the order of growing rectangles of its proportions, so that a mode
+    has the same draws whatever the spectrum, its truncation and the grid.
     """
     if reach.size == 1:
         _refuse_too_many(reach[0])

@@ -23,7 +23,6 @@ from stiction.model import (
     Real,
     check_memory,
     checked,
-    describe,
     model,
 )
 from stiction.random.conditioning import Conditioning, Conditions, Measured, basis
@@ -43,8 +42,6 @@ FEWEST_LENGTHS = 8.0 * math.pi
 """e-folding lengths in an interface below which a missing mean mode may be felt."""
 LOST, FALLEN = 1e-4, 0.02
 """What is worth a warning: a share of the variance, and a negative correlation."""
-MOST_SAMPLES = 10**10
-LAST_SAMPLE = 2**62
 
 Probability: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 Of: TypeAlias = Literal["strength", "z"]
@@ -58,12 +55,12 @@ class RandomField:
     ----------
     marginal : Beta or frozen continuous scipy.stats distribution
         Distribution F of the field at a point.
-    spectrum : PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum or callable g(k)
+    spectrum : PowerLawSpectrum, ..., CustomSpectrum or callable g(k)
         Power spectral density of the Gaussian field z.
     mean_mode : bool
-        Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every sample has
-        the same mean of z, which is harmless only while the correlation length is short against
-        the interface.
+        Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every
+        sample has the same mean of z, which is harmless only while the correlation length
+        is short against the interface.
     anisotropy : float, optional
         On a plane, the correlation length along y over that along x, which is that of the
         spectrum; 1 if left out.
@@ -81,11 +78,11 @@ class RandomField:
     Notes
     -----
     The same object serves lines and planes. On a plane the field is isotropic unless told
-    otherwise, and a line cut through it along x has the correlation of the field on a line, but
-    for what truncation leaves out, which is a little more on a plane.
+    otherwise, and a line cut through it along x has the correlation of the field on a line,
+    but for what truncation leaves out, which is a little more on a plane.
 
-    Translation process after Grigoriu (1995), spectral representation after Shinozuka and Deodatis
-    (1991); Albertini et al. (2020), Eqs. 2 to 7.
+    Translation process after Grigoriu (1995), spectral representation after Shinozuka and
+    Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
 
     Examples
     --------
@@ -123,8 +120,8 @@ class RandomField:
         Raises
         ------
         InputError
-            If truncation leaves no mode: the correlation length is too long for the interface. If
-            a line is given an anisotropy.
+            If truncation leaves no mode: the correlation length is too long for the
+            interface. If a line is given an anisotropy.
         """
         return _modes(self, interface)
 
@@ -135,8 +132,7 @@ class RandomField:
     ) -> Array:  # fmt: skip
         """Draw samples number `first`, `first` + 1, ..., standard normal numbers.
 
-        Draw j of sample i depends on (seed, stream, i, j) only: not on the batch, the spectrum or
-        the marginal.
+        Draw j of sample i depends on (seed, stream, i, j) only, not on the batch or spectrum.
 
         Parameters
         ----------
@@ -320,7 +316,7 @@ class RandomField:
         Warns
         -----
         AccuracyWarning
-            If the tails of the marginal are too heavy for its correlation, with the largest error.
+            If the tails of the marginal are too heavy for its correlation, with the error.
         """
         modes = _modes(self, interface)
         # The field whose amplitudes are its own standard deviations.
@@ -345,7 +341,7 @@ class RandomField:
     def efolding_length(self, *, of: Of = "strength") -> float:
         """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
-        Truncation is included. On a plane it is that along x, but for what truncation leaves out.
+        Truncation is included. On a plane it is that along x.
 
         Parameters
         ----------
@@ -399,16 +395,3 @@ def conditioning(field: RandomField, interface: Interface) -> Conditioning:
 @lru_cache(maxsize=64)
 def _lowest_correlation(field: RandomField, interface: Interface) -> float:
     return float(field.correlation(interface, of="z").min())
-
-
-def too_many_samples(samples: int, first: int, points: int = 1) -> list[str]:
-    """Return what is wrong with numbers of samples that nobody has."""
-    problems = []
-    if samples * points > MOST_SAMPLES:
-        at = f" at each of {points} points" if points > 1 else ""
-        problems.append(
-            f"samples: must be at most {MOST_SAMPLES:.0e} in all, got {describe(samples)}{at}"
-        )
-    if first > LAST_SAMPLE:
-        problems.append(f"first: must be at most 2**62, got {describe(first)}")
-    return problems

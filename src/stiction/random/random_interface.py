@@ -41,11 +41,10 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
         )
     flat: dict[Any, Any] = {}
     for key, inner in value.items():
-        flat |= (
-            {(key, b): rho for b, rho in inner.items()}
-            if isinstance(inner, Mapping)
-            else {key: inner}
-        )
+        if isinstance(inner, Mapping):
+            flat |= {(key, other): rho for other, rho in inner.items()}
+        else:
+            flat[key] = inner
     found: dict[str, dict[str, float]] = {}
     for pair, rho in flat.items():
         if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
@@ -88,8 +87,8 @@ class Stream(NamedTuple):
     number : int
         Of the stream of draws; that of a property never changes.
     ranks : array of int
-        Modes drawn, by their `Modes.ranks`: those of the property and of all that it is correlated
-        with.
+        Modes drawn, by their `Modes.ranks`: those of the property and of all that it is
+        correlated with.
     mean_mode : bool
         Whether the mean mode is drawn.
     columns : slice
@@ -112,8 +111,8 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which the
-        normal pressure at each point turns into strength. So may be the other stresses.
+        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which
+        the normal pressure turns into strength. So may be the other stresses.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Pa.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
@@ -135,12 +134,13 @@ class RandomInterface:
 
     Notes
     -----
-    Correlated translation fields after Grigoriu (1995): the draws of a property are a combination,
-    by the Cholesky factor of the correlation matrix, of independent draws of its own and of the
-    properties before it. So what is drawn for one does not depend on those that come after it in
-    the list above, and a property that is correlated with none keeps its draws whatever else is
-    random. Where spectra differ, so do the weights of the modes, and the correlation of the fields
-    at a point is a little less than that of the modes.
+    Correlated translation fields after Grigoriu (1995): the draws of a property are a
+    combination, by the Cholesky factor of the correlation matrix, of independent draws of
+    its own and of the properties before it. So what is drawn for one does not depend on
+    those that come after it in the list above, and a property that is correlated with none
+    keeps its draws whatever else is random. Where spectra differ, so do the weights of the
+    modes, and the correlation of the fields at a point is a little less than that of the
+    modes.
 
     Examples
     --------

@@ -1,10 +1,11 @@
 """Power spectral densities of the underlying Gaussian field, on lines and on planes.
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the field on a
-line. That fixes the density in D dimensions as a function of the length of the wave vector (it is
-the inverse Abel transform of the line's): a power of 1 + k^2 has (D - 1)/2 added to its exponent,
-and a Gaussian stays what it is. What is sampled is the truncated spectrum, so correlations and
-lengths are of that. To add a spectrum, write one class and add it to `SPECTRA`.
+On a plane the field is isotropic, and a line cut through it has the correlation of the
+field on a line. That fixes the density in D dimensions as a function of the length of the
+wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
+added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the
+truncated spectrum, so correlations and lengths are of that. To add a spectrum, write one
+class and add it to `SPECTRA`.
 """
 
 from __future__ import annotations
@@ -106,8 +107,8 @@ def integrate(
 ) -> Array:
     """Integrate a density times cos(k lag) over each interval between `edges`.
 
-    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides which
-    errors are small: 1e-12 of it, and of each part otherwise.
+    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides
+    which errors are small: 1e-12 of it, and of each part otherwise.
     """
     options: dict[str, Any] = {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
     options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
@@ -239,8 +240,8 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     Notes
     -----
-    On an infinite line this is a Matern covariance of smoothness exponent - 1/2, and on a plane the
-    same with the density (k^2 + lambda^2)^-(exponent + 1/2).
+    On an infinite line this is a Matern covariance of smoothness exponent - 1/2, and on a
+    plane the same with the density (k^2 + lambda^2)^-(exponent + 1/2).
 
     Examples
     --------
@@ -291,8 +292,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     correlation_length : float
         xi_0, m: without truncation the correlation of z is 1/e there.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.9997 of
-        the power if neither is given.
+        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept;
+        0.9997 of the power if neither is given.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -323,8 +324,9 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     correlation_length : float
         xi_0, m: without truncation the correlation of z is 1/e there.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept; 0.99 of the
-        power if neither is given, since every further nine takes ten times as many modes.
+        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept;
+        0.99 of the power if neither is given, since every further nine takes ten times as
+        many modes.
     """
 
     type: Literal["exponential"] = "exponential"
@@ -353,16 +355,17 @@ class CustomSpectrum(SpectralDensity):
     Parameters
     ----------
     function : callable
-        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative, integrable.
-        On a plane it is the density there, at wave vectors of length k, so that g(k) k must be
-        integrable; a line cut through the plane then has another spectrum than g.
+        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative,
+        integrable. On a plane it is the density there, at wave vectors of length k, so that
+        g(k) k must be integrable; a line cut through the plane then has another spectrum
+        than g.
     max_wavenumber : float, optional
         Truncation, rad/m; by `power_kept` if left out.
     power_kept : float, optional
         Share of the power kept by truncation; 0.9997 if neither is given.
     break_points : sequence of float
-        Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than a tenth
-        of an octave needs its two ends here, or it may be missed.
+        Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than
+        a tenth of an octave needs its two ends here, or it may be missed.
 
     Raises
     ------
@@ -371,8 +374,8 @@ class CustomSpectrum(SpectralDensity):
 
     Notes
     -----
-    For Python only: a study with a function of your own cannot be written to a file. Integrals are
-    by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
+    For Python only: a study with a function of your own cannot be written to a file.
+    Integrals are by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
     """
 
     function: Annotated[
@@ -440,9 +443,7 @@ def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array
 
 
 SPECTRA: dict[str, Any] = {
-    "power_law": PowerLawSpectrum,
-    "squared_exponential": SquaredExponentialSpectrum,
-    "exponential": ExponentialSpectrum,
+    kind.type: kind for kind in (PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum)
 }
 """By their names in study files."""
 

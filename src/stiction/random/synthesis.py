@@ -1,9 +1,9 @@
 """From (seed, sample, mode) to standard normal draws, and from draws to the Gaussian field.
 
-A generator for each sample of a line would cost more than the sample, so samples come in blocks of
-256, with one generator a block; inside a block the draws run mode after mode, so that a spectrum
-with more modes extends the same field. A sample of a plane has so many modes that it has a
-generator, a block of its own.
+A generator for each sample of a line would cost more than the sample, so samples come in
+blocks of 256, with one generator a block; inside a block the draws run mode after mode, so
+that a spectrum with more modes extends the same field. A sample of a plane has so many
+modes that it has a generator, a block of its own.
 """
 
 from __future__ import annotations
@@ -75,10 +75,10 @@ def _synthesise(
 ) -> None:
     """Fill `out`, (samples, rows, columns); a line is a plane of one row.
 
-    Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k. Of both, those
-    in the half of wave vectors that a real transform holds are added; in its first and last
-    column it holds both. Modes that the grid does not resolve are folded onto those that it does,
-    so the values at the nodes are exact whatever the grid.
+    Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k. Of both,
+    those in the half of wave vectors that a real transform holds are added; in its first
+    and last column it holds both. Modes that the grid does not resolve are folded onto
+    those that it does, so the values at the nodes are exact whatever the grid.
     """
     samples, rows, columns = out.shape
     half = columns // 2
@@ -110,8 +110,8 @@ def gaussian(
 ) -> Array:
     """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
 
-    One inverse transform a sample, so that the numbers do not depend on the batch. `draws` are
-    (samples, dimension), `sigma` and `numbers` those of `Modes`.
+    One inverse transform a sample, so that the numbers do not depend on the batch. `draws`
+    are (samples, dimension), `sigma` and `numbers` those of `Modes`.
     """
     z = np.empty((draws.shape[0], *shape))
     if len(shape) == 1:

@@ -1,9 +1,10 @@
 """Few expensive runs and ever more inexpensive ones: control variates for means.
 
-Sample i is the same whatever the method. The expensive result of samples 0 .. n - 1 is Y, those of
-ever less expensive methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2 - 1 and so on, n <= N_1 <= N_2 ...
-What a method gets right about the next more expensive one is averaged over all of its own samples,
-what it gets wrong over those of the latter only (Peherstorfer, Willcox and Gunzburger, 2016).
+Sample i is the same whatever the method. The expensive result of samples 0 .. n - 1 is Y,
+those of ever less expensive methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2 - 1 and so on,
+n <= N_1 <= N_2 ... What a method gets right about the next more expensive one is averaged
+over all of its own samples, what it gets wrong over those of the latter only (Peherstorfer,
+Willcox and Gunzburger, 2016).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from stiction.statistics.estimates import Estimate, as_sample
 class Combined:
     """A mean from all methods: `estimate` with its `value` and standard `error`.
 
-    `plain_error` is the standard error of the expensive results by themselves, `freedom` the number
-    of degrees of freedom of the error.
+    `plain_error` is the standard error of the expensive results by themselves, `freedom`
+    the number of degrees of freedom of the error.
     """
 
     estimate: Estimate
@@ -47,7 +48,7 @@ class Combined:
 def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
     """Estimate the mean of an expensive result of few samples, with the help of others of more.
 
-    Such as onsets by `Rupture`, `Equilibrium` and `LocalCriterion` of samples of the same seed.
+    Such as onsets by `Rupture`, `Equilibrium` and `LocalCriterion` of one seed.
 
     Parameters
     ----------
@@ -64,13 +65,13 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
     Raises
     ------
     InputError
-        If there are fewer than three expensive results, one is not finite, or others are fewer.
+        If one is not finite, there are fewer than three expensive results, or fewer others.
 
     Notes
     -----
-    Linear control variates, one in the other (Peherstorfer, Willcox and Gunzburger, 2016). With n
-    expensive results the error has n - 2 degrees of freedom, since mean and weight are estimated
-    from them: of few results, use the interval and not twice the error.
+    Linear control variates, one in the other (Peherstorfer, Willcox and Gunzburger, 2016).
+    With n expensive results the error has n - 2 degrees of freedom, since mean and weight
+    are estimated from them: of few results, use the interval and not twice the error.
 
     Examples
     --------
@@ -96,8 +97,9 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
 def _telescoped(results: Array, chain: Sequence[Array]) -> tuple[float, float]:
     """Return the mean of `results` and its variance.
 
-    mean_n(Y - a X) + a E[X], a = Cov(X, Y)/Var(X), with E[X] from the rest of the chain in the same
-    way; variance Var(Y - a X)/n + a^2 Var(E[X]): for this a the two terms do not covary.
+    mean_n(Y - a X) + a E[X], a = Cov(X, Y)/Var(X), with E[X] from the rest of the chain in
+    the same way; variance Var(Y - a X)/n + a^2 Var(E[X]): for this a the two terms do not
+    covary.
     """
     if not chain:
         return float(results.mean()), float(results.var(ddof=1)) / results.size

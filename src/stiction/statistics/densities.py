@@ -54,8 +54,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     ----------
     values : (samples,) array
     bounds : (float or None, float or None)
-        Lower and upper bound of the distribution where it has them, in the unit of the values:
-        for strength those of its marginal.
+        Lower and upper bound of the distribution where it has them, in the unit of the
+        values: for strength those of its marginal.
 
     Returns
     -------
@@ -64,22 +64,22 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     Raises
     ------
     InputError
-        If there are fewer than 16 values, one is not finite or beyond the bounds, or all are
-        equal.
+        If there are fewer than 16 values, one is not finite or beyond the bounds, or all
+        are equal.
 
     Notes
     -----
-    Diffusion estimator of Botev, Grotowski and Kroese (2010): the histogram on a fine grid evolves
-    by the heat equation with no flux through the ends, which is a Gaussian kernel reflected at the
-    bounds; the time of diffusion, and so the bandwidth, solves their fixed-point equation (14)
-    without reference to a normal distribution.
+    Diffusion estimator of Botev, Grotowski and Kroese (2010): the histogram on a fine grid
+    evolves by the heat equation with no flux through the ends, which is a Gaussian kernel
+    reflected at the bounds; the time of diffusion, and so the bandwidth, solves their
+    fixed-point equation (14) without reference to a normal distribution.
 
-    A density that vanishes at a bound would be made positive there. So the share of values within
-    a distance d of a bound is first fitted by d^b, with b from the logarithms of the smallest
-    distances (Hill, 1975). If b is significantly above 1, the estimate is that of the values
-    mapped by the beta distribution function with these exponents, for which the density of the
-    mapped values neither vanishes nor has a slope. Where there is no bound the grid reaches beyond
-    the sample.
+    A density that vanishes at a bound would be made positive there. So the share of values
+    within a distance d of a bound is first fitted by d^b, with b from the logarithms of the
+    smallest distances (Hill, 1975). If b is significantly above 1, the estimate is that of
+    the values mapped by the beta distribution function with these exponents, for which the
+    density of the mapped values neither vanishes nor has a slope. Where there is no bound
+    the grid reaches beyond the sample.
 
     Examples
     --------
@@ -161,10 +161,12 @@ def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
     def excess(time: float) -> float:
         f = functional(STAGES, time)
         for s in range(STAGES - 1, 1, -1):
+            if n * f < 1e-200:  # the values are as even as a grid: no such time smooths them
+                return -math.inf
             odd = float(np.prod(np.arange(1, 2 * s, 2))) / math.sqrt(2.0 * math.pi)
             constant = (1.0 + 0.5 ** (s + 0.5)) / 3.0
             f = functional(s, (2.0 * constant * odd / (n * f)) ** (2.0 / (3.0 + 2.0 * s)))
-        return time - (2.0 * n * math.sqrt(math.pi) * f) ** -0.4
+        return time - (2.0 * n * math.sqrt(math.pi) * max(f, 1e-300)) ** -0.4
 
     # Below a cell's width the grid, not the sample, would be resolved.
     finest, coarsest = (0.5 / cells) ** 2, 0.1
@@ -175,4 +177,4 @@ def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
         if excess(float(right)) > 0.0:  # the smallest root is the one that is meant
             root: float = brentq(excess, float(left), float(right), rtol=1e-6)
             return root
-    return 0.28**2 * n**-0.4  # no root: a sample of a few values; the normal-reference rule
+    return 0.28**2 * n**-0.4  # no root: few or even values; the normal-reference rule

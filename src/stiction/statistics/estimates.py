@@ -56,8 +56,8 @@ def mean(values: Any) -> Estimate:
 def standard_deviation(values: Any) -> Estimate:
     """Estimate the standard deviation of independent values (samples,), in their unit.
 
-    Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s), without a Gaussian
-    assumption.
+    Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s), without a
+    Gaussian assumption.
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))

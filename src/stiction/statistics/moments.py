@@ -66,19 +66,19 @@ def nucleation_statistics(
     Raises
     ------
     InputError
-        If the weakening rate, the load, the initial stress or the pressure of coefficients varies
-        along the interface, or a critical patch is larger than the interface.
+        If the weakening rate, the load, the initial stress or the pressure of coefficients
+        varies along the interface, or a critical patch is larger than the interface.
 
     Notes
     -----
-    On a plane tau_n is the average over the middle one of the ellipses of `LocalCriterion`; the
-    least over several shapes, which that takes, has no moments in closed form.
+    On a plane tau_n is the average over the middle one of the ellipses of `LocalCriterion`;
+    the least over several shapes, which that takes, has no moments in closed form.
 
-    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
-    integral of the correlation of tau_p against the weights, on a periodic interface the sum over
-    wave vectors of the spectrum of tau_p times the squared transform of the weight. The
-    correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995), not that of the
-    Gaussian field.
+    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the
+    double integral of the correlation of tau_p against the weights, on a periodic interface
+    the sum over wave vectors of the spectrum of tau_p times the squared transform of the
+    weight. The correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995),
+    not that of the Gaussian field.
 
     Examples
     --------
@@ -116,8 +116,8 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
     """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
 
-    The unit of friction coefficients is the normal pressure. An `InputError` if the nucleation
-    stress is not stationary.
+    The unit of friction coefficients is the normal pressure. An `InputError` if the
+    nucleation stress is not stationary.
     """
     check_law(problem)
     sampled = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"

@@ -24,8 +24,8 @@ class Quantiles:
     value : (m,) array
         The sample quantiles, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of the confidence interval of each; infinite where the sample is too small to bound
-        that quantile.
+        Ends of the confidence interval of each; infinite where the sample is too small to
+        bound that quantile.
     confidence : float
         Coverage of each interval, at least.
     """
@@ -63,9 +63,10 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Real = 0.95) -> 
 
     Notes
     -----
-    The number of values below the p-quantile is binomial (N, p); the interval runs between the
-    order statistics whose ranks hold it with the asked probability (David and Nagaraja, 2003,
-    Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
+    The number of values below the p-quantile is binomial (N, p); the interval runs between
+    the order statistics whose ranks hold it with the asked probability (David and Nagaraja,
+    2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole
+    ranks.
 
     Examples
     --------

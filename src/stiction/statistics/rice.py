@@ -1,8 +1,8 @@
 """Distribution of the critical stress from crossing rates: the minimum of a stationary process.
 
-On a plane dips take the place of crossings: the expected Euler characteristic of what lies below a
-level is the expected number of its parts less that of their holes, which low down there are none of
-(Adler, 1981). Low dips come as a Poisson process.
+On a plane dips take the place of crossings: the expected Euler characteristic of what lies
+below a level is the expected number of its parts less that of their holes, which low down
+there are none of (Adler, 1981). Low dips come as a Poisson process.
 """
 
 from __future__ import annotations
@@ -52,14 +52,15 @@ class RiceDistribution:
     point_survival : (m,) array
         P(a point holds more than x).
     relative_error : (m,) array
-        Sampling error of the crossing rate, one over the root of the crossings that were seen.
+        Sampling error of the crossing rate, one over the root of the crossings seen.
     trusted : (m,) array of bool
-        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings or dips
-        were seen, and on a line `1 - point_survival` is at most 4 % of P: a profile that is below
-        the level at its start is counted for that and for the crossing that brought it there, so P
-        is too high by up to (1 - point_survival)/P where xi_0 is not short against the interface.
-        On a plane there are at most 1.1 dips for each sample that has any: dips that come together
-        make P too high by as much. Above P = 0.1 P is too low, on a line by 4 to 9 % at the median.
+        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
+        or dips were seen, and on a line `1 - point_survival` is at most 4 % of P: a profile
+        that is below the level at its start is counted for that and for the crossing that
+        brought it there, so P is too high by up to (1 - point_survival)/P where xi_0 is not
+        short against the interface. On a plane there are at most 1.1 dips for each sample
+        that has any: dips that come together make P too high by as much. Above P = 0.1 P is
+        too low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
@@ -106,14 +107,14 @@ def rice_distribution(
 ) -> RiceDistribution:
     """Approximate the distribution of the critical stress of the local criterion.
 
-    P(tau_cr > x) ~ S(x) exp(-L nu(x)/S(x)): the stress at one point survives, and from there
-    crossings of the level x come as a Poisson process at the rate nu (Rice, 1945; Cramer and
-    Leadbetter, 1967). S and nu are pooled from sampled profiles of the nucleation stress, every
-    position of which counts; so a few hundred profiles tell as much of the lower tail as many more
-    minima would.
+    P(tau_cr > x) ~ S(x) exp(-L nu(x)/S(x)): the stress at one point survives, and from
+    there crossings of the level x come as a Poisson process at the rate nu (Rice, 1945;
+    Cramer and Leadbetter, 1967). S and nu are pooled from sampled profiles of the
+    nucleation stress, every position of which counts; so a few hundred profiles tell as
+    much of the lower tail as many more minima would.
 
-    On a plane P(tau_cr > x) ~ exp(-chi(x)), with chi the expected Euler characteristic of what lies
-    below x in the nucleation stress, that is the number of dips.
+    On a plane P(tau_cr > x) ~ exp(-chi(x)), with chi the expected Euler characteristic of
+    what lies below x in the nucleation stress, that is the number of dips.
 
     Parameters
     ----------
@@ -136,8 +137,8 @@ def rice_distribution(
     Raises
     ------
     InputError
-        If the problem has no nucleation stress, its load is not uniform, the profiles are few or
-        the levels do not rise.
+        If the problem has no nucleation stress, its load is not uniform, the profiles are
+        few or the levels do not rise.
 
     Examples
     --------
@@ -215,9 +216,9 @@ def _count_dips(
 ) -> None:
     """Steps whose cumulative sums count what of some planes is at or below each level.
 
-    `level` is the number of the first level at or above the value of each node. `dips` is the Euler
-    characteristic, nodes less edges plus faces of the periodic grid; `below` and `reached` are
-    nodes, and samples with a node.
+    `level` is the number of the first level at or above the value of each node. `dips` is
+    the Euler characteristic, nodes less edges plus faces of the periodic grid; `below` and
+    `reached` are nodes, and samples with a node.
     """
     samples, nx, ny = level.shape
     for sample in range(samples):

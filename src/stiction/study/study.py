@@ -38,7 +38,7 @@ from stiction.model import (
     to_plain,
 )
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField, too_many_samples
+from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import StoredRun, as_part
 from stiction.study.study_file import completed, read_sweep, read_toml, reading
@@ -117,8 +117,6 @@ class Study:
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
         ensemble, points = self.ensemble, self.experiments
-        if problems := too_many_samples(ensemble.samples, ensemble.first, len(points)):
-            raise InputError([f"ensemble.{text}" for text in problems])
         if ensemble.keep and len({point.problem.interface.shape for point in points}) > 1:
             raise InputError(
                 "ensemble.keep: nothing can be kept along the interface while its number of nodes"
