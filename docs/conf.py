@@ -33,6 +33,9 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
     "mathml",
     "sphinx_gallery.gen_gallery",
 ]
@@ -52,6 +55,20 @@ nb_execution_raise_on_error = True
 nb_merge_streams = True
 nb_output_stderr = "remove"  # compilation and progress
 
+# Links into other projects need their inventories, which a hosted build can fetch.
+intersphinx_mapping = {}
+if os.environ.get("READTHEDOCS"):
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "scipy": ("https://docs.scipy.org/doc/scipy", None),
+        "xarray": ("https://docs.xarray.dev/en/stable", None),
+        "matplotlib": ("https://matplotlib.org/stable", None),
+    }
+
+copybutton_prompt_text = ">>> |... "
+copybutton_prompt_is_regexp = True
+
 numpydoc_show_class_members = False
 autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
@@ -63,6 +80,9 @@ SCRIPTS = ROOT / "build" / "how-to"
 sphinx_gallery_conf = {
     "examples_dirs": [str(SCRIPTS), "gallery"],
     "gallery_dirs": ["how-to", "pictures"],
+    "backreferences_dir": "api/backreferences",
+    "doc_module": ("stiction",),
+    "thumbnail_size": (480, 320),
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
@@ -116,33 +136,9 @@ html_theme_options = {
 html_context = {"default_mode": "auto"}
 
 
-SECTIONS = ("start", "use", "understand", "evidence", "reference")
-
-
-def other_pages(app, docname, source):
-    """Put pages that no section names where they probably belong: none is ever lost."""
-    if docname not in ("start", "understand"):
-        return
-    named = set()
-    for section in SECTIONS:
-        text = (HERE / f"{section}.md").read_text("utf-8")
-        named |= set(re.findall(r"^([\w/-]+)$", text, flags=re.MULTILINE))
-    folders = "", "notebooks/", "tutorials/"
-    there = {f"{one}{path.stem}" for one in folders for path in (HERE / one).glob("*.md")}
-    rest = sorted(there - named - {"index", "README", *SECTIONS})
-    lessons = [name for name in rest if re.search("tutorial|from-a-|tell-me|/", name)]
-    mine = lessons if docname == "start" else [name for name in rest if name not in lessons]
-    source[0] = source[0].replace("@other pages@", "\n".join(mine))
-
-
 def links_to_the_list(app, docname, source):
     """Of all pages: where the source is read it is README.md, here the front page."""
     source[0] = re.sub(r"\]\((?:\.\./docs/)?README\.md(#[\w-]+)?\)", "](/index.md)", source[0])
-
-
-def with_other_pages(app, environment, added, changed, removed):
-    """A new page changes the lists, which did not change themselves."""
-    return ["start", "understand"]
 
 
 def plain_text(app, what, name, obj, options, lines):
@@ -165,18 +161,6 @@ def write_if_new(path, text):
         path.write_text(text, encoding="utf-8")
 
 
-def write_other_names(app):
-    """A page with the public names that api/index.rst does not list: none is ever lost."""
-    index = (HERE / "api" / "index.rst").read_text("utf-8")
-    listed = set(re.findall(r"^   (\w+)$", index, flags=re.MULTILINE))
-    modules = {"paper", "plot", "__version__"}
-    rest = sorted(set(stiction.__all__) - listed - modules)
-    title = "More names\n==========\n"
-    table = ".. currentmodule:: stiction\n\n.. autosummary::\n   :toctree: generated\n   :nosignatures:\n"
-    body = "\n".join([table, *(f"   {name}" for name in rest)]) if rest else "There are none."
-    write_if_new(HERE / "api" / "others.rst", f"{title}\n{body}\n")
-
-
 def write_commands(app):
     """The page of commands, from the commands."""
     group = typer.main.get_command(commands)
@@ -190,10 +174,6 @@ def write_commands(app):
 
 
 def setup(app):
-    app.connect("source-read", other_pages)
     app.connect("source-read", links_to_the_list)
-    app.connect("env-get-outdated", with_other_pages)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)
-    # Before Sphinx lists the sources, of which autosummary makes a page a name.
-    app.connect("config-inited", lambda app, config: write_other_names(app))

@@ -47,7 +47,7 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
     """Every block and command, with fewer repetitions."""
-    page = "docs/tutorial.md"
+    page = "docs/tutorials/measured-profile.md"
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
     scope = {}
