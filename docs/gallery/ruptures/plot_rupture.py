@@ -2,7 +2,7 @@
 A rupture
 =========
 
-Slip rate in space and time, the speed of the front, and a film as a file.
+Slip rate in space and time, and a film as a file.
 """
 
 import tempfile
@@ -20,10 +20,6 @@ st.plot.rupture(run)
 # The whole run, most of it creep:
 
 st.plot.rupture(run, whole=True)
-
-# %%
-
-st.plot.front(run)
 
 # %%
 

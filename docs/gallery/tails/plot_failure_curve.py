@@ -2,8 +2,7 @@
 Failure probability over decades
 ================================
 
-The probability that the interface slides below a stress, by subset simulation; and what failing
-interfaces have in common.
+The probability that the interface slides below a stress, by subset simulation.
 """
 
 import stiction as st
@@ -17,9 +16,3 @@ st.plot.failure_curve(curve)
 # Against the stress above the least strength the tail is a straight line:
 
 st.plot.failure_curve(curve, above_bound=True)
-
-# %%
-# Weak interfaces, each moved so that it begins to slide in the middle:
-
-found = st.failure_probability(problem, strength, stress=0.67e6, method=st.LocalCriterion())
-st.plot.weak_spots(found)

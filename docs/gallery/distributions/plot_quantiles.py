@@ -1,0 +1,18 @@
+"""
+Quantiles along a sweep
+=======================
+
+Critical stress against the correlation length, from a study with a sweep.
+"""
+
+import stiction as st
+
+problem = st.paper.problem(nodes=1024)
+study = st.Study(
+    problem=problem,
+    random=st.paper.strength(problem),
+    method=st.LocalCriterion(),
+    ensemble=st.Ensemble(samples=2000, seed=0),
+    sweep=[{"random.strength.spectrum.correlation_length": [1e-3, 2e-3, 4e-3, 8e-3]}],
+)
+st.plot.quantiles(study.run(progress=False))

@@ -1,0 +1,19 @@
+"""
+A field fitted to a record
+==========================
+
+Histogram, quantiles, correlation and spectrum of a record of strength and of the fitted field.
+"""
+
+import numpy as np
+import xarray as xr
+
+import stiction as st
+
+truth = st.RandomField(st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3, exponent=2.0))
+line = st.Interface(length=0.2, nodes=1024)
+record = xr.DataArray(
+    truth.sample(line, seed=4)[0][:800], dims="x", coords={"x": line.x[:800]}
+).assign_attrs(units="Pa")
+found = st.fit_field(record, marginal=["weibull", "lognormal"], bootstrap=50, seed=0)
+st.plot.fit(found)

@@ -1,0 +1,26 @@
+"""
+A rupture on a plane
+====================
+
+Slip rate at four times, and arrival times.
+"""
+
+import stiction as st
+
+problem = st.Problem(
+    solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    interface=st.Interface(length=(0.02, 0.02), nodes=(96, 96)),
+    friction=st.LinearWeakening(weakening_rate=0.5e12),
+)
+strength = st.RandomField(
+    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(3e-3)
+)
+tau_p = strength.sample(problem.interface, seed=0)[0]
+run = st.simulate_rupture(
+    problem, tau_p, method=st.Rupture(loading_rate=2e7), save=st.Save(every=4)
+)
+st.plot.rupture(run)
+
+# %%
+
+st.plot.front(run)
