@@ -73,6 +73,20 @@ def failure(found):
     assert 1e3 < found["design"].stress_above_bound < 3e3
 
 
+def scanned(found):
+    """The scan holds a specimen near its measured values, and its answer is not that of any."""
+    given, line = found["given"], found["problem"].interface
+    near = np.abs(given.quantile(line, 0.5)[: line.size // 3] - found["scan"].values)
+    assert near.mean() < 20e3  # the error of the scan
+
+
+def between(found):
+    """Both scatters add, as squares, and the tail lies lower."""
+    one, other = (onset.critical_stress for onset in found["onsets"].values())
+    cv = [float(each.std() / each.mean()) for each in (one, other)]
+    assert cv[1] ** 2 - cv[0] ** 2 == pytest.approx(0.1**2, rel=0.25)  # 2,000 samples: 3 % each
+
+
 def stored(found):
     """All is there; longer correlation lowers the static strength."""
     assert found["status"].done == found["status"].samples == 3000
@@ -103,6 +117,8 @@ HOW_TOS = {
     "correlated_residual_strength": correlated,
     "random_critical_slip": critical_slip,
     "failure_probability": failure,
+    "scanned_interface": scanned,
+    "between_specimens": between,
     "stored_sweep": stored,
     "one_rupture": rupture,
     "arrested_events": arrested,
