@@ -26,19 +26,21 @@ def probabilities(specimens: int = 40, samples: int = 1000) -> tuple[float, dict
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     x, rng = problem.interface.x, np.random.default_rng(0)
 
-    def failing(field, samples=samples):
+    def failing(field, samples=samples, seed=0):
         found = st.monte_carlo(
-            problem, field, method=st.LocalCriterion(), samples=samples, seed=0, pilot=False,
+            problem, field, method=st.LocalCriterion(), samples=samples, seed=seed, pilot=False,
             progress=False,
         )  # fmt: skip
         return float((found.critical_stress < STRESS).mean())
 
     found = {name: [] for name in SHARES}
-    for specimen in strength.sample(problem.interface, samples=specimens, seed=1):
+    for number, specimen in enumerate(
+        strength.sample(problem.interface, samples=specimens, seed=1)
+    ):
         measured = specimen + NOISE * rng.standard_normal(x.size)
         for name, share in SHARES.items():
             scan = xr.DataArray(measured, {"x": x}, "x")[: round(share * x.size)]
-            found[name].append(failing(strength.given(scan, noise=NOISE)))
+            found[name].append(failing(strength.given(scan, noise=NOISE), seed=number))
     return failing(strength, 20_000), {name: np.array(each) for name, each in found.items()}
 
 
