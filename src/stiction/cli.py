@@ -513,9 +513,7 @@ def rupture(
         ),
     ] = None,
     loading_rate: LoadingRate = 2e7,
-    film: Annotated[
-        bool, typer.Option("--film", help="Also a film: rupture.gif, and .mp4 if there is ffmpeg.")
-    ] = False,
+    film: Annotated[bool, typer.Option("--film", help="Also a film, rupture.gif.")] = False,
     **reading: Any,
 ) -> None:
     """Simulate one interface from its first slip to global sliding, or as far as the study says.

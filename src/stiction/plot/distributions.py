@@ -22,9 +22,7 @@ FEWEST = 20
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
-def monte_carlo(
-    result: Any, *, quantity: str | None = None, label: str | None = None, ax: Axes | None = None
-) -> Axes:
+def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw the density of an onset: of one ensemble, several, or along a sweep.
 
     Parameters
@@ -35,8 +33,6 @@ def monte_carlo(
     quantity : str, optional
         A variable of the result; by default `friction_coefficient` if there is a pressure, else
         `critical_stress`. `critical_position` is drawn as a histogram.
-    label : str, optional
-        Name of the curve in the legend.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -82,7 +78,7 @@ def monte_carlo(
                     part = variable.isel({along[0]: step})
                     _draw_values(axes, part, _step_text(variable[along[0]], step), i)
             else:
-                text = label if single else name
+                text = None if single else name
                 _draw_values(axes, variable, text, number + len(axes.lines) * single)
         _, unit, text = scaled(variable)
         axes.set_xlabel(text)

@@ -218,20 +218,14 @@ def _shade(axes: Axes, interface: Interface, begin: float, end: float) -> None:
 
 
 def equilibrium_path(
-    path: xr.Dataset,
-    *,
-    load: int | None = None,
-    problem: Problem | None = None,
-    ax: Axes | None = None,
+    path: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw slip along the interface at each load of a path; on a plane a map at one load.
+    """Draw slip along the interface at each load of a path; on a plane a map at the highest one.
 
     Parameters
     ----------
     path : Dataset
         From `stiction.equilibrium_path`; loads at which the interface slides are left out.
-    load : int, optional
-        Number of the load on a plane; the highest in equilibrium by default.
     problem : Problem, optional
         Needed only if the result does not hold it.
     ax : matplotlib.axes.Axes, optional
@@ -254,12 +248,7 @@ def equilibrium_path(
     if balanced.size == 0:
         raise InputError("path: the interface slides at every load of it; give lower ones")
     if interface.is_plane:
-        number = int(balanced[-1]) if load is None else load
-        if number not in balanced:
-            raise InputError(
-                f"load: {number} is not in equilibrium; of this path loads {balanced.min()} to"
-                f" {balanced.max()} are"
-            )
+        number = int(balanced[-1])
         slip = path["slip"].values[number]
         scale, slip_unit = unit_for("m", slip)
         with on_axes(ax, height=maps.height(interface, 1.2)) as axes:

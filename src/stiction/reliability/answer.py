@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeAlias, TypeVar
 
@@ -53,8 +52,6 @@ class Answer:
         Why this algorithm.
     confidence : float
         Of `interval`.
-    diagnostics : dict
-        Numbers that belong to the algorithm, by name.
     warnings : tuple of str
         Why the answer is not to be trusted; empty if it is.
     normal_pressure : float
@@ -75,7 +72,6 @@ class Answer:
     normal_pressure: float
     warnings: tuple[str, ...]
     first_stage_evaluations: int = 0
-    diagnostics: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     @property
     def friction_coefficient(self) -> float:

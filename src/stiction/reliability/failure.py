@@ -223,7 +223,6 @@ def _sampled(
             "cv": count.cv,
             "interval": count.interval(confidence),
             "evaluations": start + evaluations,
-            "diagnostics": {"failures": count.failures, "samples": count.samples},
             "failing_profiles": _profiles(state, _drawn(state, seed, count.numbers[:SHOWN])),
         }
         doubts = imprecise(count.cv, target_cv, values["evaluations"])
@@ -251,13 +250,10 @@ def _of_tail(
     probability, cv = tail.probability(stress), count.cv if count else tail.cv(stress)
     interval = lognormal_interval(probability, cv, confidence)
     doubts = imprecise(cv, target_cv, tail.spent)
-    diagnostics: dict[str, float] = {"repetitions": len(tail.repetitions)}
     last = tail.repetitions[-1]
     if tail.algorithm == "two_level":
         failing, values = last.failing, last.failing_values
         covered = min(one.last for one in tail.repetitions)
-        share = float(np.mean([one.share for one in tail.repetitions]))
-        diagnostics |= {"failing_share": share, "covered": covered}
         if probability == 0.0:
             interval = 0.0, math.exp(last.descent.populations[-1].log_probability)
             doubts = [
@@ -290,7 +286,6 @@ def _of_tail(
         "algorithm": tail.algorithm,
         "reason": tail.reason,
         "failing_profiles": _profiles(state, failing[chosen]),
-        "diagnostics": diagnostics,
     }, doubts
 
 
@@ -381,8 +376,7 @@ def design_stress(
     return answered(
         DesignStress, state, doubts, probability=probability, confidence=confidence,
         evaluations=tail.spent, first_stage_evaluations=tail.first_stage_evaluations,
-        algorithm=tail.algorithm, reason=tail.reason,
-        diagnostics={"repetitions": len(tail.repetitions)}, **values,
+        algorithm=tail.algorithm, reason=tail.reason, **values,
     )  # fmt: skip
 
 
