@@ -13,13 +13,13 @@ from stiction.reliability.tail import Tail, repeat_until_precise
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
-DIMENSION = 600
+DIMENSION = 200
 REPEATS = 50
 RUNS = 100
 
 
 def linear(draws):
-    """Standard normal in 600 dimensions, every draw with the same weight."""
+    """Standard normal in many dimensions, every draw with the same weight."""
     return draws.sum(axis=1) / math.sqrt(DIMENSION)
 
 

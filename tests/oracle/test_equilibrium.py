@@ -178,7 +178,7 @@ def test_patches_alike_on_a_long_interface(solid):
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
-@pytest.mark.parametrize("high", [1.66e6, 2.5e6, 4.0e6])
+@pytest.mark.parametrize("high", [1.66e6, 4.0e6])
 @pytest.mark.parametrize("low", [0.1e6, 0.66e6])
 def test_events_against_relaxation(problem, low, high):
     """Wide ranges of strength: nodes reach the floor, patches are arrested."""

@@ -10,6 +10,8 @@ from stiction.inference.marginal_fit import family_of
 
 VALUES = st.Lognormal(mean=1e6, cv=0.25, low=0.2e6).distribution.rvs(800, random_state=1)
 
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("weibull", "gamma")]
+
 
 @pytest.mark.parametrize(
     ("given", "family", "fixed"),
@@ -39,7 +41,7 @@ def test_a_cut_normal_distribution_has_the_greatest_likelihood():
         assert other.distribution.logpdf(VALUES[VALUES > 0.4e6]).sum() < best
 
 
-@pytest.mark.parametrize("name", ["lognormal", "weibull", "gamma", "beta"])
+@pytest.mark.parametrize("name", ["lognormal", "beta", *SLOW])
 def test_noise_is_taken_out_of_a_marginal(name):
     """Of many independent values: two per cent of the standard deviation, by sampling."""
     truth = {

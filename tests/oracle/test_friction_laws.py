@@ -61,10 +61,9 @@ def wide_strength(interface, seed):
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-@pytest.mark.parametrize("seed", [3, 4])
-def test_equilibria_along_polygons_against_relaxation(short, law, seed):
+def test_equilibria_along_polygons_against_relaxation(short, law):
     problem = dataclasses.replace(short, friction=law)
-    strength = wide_strength(problem.interface, seed)
+    strength = wide_strength(problem.interface, 3)
     found = st.onset(problem, strength, method=st.Equilibrium())
     critical = found.critical_load.item()
     loads = critical * np.array([0.95, 1.0 - 5e-4])

@@ -22,7 +22,7 @@ def longer(problem, times):
 
 @pytest.fixture(scope="module")
 def system():
-    problem = st.paper.problem(nodes=512)
+    problem = st.paper.problem(nodes=256)
     return problem, st.paper.strength(problem, 0.5)
 
 
@@ -75,7 +75,7 @@ def test_two_levels_and_importance_agree_on_equilibrium(system):
 
 def test_two_levels_where_patches_interact():
     """At xi_0/h_n = 0.25 interaction lowers the typical onset most; subset takes no short cut."""
-    problem = st.paper.problem(nodes=512)
+    problem = st.paper.problem(nodes=256)
     system = problem, st.paper.strength(problem, 0.25)
     two = by(system, 0.684e6, "two_level", 0.2, method=Equilibrium())
     whole = by(system, 0.684e6, "subset", 0.25, method=Equilibrium())

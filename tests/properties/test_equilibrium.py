@@ -51,7 +51,7 @@ def solve(problem, tau_p):
     return st.onset(problem, tau_p, method=METHOD)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(problem=problems, tau_p=profiles)
 def test_gap_closes_and_bounds_hold(problem, tau_p):
     onset = solve(problem, tau_p)
@@ -68,7 +68,7 @@ def test_gap_closes_and_bounds_hold(problem, tau_p):
     assert onset.critical_load.item() * mean >= load * (1.0 - 1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles)
 def test_never_above_the_discrete_local_criterion(problem, tau_p):
     program = LineProgram(problem)
@@ -77,7 +77,7 @@ def test_never_above_the_discrete_local_criterion(problem, tau_p):
     assert onset.first_instability.item() <= bound * (1.0 + 1e-13)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(problem=problems, tau_p=profiles, other=profiles, weight=hs.floats(0.05, 0.95))
 def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
     # The strength is far above the residual one here: floors would make it neither.
@@ -92,7 +92,7 @@ def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
     assert up >= low - 5e-5
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles, shift=hs.integers(0, NODES - 1))
 def test_translation_and_reflection(problem, tau_p, shift):
     several = np.array([tau_p, np.roll(tau_p, shift), tau_p[::-1]])
@@ -108,7 +108,7 @@ def test_translation_and_reflection(problem, tau_p, shift):
     assert place.max() < length
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
 def test_a_constant_shifts_the_load(problem, tau_p, constant):
     friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=constant)
@@ -123,7 +123,7 @@ def test_a_constant_shifts_the_load(problem, tau_p, constant):
     np.testing.assert_allclose(three.critical_stress, one.critical_stress, rtol=1e-10)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(problem=problems, tau_p=profiles)
 def test_slip_grows_with_the_load_and_strength_is_kept(problem, tau_p):
     load = solve(problem, tau_p).critical_load.item()

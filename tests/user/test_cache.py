@@ -8,66 +8,60 @@ from pathlib import Path
 
 import pytest
 
-from stiction.jit import jit
+from stiction import jit
 
 SOURCES = Path(__file__).parents[2] / "src"
 
 
-def run(code, source, cache):
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(source),
-        "STICTION_CACHE_DIR": str(cache),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    environment.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+@pytest.fixture
+def run(tmp_path):
+    """Run a module in a process of its own, with a folder for compiled kernels."""
+
+    def run(code, cache):
+        (tmp_path / "own_module.py").write_text(code)
+        environment = os.environ | {"PYTHONPATH": str(SOURCES), "STICTION_CACHE_DIR": str(cache)}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        command = [sys.executable, "-B", "-c", "import own_module"]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split("\n")[:-1]
+
+    return run
 
 
-def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path):
+def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monkeypatch):
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
-    code = (
-        "import stiction.jit as j;"
-        "print(*(j._folder('stiction.' + m) for m in ('dynamics.explicit', 'random.synthesis')))"
-    )
-    copy = tmp_path / "src"
-    shutil.copytree(SOURCES / "stiction", copy / "stiction")
+    copy = tmp_path / "stiction"
+    shutil.copytree(SOURCES / "stiction", copy)
+    monkeypatch.setattr(jit, "__file__", str(copy / "jit.py"))
+    monkeypatch.setattr(jit, "_KEPT", "")
+    monkeypatch.setattr(jit, "_kernel_sources", jit._kernel_sources.__wrapped__)
+    find = jit._folder.__wrapped__
+    monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path / "cache"))
     folders = []
     for edited in (None, "errors.py", "dynamics/explicit.py", "friction/__init__.py"):
         if edited:
-            with (copy / "stiction" / edited).open("a") as file:
+            with (copy / edited).open("a") as file:
                 file.write("\n# edited\n")
-        folders.append(run(code, copy, tmp_path / "cache").split())
+        folders.append([find(f"stiction.{m}") for m in ("dynamics.explicit", "random.synthesis")])
     before, message, own, law = folders
-    assert Path(before[0]).parent == tmp_path / "cache" / "compiled"
+    assert before[0].parent == tmp_path / "cache" / "compiled"
     assert message == before
     assert own[0] != before[0]
     assert own[1] == before[1]
     assert not set(law) & set(own)
 
 
-@pytest.mark.parametrize("writable", [True, False])
-def test_kernels_are_kept_where_that_is_possible(tmp_path, writable):
-    cache = tmp_path / "cache" if writable else Path(os.devnull) / "cache"
-    code = (
-        "import numpy as np; from stiction.criterion.average import minimum_rows as f;"
-        "out = np.empty(1); f(np.ones((1, 8)), np.ones(8), np.ones(5), 2, out, out.copy());"
-        "print(8.0 * out.sum())"
-    )
-    copy = tmp_path / "src"
-    shutil.copytree(SOURCES / "stiction", copy / "stiction")
-    assert run(code, copy, cache) == "8.0"
-    kept = list(cache.rglob("*.nbc")) if writable else []
-    assert bool(kept) == writable
+def test_kernels_need_no_folder(run):
+    code = "from stiction.jit import jit\n\n@jit\ndef twice(x):\n    return 2 * x\n\n"
+    assert run(code + "print(twice(4))", Path(os.devnull) / "cache") == ["8"]
 
 
-OWN_LAW = """
+LAWS = """
 from typing import NamedTuple
-import numpy as np
+import numpy as np, stiction as st
 from stiction.jit import jit
 from stiction.friction import kernels
 
@@ -84,43 +78,24 @@ def slope(law, peak, residual, rate, slip):
 
 kernels.register(OwnParameters, strength, slope)
 ones = np.ones(3)
-print(kernels.strengths(OwnParameters({scale}), ones, ones, ones, ones))
-"""
-LINEAR = """
-import numpy as np, stiction as st
-from stiction.friction import kernels
-ones = np.ones(3)
-law = st.LinearWeakening(weakening_rate=1.0).parameters
-print(kernels.strengths(law, ones, 0.0 * ones, ones, 0.5 * ones))
+linear = st.LinearWeakening(weakening_rate=1.0).parameters
+for law in (OwnParameters(2.0), linear):
+    print(kernels.strengths(law, ones, 0.0 * ones, ones, 0.5 * ones))
 """
 
 
-def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path):
+def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, run):
     """Its module may be missing in the next process, or changed; numba would notice neither."""
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-
-    def run(code):
-        (tmp_path / "own_module.py").write_text(code)
-        command = [sys.executable, "-c", "import own_module"]
-        if code == LINEAR:
-            command = [sys.executable, tmp_path / "own_module.py"]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout.strip()
-
-    assert run(OWN_LAW.format(scale=2.0)) == "[2. 2. 2.]"
-    assert run(LINEAR) == "[0.5 0.5 0.5]"
-    edited = OWN_LAW.format(scale=2.0).replace("law.scale * peak", "3.0 * law.scale * peak")
-    assert run(edited) == "[6. 6. 6.]"
-    kept = b"".join(path.read_bytes() for path in (tmp_path / "cache").rglob("*.nbi"))
-    assert kept
-    assert b"own_module" not in kept
+    cache = tmp_path / "cache"
+    assert run(LAWS, cache) == ["[2. 2. 2.]", "[0.5 0.5 0.5]"]
+    edited = LAWS.replace("law.scale * peak", "3.0 * law.scale * peak")
+    assert run(edited, cache) == ["[6. 6. 6.]", "[0.5 0.5 0.5]"]
+    assert list(cache.rglob("*.nbc"))
+    assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))
 
 
 def test_functions_of_no_module_compile():
     """As libraries make them by exec; the package looks at the module of what is compiled."""
     made: dict = {"__name__": None}
     exec("def one_more(x):\n    return x + 1", made)
-    assert jit(made["one_more"])(1) == 2
+    assert jit.jit(made["one_more"])(1) == 2

@@ -34,7 +34,7 @@ def simulate(tau_p, problem=PROBLEM, save=None, **method):
     return simulate_rupture(problem, tau_p, method=method, save=save or st.Save(["slip"]))
 
 
-@pytest.mark.parametrize("height", [1e12, 1.66e15, np.inf])
+@pytest.mark.parametrize("height", [1e12, np.inf])
 def test_a_barrier_does_not_blind_the_onset(height):
     expected = st.onset(PROBLEM, barred(1e7), method=st.Equilibrium())
     run = simulate(barred(height), stop="onset")
@@ -150,7 +150,7 @@ def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps():
         st.onset(problem, TAU_P, method=st.LocalCriterion())
 
 
-@pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
+@pytest.mark.parametrize("stop", ["onset", "rest"])
 def test_where_a_run_stops_and_what_is_known_then(stop):
     problem, tau_p = PROBLEM, np.where(np.abs(X - 0.4) < 0.08, 0.8e6, 3e6)
     method = st.Rupture(loading_rate=1e7, stop=stop)
@@ -159,9 +159,6 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
     first = float(one.first_instability[0])
     assert first == float(whole.first_instability[0])
     unknown = {name for name in method.variables(problem) if np.isnan(one[name].values).any()}
-    if stop == "sliding":
-        assert one.equals(whole)
-        return
     assert float(one.critical_stress[0]) < 0.9 * float(whole.critical_stress[0])
     later = {"kinetic_stress", "stress_drop"}
     if stop == "onset":

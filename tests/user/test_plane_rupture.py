@@ -1,5 +1,6 @@
 """Ruptures on planes as they are asked for: files, streams, commands, memory, units."""
 
+import functools
 import os
 
 import numpy as np
@@ -54,7 +55,8 @@ def test_a_stored_study_is_that_in_memory_and_has_units(path, tmp_path):
     assert np.all(direct.stress_drop.values > 5e5)
 
 
-def test_the_command_draws_figures_and_a_film(path, tmp_path):
+def test_the_command_draws_figures_and_a_film(path, tmp_path, monkeypatch):
+    monkeypatch.setattr(st.plot, "film", functools.partial(st.plot.film, frames=20))
     out = command("rupture", path, "--film", "--out", tmp_path)
     for text in ("position of the critical patch: ", " and ", "ended by: sliding"):
         assert text in out
@@ -124,6 +126,7 @@ def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
         )  # fmt: skip
 
 
+@pytest.mark.slow  # its kernels are compiled anew
 def test_other_friction_laws_slide_too(path):
     problem, strength = problem_and_strength(path)
     friction = st.ExponentialWeakening(weakening_rate=0.4e12, residual_strength=1e5)
