@@ -74,8 +74,8 @@ class FieldFit:
     parameters : dict of str to float
         What was estimated, in SI: ``efolding_length`` (m), at which the correlation of z falls to
         1/e; ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
-        the names that study files use; ``anisotropy``; and ``noise``, the standard deviation of
-        the measurement noise.
+        the names that study files use; ``anisotropy``; ``noise``, the standard deviation of the
+        measurement noise; and ``between``, the coefficient of variation between specimens.
     interval : dict of str to (float, float)
         Of each of them, from the bootstrap; within what is searched, and of bounds of the marginal
         outside the values.

@@ -9,10 +9,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
+from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.inference.between import scatter_between, variances_within
 from stiction.inference.bootstrap import Repetitions, at_ends, intervals, repeat
 from stiction.inference.estimate import Estimate, Setting, estimate, observe
 from stiction.inference.field_fit import Details, Doubt, FieldFit, Goodness
@@ -22,7 +24,7 @@ from stiction.inference.spectrum_fit import back, spectrum_family
 from stiction.inference.whittle import Observed
 from stiction.inference.window import Window, make_window
 from stiction.interface import Interface
-from stiction.model import Progress, Real, at_least, checked, is_finite
+from stiction.model import Flag, Progress, Real, at_least, checked, is_finite
 from stiction.profiles import UNITS
 from stiction.progress import Meter
 
@@ -59,6 +61,7 @@ def fit_field(
     detrend: Literal[0, 1, 2, 3] = 0,
     noise: KnownOrEstimated = True,
     anisotropy: KnownOrEstimated = False,
+    between: Flag = False,
     quantity: str = "strength",
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
@@ -95,6 +98,9 @@ def fit_field(
         standard deviation, where it is known (SI).
     anisotropy : bool or float
         Of maps: ratio of correlation lengths along y and x. False: 1; True: estimated.
+    between : bool
+        Whether records are of different specimens, each with a factor of its own: the coefficient
+        of variation ``between`` of this factor is estimated, for `RandomInterface`.
     quantity : str
         What was measured, for its unit: 'strength', 'normal_pressure', 'friction_coefficient',
         ... A field of friction coefficients says so itself.
@@ -168,6 +174,14 @@ def fit_field(
         window.without_trend(record.values[record.measured])
         for window, record in zip(windows, records, strict=True)
     ]
+    levels = np.array([row.mean() for row in rows])
+    if between and (len(rows) < 2 or levels.min() <= 0.0):
+        raise InputError(
+            f"between: needs several records of positive mean, got {len(rows)} with means from"
+            f" {levels.min():g} to {levels.max():g}"
+        )
+    if between:
+        rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
     options = (bootstrap, seed, usable_cores() if workers is None else workers)
     fields = 3 if "correlation_length" in spectral.free else 1
     with Meter("fit_field", fields * bootstrap, progress) as meter:
@@ -184,6 +198,8 @@ def fit_field(
             " repetitions; take another marginal"
         )
     fit = _result(repeated, setting, compared, records, rows, confidence, quantity)
+    if between:
+        fit = _with_between(fit, levels, windows)
     if done < asked:
         fit = replace(fit, doubts=(*fit.doubts, Doubt("repetitions", done, asked)))
     for doubt in fit.doubts:
@@ -192,6 +208,22 @@ def fit_field(
         fit.field.modes(interface)
         fit.field.warn_if_inaccurate(interface)
     return fit
+
+
+def _with_between(fit: FieldFit, levels: Array, windows: Sequence[Window]) -> FieldFit:
+    """Add the scatter between records, and what it adds to the interval of the mean."""
+    within = variances_within(fit.field, windows)
+    cv, interval, error = scatter_between(np.log(levels), within, fit.confidence)
+    width = float(student.ppf(0.5 + 0.5 * fit.confidence, levels.size - 1)) * error
+    parameters = {**fit.parameters, "between": cv}
+    ends = {
+        name: (parameters[name] * math.exp(-width), parameters[name] * math.exp(width))
+        for name in ("mean", "marginal.mean")
+        if name in fit.interval
+    }
+    return replace(
+        fit, parameters=parameters, interval={**fit.interval, **ends, "between": interval}
+    )
 
 
 def _result(
