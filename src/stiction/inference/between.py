@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,15 +29,15 @@ def variances_within(field: RandomField, windows: Sequence[Window]) -> Array:
     for window in windows:
         if id(window) in known:
             continue
-        shape = tuple(2 * n for n in window.shape)
-        lengths = tuple(n * h for n, h in zip(shape, window.spacings, strict=True))
-        line = len(shape) == 1
-        interface = Interface(
-            length=lengths[0] if line else lengths, nodes=shape[0] if line else shape
-        )
+        shape: Any = tuple(2 * n for n in window.shape)
+        lengths: Any = tuple(n * h for n, h in zip(shape, window.spacings, strict=True))
+        if len(shape) == 1:
+            (lengths,), (shape,) = lengths, shape
+        interface = Interface(length=lengths, nodes=shape)
         draws = field.draws(interface, SAMPLES, 0)
-        record = field.profiles(interface, draws)[(..., *(slice(n) for n in window.shape))]
-        means = record.reshape(SAMPLES, -1)[:, window.measured.ravel()].mean(axis=1)
+        inside = np.zeros(interface.shape, dtype=np.bool_)
+        inside[tuple(slice(n) for n in window.shape)] = window.measured
+        means = field.profiles(interface, draws)[:, inside].mean(axis=1)
         known[id(window)] = float(np.log(means).var())
     return np.array([known[id(window)] for window in windows])
 

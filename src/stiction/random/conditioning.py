@@ -31,10 +31,10 @@ from scipy.special import ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.jit import jit
 from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
+from stiction.random.synthesis import condition
 
 NEGLIGIBLE = 1e-8
 """Singular values below which a direction of the draws stays as it is, to round-off."""
@@ -345,7 +345,7 @@ class Conditioning:
         out = np.array(draws)
         narrow = (1.0 + self.values**2) ** -0.5 - 1.0
         transposed = np.ascontiguousarray(self.right.T)
-        _condition(self.right, transposed, np.ascontiguousarray(data * gain), narrow, out)
+        condition(self.right, transposed, np.ascontiguousarray(data * gain), narrow, out)
         return out
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
@@ -365,21 +365,3 @@ class Conditioning:
                 f" {self.chi_square:.4g} for {points} values): check its marginal, its correlation"
                 " length and the noise"
             )
-
-
-@jit
-def _condition(right: Array, transposed: Array, offsets: Array, factors: Array, out: Array) -> None:
-    """Replace each row a of `out` by a + V (offset + factors V^T a), in an order of its own."""
-    dimension, count = right.shape
-    weights = np.empty(count)
-    for i in range(out.shape[0]):
-        weights[:] = 0.0
-        for j in range(dimension):
-            draw = out[i, j]
-            for k in range(count):
-                weights[k] += draw * right[j, k]
-        row = min(i, offsets.shape[0] - 1)
-        for k in range(count):
-            weight = offsets[row, k] + factors[k] * weights[k]
-            for j in range(dimension):
-                out[i, j] += weight * transposed[k, j]

@@ -119,3 +119,21 @@ def gaussian(
     out = z.reshape(z.shape[0], math.prod(shape[:-1]), shape[-1])
     _synthesise(draws, sigma, numbers, has_mean, out)
     return z
+
+
+@jit
+def condition(right: Array, transposed: Array, offsets: Array, factors: Array, out: Array) -> None:
+    """Replace each row a of `out` by a + V (offset + factors V^T a), the draws given measured z."""
+    dimension, count = right.shape
+    weights = np.empty(count)
+    for i in range(out.shape[0]):
+        weights[:] = 0.0
+        for j in range(dimension):
+            draw = out[i, j]
+            for k in range(count):
+                weights[k] += draw * right[j, k]
+        row = min(i, offsets.shape[0] - 1)
+        for k in range(count):
+            weight = offsets[row, k] + factors[k] * weights[k]
+            for j in range(dimension):
+                out[i, j] += weight * transposed[k, j]
