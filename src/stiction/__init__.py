@@ -2,76 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 __version__ = "0.1.0"
 
-# Public name -> module that holds it; imported on first use, so that `import stiction` is quick.
+# Public names stand in the stub, which editors read; each is imported on first use, so that
+# `import stiction` is quick.
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
-    "Solid": "solid",
-    "Interface": "interface",
-    "LinearWeakening": "friction",
-    "ExponentialWeakening": "friction",
-    "PiecewiseWeakening": "friction",
-    "Load": "load",
-    "GradientLoad": "load",
-    "EdgeLoad": "load",
-    "Problem": "problem",
-    "RandomField": "random.random_field",
-    "RandomInterface": "random.random_interface",
-    "Beta": "random.marginals",
-    "Lognormal": "random.marginals",
-    "Weibull": "random.marginals",
-    "Gamma": "random.marginals",
-    "TruncatedNormal": "random.marginals",
-    "PowerLawSpectrum": "random.spectra",
-    "SquaredExponentialSpectrum": "random.spectra",
-    "ExponentialSpectrum": "random.spectra",
-    "CustomSpectrum": "random.spectra",
-    "LocalCriterion": "criterion.local",
-    "Equilibrium": "equilibrium.method",
-    "equilibrium_path": "equilibrium.path",
-    "Rupture": "dynamics.method",
-    "simulate_rupture": "dynamics.simulate",
-    "Save": "dynamics.save",
-    "read_profile": "profiles",
-    "onset": "methods",
-    "monte_carlo": "ensemble.monte_carlo",
-    "fit_field": "inference.fit",
-    "failure_probability": "reliability.failure",
-    "design_stress": "reliability.failure",
-    "failure_curve": "reliability.curve",
-    "read_peaks": "inference.peaks",
-    "infer": "inference.infer",
-    "design_of_tests": "inference.design",
-    "Ensemble": "ensemble.experiment",
-    "Study": "study.study",
-    "open_run": "study.study",
-    "RunError": "errors",
-    "InputError": "errors",
-    "AccuracyWarning": "errors",
-    "UnitWarning": "errors",
+    name: home
+    for home, name in re.findall(r"^from (stiction.*) import (\w+) as", _STUB, re.MULTILINE)
 }
-_MODULES = {
-    "external": "external",
-    "paper": "paper",
-    "plot": "plot",
-    "statistics": "statistics",
-    "theory": "theory",
-}
-
-__all__ = ["__version__", *_HOMES, *_MODULES]
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        value = getattr(import_module(f"stiction.{_HOMES[name]}"), name)
-        globals()[name] = value
-        return value
-    if name in _MODULES:
-        return import_module(f"stiction.{_MODULES[name]}")
-    raise AttributeError(f"module 'stiction' has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'stiction' has no attribute {name!r}")
+    home = _HOMES[name]
+    if home == __name__:
+        return import_module(f"{home}.{name}")
+    value = globals()[name] = getattr(import_module(home), name)
+    return value
 
 
 def __dir__() -> list[str]:

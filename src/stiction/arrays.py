@@ -1,7 +1,4 @@
-"""Arrays: their type, real Fourier transforms row by row, and BLAS with one thread.
-
-Inside compiled kernels numba takes ``np.fft`` from rocket-fft, which is loaded when numba is.
-"""
+"""Arrays: their type, and BLAS with one thread."""
 
 from __future__ import annotations
 
@@ -10,28 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
-import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[Any]
 """Array of floats, double precision unless said otherwise."""
-
-
-def transform(profiles: Array, dimensions: int) -> Array:
-    """Return the unscaled real transform over the last one or two axes.
-
-    Row by row of the other axes, so that the numbers do not depend on the batch.
-    """
-    if dimensions == 1:
-        return np.fft.rfft(profiles)
-    return np.fft.rfft2(profiles)
-
-
-def inverse_transform(spectra: Array, shape: tuple[int, ...]) -> Array:
-    """Return the inverse of `transform` for profiles of the given shape."""
-    if len(shape) == 1:
-        return np.fft.irfft(spectra, shape[0])
-    return np.fft.irfft2(spectra, shape)
 
 
 _lock = threading.Lock()

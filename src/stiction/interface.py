@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, WithJsonSchema, model_validator
 
-from stiction.arrays import Array, inverse_transform, transform
+from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import _count, _number, model
 
@@ -18,34 +20,29 @@ SHORTEST = 1e-30
 """Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
 
 
-def _one_or_two(value: Any) -> tuple[Any, ...]:
-    """The entries of what was given: one of a line, two of a plane."""
+def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
+    """What was given, entry by entry: one of a line, two of a plane."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, list | tuple):
-        return (value,)
+        return read(value)
     if len(value) != 2:
         raise ValueError("must be a number for a line, or two, (along x, along y), for a plane")
-    return tuple(value)
+    return tuple(map(read, value))
 
 
-def _lengths(value: Any) -> Any:
-    lengths = tuple(_number(entry) for entry in _one_or_two(value))
-    if not all(0.0 < length < math.inf for length in lengths):
+def _length(value: Any) -> float:
+    length = _number(value)
+    if not 0.0 < length < math.inf:
         raise ValueError("must be positive and finite")
-    return lengths if len(lengths) == 2 else lengths[0]
+    return length
 
 
-def _nodes(value: Any) -> Any:
-    counts = tuple(_count(entry) for entry in _one_or_two(value))
-    for count in counts:
-        if count < FEWEST:
-            raise ValueError(f"must be at least {FEWEST}")
-        if count % 2:
-            raise ValueError("must be even")
-    if math.prod(counts) > MOST:
-        raise ValueError(f"must be at most 2^24 = {MOST} in all")
-    return counts if len(counts) == 2 else counts[0]
+def _node_count(value: Any) -> int:
+    count = _count(value)
+    if count < FEWEST or count % 2:
+        raise ValueError(f"must be even and at least {FEWEST}")
+    return count
 
 
 def _schema(kind: str) -> WithJsonSchema:
@@ -53,18 +50,10 @@ def _schema(kind: str) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [{"type": kind}, pair]})
 
 
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
-Length: TypeAlias = Annotated[
-    float | tuple[float, float],
-    BeforeValidator(_lengths), PlainSerializer(_plain), _schema("number"),
-]  # fmt: skip
-Nodes: TypeAlias = Annotated[
-    int | tuple[int, int],
-    BeforeValidator(_nodes), PlainSerializer(_plain), _schema("integer"),
-]  # fmt: skip
+_lengths = BeforeValidator(partial(_one_or_two, read=_length))
+_counts = BeforeValidator(partial(_one_or_two, read=_node_count))
+Length: TypeAlias = Annotated[float | tuple[float, float], _lengths, _schema("number")]
+Nodes: TypeAlias = Annotated[int | tuple[int, int], _counts, _schema("integer")]
 
 
 @model
@@ -103,8 +92,10 @@ class Interface:
         if isinstance(self.length, tuple) != isinstance(self.nodes, tuple):
             raise InputError(
                 "length and nodes: give one number each for a line or two each for a plane, got"
-                f" length = {_plain(self.length)}, nodes = {_plain(self.nodes)}"
+                f" length = {self.length}, nodes = {self.nodes}"
             )
+        if self.size > MOST:
+            raise InputError(f"nodes: must be at most 2^24 = {MOST} in all, got {self.nodes}")
         if min(self.spacings) < SHORTEST:
             raise InputError(
                 f"length: the nodes must be at least {SHORTEST:g} m apart, got"
@@ -165,10 +156,8 @@ class Interface:
     @property
     def coordinates(self) -> dict[str, Array]:
         """Positions of the nodes along each direction, in [0, length), m."""
-        return {
-            dim: np.arange(n) * spacing
-            for dim, n, spacing in zip(self.dims, self.shape, self.spacings, strict=True)
-        }
+        each = zip(self.dims, self.shape, self.spacings, strict=True)
+        return {dim: np.arange(n) * spacing for dim, n, spacing in each}
 
     @property
     def x(self) -> Array:
@@ -220,9 +209,14 @@ class Interface:
         return share
 
     def transform(self, profiles: Array) -> Array:
-        """Real Fourier transform of profiles (..., *shape), unscaled."""
-        return transform(profiles, len(self.shape))
+        """Real Fourier transform of profiles (..., *shape), unscaled.
+
+        Row by row of the other axes, so that the numbers do not depend on the batch.
+        """
+        return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 
     def inverse_transform(self, spectra: Array) -> Array:
         """Profiles (..., *shape) of real Fourier transforms."""
-        return inverse_transform(spectra, self.shape)
+        if self.is_plane:
+            return np.fft.irfft2(spectra, self.shape)
+        return np.fft.irfft(spectra, self.shape[0])

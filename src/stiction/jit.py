@@ -56,15 +56,13 @@ def _kernel_sources() -> dict[str, bytes]:
     message recompiles nothing.
     """
     package = Path(__file__).parent
-    texts = {
-        ".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes()
-        for path in sorted(package.rglob("*.py"))
-    }
-    return {
-        name.removesuffix(".__init__"): text
-        for name, text in texts.items()
-        if name == "stiction.jit" or b"stiction.jit import" in text or b"InputError" not in text
-    }
+    found = {}
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"stiction.jit import" in text or b"InputError" not in text or path.stem == "jit":
+            name = ".".join(path.relative_to(package.parent).with_suffix("").parts)
+            found[name.removesuffix(".__init__")] = text
+    return found
 
 
 @cache
@@ -93,8 +91,6 @@ def _folder(module: str) -> Path:
 
 
 _KEPT = numba.config.CACHE_DIR
-
-
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
@@ -122,21 +118,12 @@ def _keep_own(cache: Any) -> None:
     notice that the law was edited, and could not read its index where the law's module is missing.
     """
     load, save = cache.load_overload, cache.save_overload
-    unreadable = (ImportError, AttributeError)
 
     def load_overload(signature: Any, target: Any) -> Any:
-        try:
-            return load(signature, target) if _is_own(signature) else None
-        except unreadable:
-            return None
+        return load(signature, target) if _is_own(signature) else None
 
     def save_overload(signature: Any, data: Any) -> None:
-        if not _is_own(signature):
-            return
-        try:
-            save(signature, data)
-        except unreadable:
-            cache.flush()
+        if _is_own(signature):
             save(signature, data)
 
     cache.load_overload, cache.save_overload = load_overload, save_overload

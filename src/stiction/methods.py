@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import WrapValidator
+from pydantic import BeforeValidator
 
 from stiction.errors import InputError
-from stiction.model import Progress, checked, describe, to_plain
+from stiction.model import Progress, checked, to_plain
 from stiction.placing import with_gaps
 from stiction.problem import Problem, Sample, named_profiles, refusals
 from stiction.profiles import gather
@@ -55,9 +55,9 @@ class Method(Protocol):
     package that names it under the entry points "stiction.methods" offers it in study files too;
     its `type` is then a ``Literal`` with a default.
     Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
-    solver returned; `accepts`, of "barriers" and "overstress" (see
-    `Problem.sample`), and `first_stage`, the type of a cheaper method whose onsets lie close to
-    its own, by which rare failures are found first.
+    solver returned; `accepts`, of "barriers" and "overstress" (see `Problem.sample`); and
+    `first_stage`, the type of a cheaper method whose onsets lie close to its own, by which rare
+    failures are found first.
     """
 
     @property
@@ -109,38 +109,22 @@ def methods() -> Mapping[str, Any]:
     return MappingProxyType(found)
 
 
-def check_method(method: Any) -> None:
-    """Raise an `InputError` unless `method` is a method; the class instead of an object is none."""
-    if isinstance(method, type):
-        raise InputError(
-            f"method: must be an object, got the class {method.__name__}; write"
-            f" st.{method.__name__}(...)"
-        )
-    missing = [name for name in MEMBERS if not hasattr(method, name)]
+def _method(value: Any) -> Any:
+    if isinstance(value, type):
+        raise ValueError(f"must be an object; write st.{value.__name__}(...)")
+    missing = [name for name in MEMBERS if not hasattr(value, name)]
     if "prepare" in missing:
-        raise InputError(
-            "method: must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
-            f" st.Rupture(loading_rate=...), got {describe(method)}"
+        raise ValueError(
+            "must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
+            " st.Rupture(loading_rate=...)"
         )
     if missing:
-        raise InputError(f"method: {describe(method)} lacks {', '.join(missing)}")
-
-
-def _as_method(value: Any, _: Any) -> Any:
-    try:
-        check_method(value)
-    except InputError as error:
-        raise InputError([text.removeprefix("method: ") for text in error.problems]) from None
+        raise ValueError(f"lacks {', '.join(missing)}")
     return value
 
 
-MethodObject: TypeAlias = Annotated[Any, WrapValidator(_as_method)]
+MethodObject: TypeAlias = Annotated[Any, BeforeValidator(_method)]
 """Annotation of an argument that is a method; see `stiction.model.checked`."""
-
-
-def accepted(method: Method) -> tuple[str, ...]:
-    """Return what `Problem.sample` may let through for a method, beyond what every one takes."""
-    return getattr(method, "accepts", ())
 
 
 def study_attributes(**parts: Any) -> dict[str, Any]:
@@ -180,22 +164,15 @@ def _check_values(
     sizes |= {"sample": sample.samples, DIRECTION: 2}
     problems = [f"does not return {name!r}" for name in variables if name not in values]
     for name, found in values.items():
+        dims = variables[name].dims if name in variables else ()
+        shape = tuple(sizes.get(dim) for dim in dims)
         if name not in variables:
             problems.append(f"returns {name!r}, which is none of its variables")
-            continue
-        dims = variables[name].dims
-        shape = tuple(sizes.get(dim) for dim in dims)
-        if found.shape != shape and None not in shape:
+        elif found.shape != shape and None not in shape:
             over = ", ".join(dims)
             problems.append(f"returns {name!r} of shape {found.shape}, not {shape} over ({over})")
     if problems:
         raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
-
-
-def warn_of(problem: Problem, method: Method, sample: Sample, values: Values) -> None:
-    """Let a method that can judge its own results warn of them, once for all samples."""
-    if hasattr(method, "warn_of"):
-        method.warn_of(problem, sample, values)
 
 
 def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
@@ -298,9 +275,10 @@ def onset(
     measured = None
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
-    sample = problem.sample(profiles, accept=accepted(method))
+    sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)
-    warn_of(problem, method, sample, values)
+    if hasattr(method, "warn_of"):
+        method.warn_of(problem, sample, values)
     result = label(problem, method, values, np.arange(sample.samples), attributes)
     return with_gaps(problem, result, measured)

@@ -13,7 +13,7 @@ import numbers
 import os
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
@@ -27,7 +27,6 @@ from pydantic import (
     InstanceOf,
     PlainSerializer,
     WithJsonSchema,
-    WrapValidator,
 )
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
@@ -38,7 +37,7 @@ from stiction.progress import Show
 T = TypeVar("T")
 
 
-def _number(value: Any) -> Any:
+def _number(value: Any) -> float:
     """Numbers of any library, but no strings and no booleans, which pydantic would convert."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -50,47 +49,31 @@ def _number(value: Any) -> Any:
         raise ValueError("must be finite") from None
 
 
-def whole(value: Any) -> int | None:
-    """`value` as an int if it is a whole number (1e4 too), None otherwise."""
+def _count(value: Any) -> int:
+    """Whole numbers of any library, 1e4 too."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
-        return None
+        raise ValueError("must be a whole number")
     if isinstance(value, numbers.Integral):
         return int(value)
-    number = float(value)
-    return int(number) if number.is_integer() else None
-
-
-def _count(value: Any) -> Any:
-    count = whole(value)
-    if count is None:
+    if not float(value).is_integer():
         raise ValueError("must be a whole number")
-    return count
-
-
-def as_list(value: Any) -> Any:
-    """Return arrays and ranges as lists, for annotations of sequences."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return list(value) if isinstance(value, range) else value
+    return int(float(value))
 
 
 def is_whole(value: Any, least: int) -> bool:
     """Whether a value is a whole number (1e4 too), and not less than `least`."""
-    number = whole(value)
-    return number is not None and number >= least
-
-
-def is_real(value: Any) -> bool:
-    """Whether a value is a number and neither text nor a truth value; NaN and infinity are."""
     try:
-        return isinstance(_number(value), float)
+        return _count(value) >= least
     except ValueError:
         return False
 
 
 def is_finite(value: Any) -> bool:
-    """Whether a value is a finite number."""
-    return is_real(value) and math.isfinite(value)
+    """Whether a value is a finite number, and neither text nor a truth value."""
+    try:
+        return math.isfinite(_number(value))
+    except ValueError:
+        return False
 
 
 def real_array(value: Any) -> Array:
@@ -113,16 +96,24 @@ def is_unplaced(value: Any) -> bool:
     return isinstance(value, dict) or any(hasattr(value, name) for name in own)
 
 
+def _must(
+    be: str, valid: Callable[[Any], bool], made: Callable[[Any], Any] = lambda value: value
+) -> BeforeValidator:
+    """Return the validator of an annotation that refuses what is not `valid`."""
+
+    def read(value: Any) -> Any:
+        if not valid(value):
+            raise ValueError(f"must be {be}")
+        return made(value)
+
+    return BeforeValidator(read)
+
+
 @functools.cache
 def at_least(least: int) -> Any:
     """Return the annotation of a whole number not below `least`."""
-
-    def read(value: Any) -> int:
-        if not is_whole(value, least):
-            raise ValueError(f"must be a whole number >= {least}")
-        return int(value)
-
-    return Annotated[int, BeforeValidator(read)]
+    valid = functools.partial(is_whole, least=least)
+    return Annotated[int, _must(f"a whole number >= {least}", valid, int)]
 
 
 Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
@@ -145,11 +136,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         )
     if is_unplaced(value):
         return value
-    if isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        number = _number(value)
-        if not np.isfinite(number):
-            raise ValueError("must be finite")
-        return number
+    if is_finite(value):
+        return _number(value)
     try:
         array = np.array(real_array(value))
     except TypeError as error:
@@ -165,13 +153,11 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    if hasattr(value, "plain"):
-        return value.plain()
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
-Positive: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 PROFILE_SCHEMA = [
     {"type": "number"},
     {"type": "array", "items": {"type": "number"}},
@@ -187,62 +173,41 @@ Profile: TypeAlias = Annotated[
 """A number, or a read-only array of shape (nodes,)."""
 
 
-def _optional_profile(value: Any, info: pydantic.ValidationInfo) -> Any:
-    return None if value is None else _profile(value, info)
-
-
 OptionalProfile: TypeAlias = Annotated[
     Any,
-    BeforeValidator(_optional_profile),
+    BeforeValidator(lambda value, info: None if value is None else _profile(value, info)),
     PlainSerializer(_plain),
     WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, {"type": "null"}]}),
 ]
 """The same, or None for 'not given'."""
 
 
-def _truth(value: Any) -> Any:
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError("must be True or False")
-    return bool(value)
+def _is_text(value: Any) -> bool:
+    """Whether it is valid UTF-8, which TOML, JSON and NetCDF need."""
+    return isinstance(value, str) and value == value.encode(errors="ignore").decode()
 
 
-def _progress(value: Any) -> Any:
-    if isinstance(value, bool | np.bool_) or (callable(value) and not isinstance(value, type)):
-        return value
-    raise ValueError("must be True, False or a function")
+def _is_path(value: Any) -> bool:
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
+    if not text or not _is_text(text) or "\0" in text:
+        return False
+    return all(len(os.fsencode(part)) <= 255 for part in Path(text).parts)
 
 
-def _names(value: Any) -> tuple[str, ...]:
-    several = isinstance(value, list | tuple | set | frozenset)
-    names = tuple(value) if several else (value,)
-    if not all(isinstance(name, str) for name in names):
-        raise ValueError("must be a name or a list of names")
-    return names
+def _listed(names: Any) -> tuple[Any, ...]:
+    return tuple(names) if isinstance(names, list | tuple | set | frozenset) else (names,)
 
 
-def _path(value: Any) -> Path:
-    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if not isinstance(text, str) or not text or "\0" in text:
-        raise ValueError("must be a path")
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise ValueError(
-            "must be valid UTF-8, which NetCDF and JSON need; rename the file"
-        ) from None
-    if any(len(os.fsencode(part)) > 255 for part in Path(text).parts):
-        raise ValueError("is too long a name for a file")
-    return Path(text)
+def _are_names(value: Any) -> bool:
+    return all(isinstance(name, str) for name in _listed(value))
 
 
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError("must be text")
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValueError("must be valid UTF-8, which TOML and NetCDF need") from None
-    return value
+def _is_flag(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_)
+
+
+def _is_show(value: Any) -> bool:
+    return _is_flag(value) or (callable(value) and not isinstance(value, type))
 
 
 def _numbers(value: Any) -> Array:
@@ -252,16 +217,20 @@ def _numbers(value: Any) -> Array:
         raise InputError(f"must be numbers; {error}") from None
 
 
-Flag: TypeAlias = Annotated[bool, BeforeValidator(_truth)]
-Progress: TypeAlias = Annotated[Show, WrapValidator(lambda value, _: _progress(value))]
+Flag: TypeAlias = Annotated[bool, _must("True or False", _is_flag, bool)]
+Progress: TypeAlias = Annotated[Show, _must("True, False or a function", _is_show)]
 """True, False, or a function of (done, total)."""
-Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
+Names: TypeAlias = Annotated[
+    tuple[str, ...], _must("a name or a list of names", _are_names, _listed)
+]
 """One name or several, as a tuple."""
-Text: TypeAlias = Annotated[str, BeforeValidator(_text)]
-FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
+Text: TypeAlias = Annotated[str, _must("text in UTF-8", _is_text)]
+FilePath: TypeAlias = Annotated[
+    Path, _must("a path in UTF-8, each name at most 255 bytes", _is_path)
+]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
 """Real numbers of any shape, as a float64 array."""
-Seconds: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, allow_inf_nan=False)]
+Seconds: TypeAlias = Positive
 
 
 def describe(value: Any) -> str:
@@ -272,8 +241,8 @@ def describe(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _article(name: str) -> str:
-    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
+def _one_of(names: Iterable[str]) -> str:
+    return " or ".join(f"{'an' if name[0] in 'AEIO' else 'a'} {name}" for name in names)
 
 
 def _models_in(annotation: Any) -> list[type]:
@@ -295,8 +264,7 @@ def _parameters(owner: Any) -> dict[str, Any]:
     if dataclasses.is_dataclass(owner):
         hints = typing.get_type_hints(owner, include_extras=True)
         return {key: hints[name] for key, name in keys_of(owner).items()}
-    hints = typing.get_type_hints(_without_return(owner), include_extras=True)
-    return {name: hints.get(name, Any) for name in inspect.signature(owner).parameters}
+    return dict.fromkeys(inspect.signature(owner).parameters) if owner else {}
 
 
 def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str], list[Any]]:
@@ -305,24 +273,20 @@ def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[
     Pydantic numbers positional arguments and puts the chosen member of a union into the path.
     """
     path: list[str] = []
-    owners: list[Any] = [owner]
-    inside: list[Any] = []
-    for step in location:
-        members = {getattr(one, "type", None): one for one in owners}
-        if len(owners) > 1 and step in members:
-            owners = [members[step]]
+    owners, inside = [owner], []
+    for number, step in enumerate(location, 1):
+        chosen = [one for one in owners if getattr(one, "type", None) == step]
+        if chosen and len(owners) > 1:
+            owners = chosen
             continue
-        found: dict[str, Any] = {}
-        for one in owners:
-            found |= _parameters(one)
+        found = {name: hint for one in owners for name, hint in _parameters(one).items()}
         if isinstance(step, int) and not path and step < len(found):
             step = list(found)[step]
         path.append(str(step))
         inside = _models_in(found.get(str(step)))
-        if inside and step is not location[-1]:
+        if inside and number < len(location):
             owners = inside
-    names = dict.fromkeys(name for one in owners for name in _parameters(one))
-    return path, list(names), inside
+    return path, list(dict.fromkeys(name for one in owners for name in _parameters(one))), inside
 
 
 def explain(
@@ -330,82 +294,64 @@ def explain(
 ) -> list[str]:
     """List the mistakes that pydantic found, one text each, with the path to the key.
 
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-    owner : class or function
-        The model that was validated, or the function that was called.
-    root : str
-        What paths begin with.
-    prefix : tuple of str
-        Which part of the `owner` was validated, if not all of it.
+    `owner` is the model that was validated, or `prefix` of it, or the function that was called.
+    Paths begin with `root`.
     """
     texts = []
-    items = error.errors()
-    if any(item["type"] == "unexpected_positional_argument" for item in items):
-        names = list(_parameters(owner))
-        return [f"{owner.__name__}: give its arguments by name (valid: {', '.join(names)})"]
-    for item in items:
+    for item in error.errors():
         steps, valid, inside = _walk(owner, (*prefix, *item["loc"]))
         path = ".".join([root, *steps] if root else steps)
-        kind, message, given = item["type"], item["msg"], item.get("input")
-        message = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
+        kind, given = item["type"], describe(item.get("input"))
+        context = item.get("ctx") or {}
+        wrong = context.get("error")
+        if kind == "unexpected_positional_argument":
+            names = ", ".join(_parameters(owner))
+            return [f"{owner.__name__}: give its arguments by name (valid: {names})"]
         if kind in ("missing", "missing_argument"):
             texts.append(f"{path}: missing")
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
             table, _, key = path.rpartition(".")
             texts.append(unknown_name(table or owner.__name__, key, valid))
         elif kind == "union_tag_invalid":
-            tags = [tag.strip("' ") for tag in item["ctx"]["expected_tags"].split(",")]
-            texts.append(unknown_name(f"{path}.type", str(item["ctx"]["tag"]), tags))
+            tags = [tag.strip("' ") for tag in context["expected_tags"].split(",")]
+            texts.append(unknown_name(f"{path}.type", str(context["tag"]), tags))
         elif kind == "union_tag_not_found":
-            texts.append(f"{path}.type: missing, got {describe(given)}")
-        elif kind == "value_error":
-            nested = (item.get("ctx") or {}).get("error")
-            if isinstance(nested, InputError):
-                texts.extend(f"{path}: {text}" if path else text for text in nested.problems)
-            else:
-                texts.append(f"{path}: {message}, got {describe(given)}")
-        elif kind == "is_instance_of":
-            texts.append(f"{path}: must be {_article(item['ctx']['class'])}, got {describe(given)}")
-        elif inside and kind in ("dataclass_type", "model_attributes_type"):
-            expected = " or ".join(_article(one.__name__) for one in inside)
-            texts.append(f"{path}: must be {expected}, got {describe(given)}")
+            texts.append(f"{path}.type: missing, got {given}")
+        elif isinstance(wrong, InputError):
+            texts.extend(f"{path}: {text}" if path else text for text in wrong.problems)
+        elif wrong is not None:
+            texts.append(f"{path}: {wrong}, got {given}")
         else:
-            message = message.removeprefix("Input should be ")
-            texts.append(f"{path}: must be {message}, got {describe(given)}")
+            message = item["msg"].removeprefix("Input should be ")
+            if kind == "is_instance_of":
+                message = _one_of([context["class"]])
+            elif inside and kind in ("dataclass_type", "model_attributes_type"):
+                message = _one_of(one.__name__ for one in inside)
+            texts.append(f"{path}: must be {message}, got {given}")
     return texts
 
 
-def _same(left: Any, right: Any) -> bool:
-    if isinstance(left, np.ndarray) or isinstance(right, np.ndarray):
-        return np.array_equal(left, right)
-    if hasattr(left, "identical"):
-        return type(left) is type(right) and bool(left.identical(right))
-    return bool(left == right)
+def _comparable(value: Any) -> Any:
+    """What stands for a value where objects are compared and hashed."""
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
+    if hasattr(value, "identical"):  # labelled arrays
+        return str(value.to_dict())
+    if isinstance(value, dict):
+        return tuple((key, _comparable(value[key])) for key in sorted(value))
+    return tuple(map(_comparable, value)) if isinstance(value, list) else value
+
+
+def _fields(self: Any) -> tuple[Any, ...]:
+    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
 
 
 def _equal(self: Any, other: Any) -> bool:
-    if type(self) is not type(other):
-        return NotImplemented
-    fields = dataclasses.fields(self)
-    return all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields)
-
-
-def _hashable(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return (value + 0.0).tobytes()  # zeros of both signs are equal, so they must hash alike
-    if hasattr(value, "identical"):  # labelled arrays cannot be hashed
-        return np.asarray(value).tobytes()
-    if isinstance(value, dict):
-        return tuple((key, _hashable(inner)) for key, inner in value.items())
-    if isinstance(value, list):
-        return tuple(map(_hashable, value))
-    return value
+    return _fields(self) == _fields(other) if type(self) is type(other) else NotImplemented
 
 
 def _hash(self: Any) -> int:
-    return hash(tuple(_hashable(getattr(self, field.name)) for field in dataclasses.fields(self)))
+    return hash(_fields(self))
 
 
 @typing.overload
@@ -422,8 +368,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
-    bare = cls.__repr__ in (object.__repr__, brief)  # its own, if it has one, stays
-    wrapped: Any = pydantic_dataclass(frozen=True, eq=False, kw_only=kw_only, config=config)(cls)
+    decorate = pydantic_dataclass(frozen=True, eq=False, repr=False, kw_only=kw_only, config=config)
+    wrapped: Any = decorate(cls)
     validated_init = wrapped.__init__
 
     @functools.wraps(validated_init)
@@ -432,16 +378,11 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
             validated_init(self, *args, **kwargs)
         except pydantic.ValidationError as error:
             raise InputError(explain(error, wrapped, cls.__name__)) from None
-        except TypeError as error:  # too many positional arguments, for example
-            raise InputError(f"{cls.__name__}: {error}") from None
 
     # Validation inside another model must keep calling pydantic's own path, not this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
-    wrapped.__init__ = init
-    wrapped.__eq__ = _equal
-    if bare:
-        wrapped.__repr__ = brief
-    wrapped.__hash__ = _hash
+    wrapped.__init__, wrapped.__repr__ = init, brief
+    wrapped.__eq__, wrapped.__hash__ = _equal, _hash
     return wrapped
 
 
@@ -454,7 +395,13 @@ def checked(function: Function) -> Function:
     A class in an annotation takes its own instances only, not the tables of a study file. All that
     is wrong comes as one `InputError`.
     """
-    plain = _without_return(function)
+    plain = types.FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__,
+        function.__closure__,
+    )  # fmt: skip
+    plain.__kwdefaults__ = function.__kwdefaults__
+    plain.__annotations__ = dict(function.__annotations__)
+    plain.__annotations__.pop("return", None)  # it may name what is not loaded
     hints = typing.get_type_hints(plain, include_extras=True)
     plain.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
     validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(plain)
@@ -477,7 +424,7 @@ def check(name: str, value: Any, annotation: Any) -> Any:
     try:
         return _adapter(annotation).validate_python(value)
     except pydantic.ValidationError as error:
-        raise InputError(explain(error, check, name)) from None
+        raise InputError(explain(error, None, name)) from None
 
 
 @functools.lru_cache(maxsize=64)
@@ -499,41 +446,18 @@ def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> Non
         )
 
 
-def _without_return(function: Any) -> types.FunctionType:
-    """The same function without an annotation of its result, which may name what is not loaded."""
-    plain = types.FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__,
-        function.__closure__,
-    )  # fmt: skip
-    plain.__kwdefaults__ = function.__kwdefaults__
-    names = function.__annotations__.items()
-    plain.__annotations__ = {name: hint for name, hint in names if name != "return"}
-    return plain
-
-
 def _instances(annotation: Any) -> Any:
     """The annotation with model classes that take instances only."""
-    if dataclasses.is_dataclass(annotation) and isinstance(annotation, type):
-        return _instance_of((annotation,))
-    if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
-        members = typing.get_args(annotation)
-        classes: Any = tuple(one for one in members if dataclasses.is_dataclass(one))
-        rest = tuple(one for one in members if one not in classes)
-        if classes:
-            return typing.Union[(_instance_of(classes), *rest)]
-    return annotation
-
-
-def _instance_of(classes: tuple[type, ...]) -> Any:
-    def read(value: Any, _: Any) -> Any:
-        if not isinstance(value, classes):
-            raise ValueError("must be " + " or ".join(_article(one.__name__) for one in classes))
-        return value
-
-    return Annotated[Any, WrapValidator(read)]
-
-
-_LONG = 6
+    union = isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union
+    members = typing.get_args(annotation) if union else (annotation,)
+    classes = tuple(
+        cls for cls in members if isinstance(cls, type) and dataclasses.is_dataclass(cls)
+    )
+    if not classes:
+        return annotation
+    own = _must(_one_of(cls.__name__ for cls in classes), lambda value: isinstance(value, classes))
+    rest = (one for one in members if one not in classes)
+    return typing.Union[(Annotated[Any, own], *rest)]
 
 
 def brief(self: Any) -> str:
@@ -541,30 +465,21 @@ def brief(self: Any) -> str:
     parts = []
     for field in dataclasses.fields(self):
         value = getattr(self, field.name)
-        if field.repr and not _is_default(value, field.default):
+        default = type(value) is type(field.default) and value == field.default
+        if field.repr and not default:
             parts.append(f"{field.name}={_shown(value)}")
     return f"{type(self).__name__}({', '.join(parts)})"
-
-
-def _is_default(value: Any, default: Any) -> bool:
-    if isinstance(value, np.ndarray) or type(value) is not type(default):
-        return False
-    return bool(value == default)
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
         shape = " x ".join(str(size) for size in value.shape)
-        if value.dtype.kind not in "fiub" or value.size == 0:
+        if value.dtype.kind not in "fiu" or value.size == 0:
             return f"<{shape} array>"
-        if value.dtype.kind == "b":
-            return f"<{shape} array, {int(value.sum())} true>"
         return f"<{shape} array, {np.nanmin(value):.6g} to {np.nanmax(value):.6g}>"
-    if isinstance(value, list | tuple) and len(value) > _LONG:
+    if isinstance(value, list | tuple) and len(value) > 6:
         return f"<{len(value)} values>"
-    if isinstance(value, float):
-        return f"{float(value)!r}"  # numpy's own says np.float64(...)
-    return repr(value)
+    return repr(float(value) if isinstance(value, np.floating) else value)
 
 
 def to_plain(value: Any) -> Any:

@@ -31,11 +31,6 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
     Returns
     -------
     Problem
-
-    Raises
-    ------
-    InputError
-        If the plane state is unknown or the nodes are too few.
     """
     return Problem(
         solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
@@ -61,11 +56,6 @@ def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField
     Returns
     -------
     RandomField
-
-    Raises
-    ------
-    InputError
-        If the ratio is not positive, or h_n is not defined because W varies.
     """
     return RandomField(
         marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),

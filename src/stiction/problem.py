@@ -15,22 +15,17 @@ from stiction.friction import SCALES, Friction, contradictions
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
-from stiction.model import Mode, Names, check, describe, is_unplaced, model, real_array
+from stiction.model import Mode, describe, is_unplaced, model, real_array
 from stiction.placing import describe_gaps, turned
 from stiction.profiles import at_nodes, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
 
 FEWEST_NODES = 4
-ACCEPTED = ("barriers", "overstress", "constant")
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
-MOST_NODES = 5e4
-"""A problem that needs more has a wrong unit rather than a long interface."""
 WEAKEST, STRONGEST = 1e-8, 1.0
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
-
-
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
 weaken."""
@@ -92,13 +87,10 @@ class Sample(NamedTuple):
 
     def part(self, some: slice) -> Sample:
         """Return some samples of the batch."""
-        own = (getattr(self, name)[some] for name in BY_SAMPLE)
-        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
-
-    def one(self, number: int) -> Sample:
-        """Return sample `number` by itself, its arrays of shape (*shape) and contiguous."""
-        own = (np.ascontiguousarray(getattr(self, name)[number]) for name in BY_SAMPLE)
-        return self._replace(**dict(zip(BY_SAMPLE, own, strict=True)))
+        return Sample(
+            self.strength[some], self.residual_strength[some], self.weakening_rate[some],
+            self.initial_stress[some], self.load_profile, self.normal_pressure[some],
+        )  # fmt: skip
 
     @property
     def uniform_weakening(self) -> bool:
@@ -116,19 +108,10 @@ class Sample(NamedTuple):
         """Largest weakening rate of nodes that may break, Pa/m."""
         return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
 
-    def every_second(self, first: int) -> Sample:
-        """Return the same samples on the nodes `first`, `first` + 2, ... of a line."""
-        return Sample(*(values[..., first::2] for values in self))
-
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
         return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
 
-
-BY_SAMPLE = (
-    "strength", "residual_strength", "weakening_rate", "initial_stress", "normal_pressure"
-)  # fmt: skip
-"""What has an axis of samples."""
 
 PROFILES: dict[str, Variable] = {
     "strength": Variable("Pa", "peak strength"),
@@ -184,44 +167,58 @@ class Problem:
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
         self._place_profiles()
-        shape = self.interface.shape
-        friction, load = self.friction, self.load
-        nodes = " x ".join(map(str, shape))
-        problems = []
-        for part in ("friction", "load"):
-            owner = getattr(self, part)
-            for field in dataclasses.fields(owner):
-                value = getattr(owner, field.name)
-                if isinstance(value, np.ndarray) and value.shape != shape:
-                    problems.append(
-                        f"{part}.{field.name}: must have one entry for each of the {nodes} nodes,"
-                        f" got {describe(value)}{turned(value.shape, shape)}"
-                    )
-        if isinstance(load.profile, LoadShape):
-            load.profile.on(self.interface)  # refuses one that is not positive
-        if self.interface.is_plane:
-            if self.solid.plane != "strain":
-                problems.append(
-                    "solid.plane: on an interface of two dimensions the solids are in three, so"
-                    f" there is no plane {self.solid.plane}; leave plane = 'strain'"
-                )
-            if self.mode != "II":
-                problems.append(
-                    "mode: on an interface of two dimensions load and slip are along x, which is"
-                    f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
-                )
-        problems += [f"friction: {text}" for text in contradictions(friction)]
-        rate = friction.weakening_rate
+        problems = self._wrong_shapes()
+        if isinstance(self.load.profile, LoadShape):
+            self.load.profile.on(self.interface)  # refuses one that is not positive
+        if self.interface.is_plane and self.solid.plane != "strain":
+            problems.append(
+                "solid.plane: on an interface of two dimensions the solids are in three, so"
+                f" there is no plane {self.solid.plane}; leave plane = 'strain'"
+            )
+        if self.interface.is_plane and self.mode != "II":
+            problems.append(
+                "mode: on an interface of two dimensions load and slip are along x, which is"
+                f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
+            )
+        problems += [f"friction: {text}" for text in contradictions(self.friction)]
+        rate = self.friction.weakening_rate
         if rate is not None and not problems:
             problems += self._too_few_nodes(float(np.max(rate)))
         if problems:
             raise InputError(problems)
         if rate is not None:
-            self._warn_if_short(self.nucleation_lengths(float(np.median(rate)))[0])
+            self._warn_if_short(float(np.median(rate)))
         return self
 
-    def _warn_if_short(self, patch: float) -> None:
-        length = min(self.interface.lengths)
+    def _place_profiles(self) -> None:
+        """Put profiles with coordinates of their own on the nodes."""
+        problems: list[str] = []
+        for part in ("friction", "load"):
+            owner, placed = getattr(self, part), {}
+            for name, value in vars(owner).items():
+                if is_unplaced(value):
+                    try:
+                        placed[name] = on_nodes(f"{part}.{name}", value, self.interface)
+                    except InputError as error:
+                        problems += error.problems
+            if placed and not problems:  # frozen for others; validation is not over yet
+                object.__setattr__(self, part, dataclasses.replace(owner, **placed))
+        if problems:
+            raise InputError(problems)
+
+    def _wrong_shapes(self) -> list[str]:
+        shape = self.interface.shape
+        nodes = " x ".join(map(str, shape))
+        return [
+            f"{part}.{name}: must have one entry for each of the {nodes} nodes, got"
+            f" {describe(value)}{turned(value.shape, shape)}"
+            for part in ("friction", "load")
+            for name, value in vars(getattr(self, part)).items()
+            if isinstance(value, np.ndarray) and value.shape != shape
+        ]
+
+    def _warn_if_short(self, rate: float) -> None:
+        patch, length = self.nucleation_lengths(rate)[0], min(self.interface.lengths)
         if patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
@@ -231,13 +228,7 @@ class Problem:
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
-        """Warn if a mean strength (Pa) does not go with the rest of the problem.
-
-        Parameters
-        ----------
-        strength, residual : float
-            Mean peak and residual strength, Pa.
-        """
+        """Warn if mean peak and residual strengths (Pa) do not go with the rest of the problem."""
         ratio = strength / self.solid.shear_modulus
         if not WEAKEST <= ratio <= STRONGEST:
             warn_user(
@@ -248,24 +239,7 @@ class Problem:
         elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
             scale, value = self.friction.scale
             rate = float(self.friction.rate(np.array(strength - residual), scale, np.median(value)))
-            self._warn_if_short(self.nucleation_lengths(max(rate, 1e-300))[0])
-
-    def _place_profiles(self) -> None:
-        """Put profiles with coordinates of their own on the nodes."""
-        problems: list[str] = []
-        for part in ("friction", "load"):
-            owner, placed = getattr(self, part), {}
-            for field in dataclasses.fields(owner):
-                value = getattr(owner, field.name)
-                if is_unplaced(value):
-                    try:
-                        placed[field.name] = on_nodes(f"{part}.{field.name}", value, self.interface)
-                    except InputError as error:
-                        problems += error.problems
-            if placed and not problems:  # frozen for others; validation is not over yet
-                object.__setattr__(self, part, dataclasses.replace(owner, **placed))
-        if problems:
-            raise InputError(problems)
+            self._warn_if_short(max(rate, 1e-300))
 
     @property
     def load_profile(self) -> Any:
@@ -278,6 +252,12 @@ class Problem:
         return self.solid.effective_modulus(self.mode)
 
     @property
+    def uniform_rate(self) -> float | None:
+        """The problem's weakening rate, Pa/m, if it is the same at all nodes, else None."""
+        rate = self.friction.weakening_rate
+        return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
+
+    @property
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
 
@@ -287,19 +267,12 @@ class Problem:
             If the weakening rate varies along the interface or follows from `critical_slip` or
             `fracture_energy`.
         """
-        rate = self.uniform_rate
-        if rate is None:
+        if self.uniform_rate is None:
             raise InputError(
                 "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
                 " rate; where it varies, use st.Equilibrium() or st.Rupture()"
             )
-        return self.nucleation_lengths(rate)[0]
-
-    @property
-    def uniform_rate(self) -> float | None:
-        """The problem's weakening rate, Pa/m, if it is the same at all nodes, else None."""
-        rate = self.friction.weakening_rate
-        return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
+        return self.nucleation_lengths(self.uniform_rate)[0]
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
         """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
@@ -324,17 +297,14 @@ class Problem:
         resolution = min(self.nodes_in_nucleation_length(highest_rate))
         if resolution >= FEWEST_NODES:
             return []
-        length = self.nucleation_lengths(highest_rate)[0]
         shape = self.interface.shape
         finer = [2.0 * np.ceil(0.5 * FEWEST_NODES * n / max(resolution, 1e-300)) for n in shape]
-        enough = " x ".join(f"{n:.10g}" for n in finer)
-        doubt = ""
-        if max(finer) > MOST_NODES:
-            doubt = "; so many suggest that a length, a modulus or a strength has a wrong unit"
         return [
-            f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g} nodes;"
-            f" at least {FEWEST_NODES} are needed, that is interface.nodes >= {enough},"
-            f" got {' x '.join(map(str, shape))}{doubt}"
+            f"interface.nodes: the nucleation length {self.nucleation_lengths(highest_rate)[0]:.3g}"
+            f" m spans {resolution:.2g} nodes; at least {FEWEST_NODES} are needed, that is"
+            f" interface.nodes >= {' x '.join(f'{n:.10g}' for n in finer)}, got"
+            f" {' x '.join(map(str, shape))}; if that is far, check the units of all lengths,"
+            " moduli and strengths"
         ]
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
@@ -381,23 +351,41 @@ class Problem:
         """
         if isinstance(profiles, Sample):
             return profiles
-        accept = check("accept", accept, Names)
-        unknown = [name for name in accept if name not in ACCEPTED]
-        if unknown:
-            raise InputError([unknown_name("accept", name, ACCEPTED) for name in unknown])
-        values, scale, problems = self._values(named_profiles(profiles), accept)
-        problems += self._impossible(values, scale, accept)
+        given, problems = named_profiles(profiles), []
+        friction, load, interface = self.friction, self.load, self.interface
+        scales = [name for name in SCALES if name in given]
+        if len(scales) > 1:
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+
+        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
+            try:
+                return profiles_of(name, given.get(name, own), interface, samples, infinite)
+            except InputError as error:
+                problems.extend(error.problems)
+                return np.ones(1)
+
+        if "strength" not in given:
+            raise InputError("strength: missing among the profiles")
+        strength = checked("strength", None, None, "barriers" in accept)
+        samples = len(strength)
+        residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
+        residual = checked("residual_strength", residual, samples)
+        initial = checked("initial_stress", load.initial_stress, samples)
+        pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
+        if load.normal_pressure is not None or "normal_pressure" in given:
+            pressure = checked("normal_pressure", load.normal_pressure, samples)
+        scale, own_scale = friction.scale
+        scale = scales[0] if scales else scale
+        value = checked(scale, own_scale, samples)
+        problems = problems or self._impossible(strength, residual, initial, accept)
         if problems:
             raise InputError(problems)
-        strength, residual, value, initial, pressure = values
-        rates = value
-        if scale != "weakening_rate":
-            rates = self._rates(strength, residual, scale, value)
+        rates = self._rates(strength, residual, scale, value)
         constant = strength <= residual
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
             residual = np.minimum(residual, strength)
-            along = self.interface.axes
+            along = interface.axes
             slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
             rates = np.where(constant, slowest, rates)
             if "constant" not in accept:
@@ -405,92 +393,39 @@ class Problem:
                     f"strength is not above residual_strength at {100.0 * constant.mean():.2g} %"
                     " of the nodes; these do not weaken: their strength stays as it is"
                 )
-        too_few = self._too_few_nodes(steepest_rate(strength, residual, rates))
-        if too_few:
+        if too_few := self._too_few_nodes(steepest_rate(strength, residual, rates)):
             raise InputError(too_few)
-        shape = self.interface.shape
-        profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=np.float64)
+        profile = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=np.float64)
         return Sample(strength, residual, rates, initial, profile, pressure)
 
-    def _values(
-        self, given: Mapping[str, Any], accept: Collection[str]
-    ) -> tuple[list[Any], str, list[str]]:
-        """Strength, residual strength, scale of slip, initial stress and pressure, broadcast.
-
-        None where the shape is wrong, with the problems; and which scale of slip it is.
-        """
-        friction, load, interface = self.friction, self.load, self.interface
-        problems: list[str] = []
-
-        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
-            try:
-                return profiles_of(name, given.get(name, own), interface, samples, infinite)
-            except InputError as error:
-                problems.extend(error.problems)
-                return None
-
-        if "strength" not in given:
-            raise InputError("strength: missing among the profiles")
-        strength = checked("strength", None, None, "barriers" in accept)
-        samples = 1 if strength is None else strength.shape[0]
-        own_residual: Any = 0.0
-        if strength is not None:
-            own_residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
-        residual = checked("residual_strength", own_residual, samples)
-        initial = checked("initial_stress", load.initial_stress, samples)
-        pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
-        if load.normal_pressure is not None or "normal_pressure" in given:
-            pressure = checked("normal_pressure", load.normal_pressure, samples)
-        scales = [name for name in SCALES if name in given]
-        if len(scales) > 1:
-            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
-        scale, own_scale = friction.scale
-        scale = scales[0] if scales else scale
-        value = checked(scale, own_scale, samples)
-        return [strength, residual, value, initial, pressure], scale, problems
-
-    def _impossible(self, values: list[Any], scale: str, accept: Collection[str]) -> list[str]:
-        """What is wrong with values of the right shape, or None."""
-        strength, residual, value, initial, _ = values
+    def _impossible(
+        self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
+    ) -> list[str]:
+        """Return what is wrong with profiles that are in order one by one."""
         along, problems = self.interface.axes, []
-        if value is not None and value.min() <= 0.0:
-            unit = PROFILES[scale].units
-            problems.append(f"{scale}: must be positive, got {value.min():g} {unit}")
-        if residual is not None and residual.min() < 0.0:
-            problems.append(f"residual_strength: must not be negative, got {residual.min():g} Pa")
-        if strength is None:
-            return problems
-        stuck = np.isinf(strength).all(axis=along)
-        if stuck.any():
+        if "overstress" not in accept and np.any(strength <= initial):
+            where = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
+            node = ", ".join(map(str, where[1:]))
             problems.append(
-                f"strength: infinite at every node of sample {int(np.argmax(stuck))}; nothing can"
-                " break"
-            )
-        if initial is not None and "overstress" not in accept and np.any(strength <= initial):
-            number, *node = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
-            where = (number, *node)
-            problems.append(
-                f"strength: must be above initial_stress everywhere; sample {number}, node"
-                f" {', '.join(map(str, node))}: {strength[where]:g} against {initial[where]:g} Pa;"
+                f"strength: must be above initial_stress everywhere; sample {where[0]}, node"
+                f" {node}: {strength[where]:g} against {initial[where]:g} Pa;"
                 " only st.Rupture() begins above the strength"
             )
-        if residual is not None:
-            weakens = (strength > residual) & np.isfinite(strength)
-            nowhere = np.flatnonzero(~weakens.any(axis=along) & ~stuck)
-            if nowhere.size:
-                first = strength[nowhere[0]]
-                problems.append(
-                    f"strength: must be above residual_strength somewhere; sample {nowhere[0]} is"
-                    f" nowhere, from {first.min():g} to {first.max():g} Pa: check the units of both"
-                )
+        nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
+        if nowhere.any():
+            number = int(np.argmax(nowhere))
+            least, most = strength[number].min(), strength[number].max()
+            problems.append(
+                "strength: must be finite and above residual_strength somewhere; sample"
+                f" {number} is nowhere, from {least:g} to {most:g} Pa: check the units of both"
+            )
         return problems
 
     def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
-        """Weakening rates, Pa/m, from critical slip or fracture energy."""
-        with np.errstate(over="ignore"):  # too short a critical slip is refused by the caller
-            rates = self.friction.rate(strength - residual, scale, value)
+        """Weakening rates, Pa/m, from whichever scale of slip is given."""
+        rates = self.friction.rate(strength - residual, scale, value)
         barriers = np.isinf(strength)
-        if barriers.any():  # any rate will do where nothing weakens
+        if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
             along = self.interface.axes
             own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
             rates = np.where(barriers, own, rates)
@@ -508,8 +443,7 @@ def profiles_of(
     """
     shape = interface.shape
     nodes = ", ".join(map(str, shape))
-    first = "samples" if samples is None else str(samples)
-    valid = f"({first}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
+    valid = f"({samples or 'samples'}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
     if samples is not None:
         valid += f", ({samples}, 1) or a number"
     try:
@@ -518,41 +452,38 @@ def profiles_of(
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
     if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
         array = array[..., 0]
-    allowed: set[tuple[int, ...]] = {shape}
-    if samples is not None:
-        column = (samples, *(1 for _ in shape))
-        if array.shape == (samples, 1):
-            array = array.reshape(column)
-        allowed |= {(), (samples, *shape), column}
-    if array.shape not in allowed and not (samples is None and array.shape[1:] == shape):
+    column = (samples or 0, *(1 for _ in shape))
+    if array.shape == (samples, 1):
+        array = array.reshape(column)
+    several = array.shape[1:] == shape and samples in (None, len(array))
+    broadcast = samples is not None and array.shape in ((), column)
+    if not (array.shape == shape or several or broadcast):
         hint = turned(array.shape[-2:], shape)
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{hint}")
     if array.size == 0:
         raise InputError(f"{name}: has no samples, shape {array.shape}")
-    _check_finite(name, array, interface, infinite)
+    _check_values(name, array, interface, infinite)
     if samples is not None:
         return np.broadcast_to(array, (samples, *shape))
     return array[None] if array.shape == shape else array
 
 
-def _check_finite(name: str, array: Array, interface: Interface, infinite: bool) -> None:
-    bad = ~(np.abs(array) <= LARGEST)
-    if infinite:
-        bad &= array != np.inf
-    if not bad.any():
-        return
+def _check_values(name: str, array: Array, interface: Interface, infinite: bool) -> None:
+    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
     missing = np.isnan(array)
-    unless = ", or inf where nothing breaks" if infinite else ""
-    if len(interface.shape) == 1 and array.shape[-1:] == interface.shape and missing.any():
-        where = describe_gaps(missing, interface)
+    if missing.any() and array.shape[-len(interface.shape) :] == interface.shape:
         raise InputError(
-            f"{name}: must be finite{unless}: there {where}; st.onset(..., gaps='fill') and"
-            " st.read_profile(..., gaps='fill') fill gaps with straight lines and remember them"
+            f"{name}: must be finite: there {describe_gaps(missing, interface)}; gaps='fill' of"
+            " st.onset and st.read_profile fills gaps with straight lines"
         )
-    entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-    raise InputError(
-        f"{name}: must be finite{unless}; entry {entry} is not, or lies beyond {LARGEST:g}"
-    )
+    if bad.any():
+        entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
+        raise InputError(f"{name}: must be finite; entry {entry} is not, or beyond {LARGEST:g}")
+    least = f"{array.min():g} {PROFILES[name].units}"
+    if name in SCALES and array.min() <= 0.0:
+        raise InputError(f"{name}: must be positive, got {least}")
+    if name == "residual_strength" and array.min() < 0.0:
+        raise InputError(f"{name}: must not be negative, got {least}")
 
 
 def named_profiles(given: Any) -> dict[str, Any]:

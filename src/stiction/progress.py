@@ -2,7 +2,7 @@
 
 A terminal shows a bar, a notebook a line that is rewritten, a pipe a line now and then; all of it
 on standard error, and only after two seconds. Code that works only reports what is done
-(`advance`) and what is expected in all (`expect`), and asks whether its time is `over`.
+(`advance`), and asks whether its time is `over`.
 """
 
 from __future__ import annotations
@@ -27,16 +27,11 @@ PORTION = 0.25
 
 
 def duration(seconds: float) -> str:
-    """Seconds for people."""
-    if seconds < 1.0:
-        return f"{seconds * 1e3:.3g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.3g} us"
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    if seconds < 7200.0:
-        return f"{seconds / 60.0:.3g} min"
-    if seconds < 48 * 3600.0:
-        return f"{seconds / 3600.0:.3g} h"
-    return f"{seconds / 86400.0:.3g} days"
+    """Return seconds as text for people, such as '1.5 h'."""
+    sizes = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0}
+    most = {"us": 1e-3, "ms": 1.0, "s": 120.0, "min": 7200.0, "h": 172800.0}
+    unit = next((unit for unit, below in most.items() if seconds < below), "days")
+    return f"{seconds / sizes[unit]:.3g} {unit}"
 
 
 class Meter:
@@ -65,12 +60,15 @@ class Meter:
         unit: str = "samples",
         time_limit: float | None = None,
     ) -> None:
-        self.what, self.total, self.unit, self.note = what, total, unit, ""
-        self.time_limit = time_limit
-        self.done, self.at_most = 0, False
-        self._show = show
-        self._begun = self._stage = time.monotonic()
+        self.unit, self.time_limit, self._show = unit, time_limit, show
+        self.stage(what, total)
+        self._begun = self._stage
+
+    def stage(self, what: str, total: int | None = None) -> None:
+        """Begin another part of the work; the clock goes on."""
+        self.what, self.total, self.done, self.note = what, total, 0, ""
         self._first: tuple[float, int] | None = None
+        self._stage = time.monotonic()
 
     def advance(self, count: int = 1) -> None:
         """Report that `count` more are done."""
@@ -79,15 +77,6 @@ class Meter:
             self._first = time.monotonic(), self.done
         if callable(self._show):
             self._show(self.done, self.total or 0)
-
-    def expect(self, more: float, *, at_most: bool = False) -> None:
-        """Report how many more are expected, or allowed at most."""
-        self.total, self.at_most = self.done + max(0, math.ceil(more)), at_most
-
-    def stage(self, what: str, total: int | None = None) -> None:
-        """Begin another part of the work; the clock goes on."""
-        self.what, self.total, self.done, self.at_most, self.note = what, total, 0, False, ""
-        self._first, self._stage = None, time.monotonic()
 
     @property
     def over(self) -> bool:
@@ -116,20 +105,13 @@ class Meter:
     @property
     def text(self) -> str:
         """How far it is, as text."""
-        parts = []
-        if self.total and not self.at_most:
-            parts.append(f"{self.done:,} of {self.total:,} {self.unit}")
-        elif self.done:
-            parts.append(f"{self.done:,} {self.unit}")
-            if self.total:
-                parts[-1] += f" (at most {self.total:,})"
-        if self.note:
-            parts.append(self.note)
+        of = f" of {self.total:,}" if self.total else ""
+        parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
         parts.append(duration(math.floor(self.elapsed)))
         left = self.left
         if left is not None and left >= 1.0:
-            parts.append(f"{'up to' if self.at_most else 'about'} {duration(round(left))} left")
-        return ", ".join(parts)
+            parts.append(f"about {duration(round(left))} left")
+        return ", ".join(part for part in parts if part)
 
     def __enter__(self) -> Meter:
         return self.start()
@@ -148,6 +130,9 @@ class Meter:
         """Show nothing from here on."""
         _unwatch(self)
 
+
+SILENT = Meter("", show=False)
+"""For work that nobody watches and nothing limits."""
 
 _lock = threading.Lock()
 _live: list[Meter] = []
@@ -186,20 +171,13 @@ class _Watcher(threading.Thread):
     def run(self) -> None:
         display: _Pipe | _Terminal | _Notebook | None = None
         while not self.ended.wait(TICK):
-            meter = _speaker()
-            if meter is not None:
+            with _lock:
+                old = [meter for meter in _live if meter.elapsed >= AFTER]
+            if old:  # the outermost that knows its end, else the innermost
                 display = display or _display()
-                display.show(meter)
+                display.show(next((meter for meter in old if meter.total), old[-1]))
         if display is not None:
             display.close()
-
-
-def _speaker() -> Meter | None:
-    """The outermost meter that knows its end, else the innermost, of those that run for long."""
-    with _lock:
-        old = [meter for meter in _live if meter.elapsed >= AFTER]
-    known = [meter for meter in old if meter.total and not meter.at_most]
-    return known[0] if known else old[-1] if old else None
 
 
 def _display() -> _Pipe | _Terminal | _Notebook:
@@ -207,9 +185,7 @@ def _display() -> _Pipe | _Terminal | _Notebook:
     active = shell.get_ipython() if shell is not None else None
     if type(active).__name__ == "ZMQInteractiveShell":
         return _Notebook()
-    if sys.stderr is not None and sys.stderr.isatty():
-        return _Terminal()
-    return _Pipe()
+    return _Terminal() if sys.stderr is not None and sys.stderr.isatty() else _Pipe()
 
 
 class _Pipe:
@@ -224,14 +200,11 @@ class _Pipe:
         foreseen = elapsed + (meter.left or 0.0)
         if elapsed >= self._next and (self._next or foreseen >= LONG):
             self._next = max(elapsed + LONG, 1.1 * elapsed)
-            self._print()
+            print(self._line, file=sys.stderr, flush=True)
 
     def close(self) -> None:
         if self._next:
-            self._print()
-
-    def _print(self) -> None:
-        print(self._line, file=sys.stderr, flush=True)
+            print(self._line, file=sys.stderr, flush=True)
 
 
 class _Terminal:
@@ -254,12 +227,9 @@ class _Terminal:
         self._bar.start()
 
     def show(self, meter: Meter) -> None:
+        done, total = meter.done, meter.total
         self._bar.update(
-            self._task,
-            description=meter.what,
-            completed=meter.done,
-            total=None if meter.at_most else meter.total,
-            text=meter.text,
+            self._task, description=meter.what, completed=done, total=total, text=meter.text
         )
 
     def close(self) -> None:
@@ -267,32 +237,22 @@ class _Terminal:
 
 
 class _Notebook:
-    """A line below the cell, rewritten; needs nothing but IPython."""
-
-    WIDTH = 30
+    """A line below the cell, rewritten; rich would need ipywidgets."""
 
     def __init__(self) -> None:
         from IPython.display import display
 
         self._line = display({"text/plain": ""}, raw=True, display_id=True)
 
-    def show(self, meter: Meter) -> None:
+    def show(self, meter: Meter, bar: str = "") -> None:
         self._meter = meter
-        bar = ""
-        if meter.total and not meter.at_most:
-            full = round(min(1.0, meter.done / meter.total) * self.WIDTH)
-            bar = f" [{'#' * full}{'.' * (self.WIDTH - full)}]"
-        self._write(f"{meter.what}{bar} {meter.text}")
+        if meter.total:
+            full = round(30 * min(1.0, meter.done / meter.total))
+            bar = f" [{'#' * full:.<30}]"
+        self._line.update({"text/plain": f"{meter.what}{bar} {meter.text}"}, raw=True)
 
     def close(self) -> None:
-        self._write(f"{self._meter.what} {self._meter.text}")
-
-    def _write(self, text: str) -> None:
-        self._line.update({"text/plain": text}, raw=True)
-
-
-SILENT = Meter("", show=False)
-"""For work that nobody watches and nothing limits."""
+        self.show(self._meter)
 
 
 class Portions:

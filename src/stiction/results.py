@@ -88,34 +88,23 @@ def to_dataset(
 ) -> xr.Dataset:
     """Label arrays with dimensions, coordinates, units and long names.
 
-    Parameters
-    ----------
-    values : mapping of arrays
-    variables : mapping of Variable
-        One for each array.
-    coordinates : mapping of (array, Variable)
-    attributes : mapping
-        Strings and numbers are kept, anything else is written as JSON.
+    Of the attributes, strings and numbers are kept; anything else is written as JSON.
     """
-
     import xarray as xr
 
-    def attrs(variable: Variable) -> dict[str, str]:
-        return {"units": variable.units, "long_name": variable.long_name}
+    def labelled(array: NDArray[Any], variable: Variable) -> Any:
+        about = {"units": variable.units, "long_name": variable.long_name}
+        return variable.dims, np.asarray(array), about
 
-    data = {
-        name: (variables[name].dims, np.asarray(value), attrs(variables[name]))
-        for name, value in values.items()
-    }
-    coords = {name: (v.dims, array, attrs(v)) for name, (array, v) in coordinates.items()}
-    dataset = xr.Dataset(data, coords=coords)
-    dataset.attrs["stiction_version"] = __version__
-    for library in ("numpy", "numba"):
-        dataset.attrs[f"{library}_version"] = version(library)
+    attrs: dict[str, Any] = {"stiction_version": __version__}
+    attrs |= {f"{library}_version": version(library) for library in ("numpy", "numba")}
     for name, value in attributes.items():
-        plain = isinstance(value, str | int | float)
-        dataset.attrs[name] = value if plain else json.dumps(value)
-    return dataset
+        attrs[name] = value if isinstance(value, str | int | float) else json.dumps(value)
+    return xr.Dataset(
+        {name: labelled(array, variables[name]) for name, array in values.items()},
+        coords={name: labelled(*given) for name, given in coordinates.items()},
+        attrs=attrs,
+    )
 
 
 SAMPLE = Variable("1", "sample number", ("sample",))

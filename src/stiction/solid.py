@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from stiction.errors import InputError, UnitWarning, warn_user
-from stiction.model import Mode, Positive, Real, is_finite, model
+from stiction.model import Mode, Positive, Real, check, is_finite, model
 
 SLOWEST, FASTEST = 0.3, 2e4
 """m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
@@ -65,22 +65,13 @@ class Solid:
     def _shear_modulus(cls, given: Any) -> Any:
         """Replace `youngs_modulus` by G = E/(2 (1 + nu))."""
         named = dict(given.kwargs or {}) if isinstance(given, ArgsKwargs) else given
-        if not isinstance(named, dict):
-            return given
-        if {"c_p", "c_s"} & named.keys():
-            raise InputError(
-                "wave speeds are not parameters; give shear_modulus = density c_s^2 and"
-                " poisson_ratio = (c_p^2 - 2 c_s^2)/(2 (c_p^2 - c_s^2))"
-            )
-        if "youngs_modulus" not in named:
+        if not isinstance(named, dict) or "youngs_modulus" not in named:
             return given
         if "shear_modulus" in named or (isinstance(given, ArgsKwargs) and given.args):
             raise InputError("give shear_modulus or youngs_modulus, by name, and not both")
-        modulus: Any = named["youngs_modulus"]
         ratio: Any = named.get("poisson_ratio")
-        named = {name: value for name, value in named.items() if name != "youngs_modulus"}
-        if not (is_finite(modulus) and modulus > 0.0):
-            raise InputError(f"youngs_modulus: must be a positive number, got {modulus!r}")
+        named = dict(named)
+        modulus = check("youngs_modulus", named.pop("youngs_modulus"), Positive)
         # Without a usable ratio any modulus will do: the ratio is what is complained of.
         usable = is_finite(ratio) and ratio > -1.0
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))

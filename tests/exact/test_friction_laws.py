@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import stiction as st
-from stiction.friction.kernels import line_at, slope_at, strength_at, strengths
+from stiction.friction.kernels import line_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
 LAWS = {
@@ -34,16 +34,20 @@ def test_kernels_follow_the_law(law):
     np.testing.assert_allclose(found, RESIDUAL + DROP * law.fraction(u), rtol=1e-14)
     # No corner lies in the interval of the difference, which is exact on straight pieces.
     arguments = law.parameters, RESIDUAL + DROP, RESIDUAL, RATE
+
+    def slope_at(slip):
+        return line_at(*arguments, slip, 0.0)[1]
+
     for slip in u * critical:
         here, there = slip, slip + 1e-4 * critical
         fall = strength_at(*arguments, here) - strength_at(*arguments, there)
-        slope = slope_at(*arguments, 0.5 * (here + there))
+        slope = slope_at(0.5 * (here + there))
         assert fall == pytest.approx(slope * (there - here), rel=1e-6, abs=1e-6)
         start, steep = line_at(*arguments, 0.1 * critical, slip - 0.1 * critical)
-        assert steep == slope_at(*arguments, slip)
+        assert steep == slope_at(slip)
         reached = start - steep * (slip - 0.1 * critical)
         assert reached == pytest.approx(strength_at(*arguments, slip), rel=1e-14)
-    assert slope_at(*arguments, 0.0) == pytest.approx(RATE, rel=1e-14)
+    assert slope_at(0.0) == pytest.approx(RATE, rel=1e-14)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
@@ -56,16 +60,15 @@ def test_energy_is_the_area_under_the_law(law):
         energy = law.dissipated(np.array([u * critical]), np.array([DROP]), np.array([RATE]))
         assert energy[0] == pytest.approx(DROP * critical * area, rel=1e-11)
     assert float(law.area(100.0)) == pytest.approx(law.integral, rel=1e-14)
-    assert law.fracture_energy_of(DROP, RATE) == pytest.approx(DROP * critical * law.integral)
     assert float(law.fraction(law.slip_at(0.37))) == pytest.approx(0.37, rel=1e-14)
     assert float(law.fraction(law.reach)) == pytest.approx(0.01 if law.type == "exponential" else 0)
 
 
 def test_each_scale_means_the_same_law():
-    gamma = LAWS["dual"].fracture_energy_of(DROP, RATE)
+    critical = LAWS["dual"].critical_slip_of(DROP, RATE)
     for name, value in (
-        ("fracture_energy", gamma),
-        ("critical_slip", LAWS["dual"].critical_slip_of(DROP, RATE)),
+        ("fracture_energy", DROP * critical * LAWS["dual"].integral),
+        ("critical_slip", critical),
     ):
         law = st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], **{name: value})
         assert law.rate(np.array([DROP]), *law.scale)[0] == pytest.approx(RATE, rel=1e-14)
@@ -78,7 +81,7 @@ def test_polygon_along_a_law():
     # Corners on the law, at equal losses; the last piece dissipates what the tail does.
     np.testing.assert_allclose(polygon.strength, 1.0 - np.arange(1, 9) / 8, atol=1e-15)
     np.testing.assert_allclose(law.fraction(u), polygon.strength[:-1], rtol=1e-14)
-    tail = polygon.fracture_energy_of(1.0, polygon.rate(np.ones(1), *polygon.scale))[0] / 2e-6
+    tail = polygon.integral * polygon.critical_slip / 2e-6
     corners = np.append(0.0, u)
     assert tail - np.trapezoid(law.fraction(corners), corners) == pytest.approx(1 / 8)
     assert polygon.residual_ratio == 0.2

@@ -314,14 +314,6 @@ CASES = {
         lambda: st.theory.rice_distribution(make_problem(), make_strength(), seed="1"),
         ["seed", "whole", "'1'"],
     ),
-    "accepted by nobody": (
-        lambda: make_problem().sample(np.full(256, 1e6), accept=0.5),
-        ["accept", "0.5"],
-    ),
-    "accepted with a slip": (
-        lambda: make_problem().sample(np.full(256, 1e6), accept=("barrier",)),
-        ["accept", "did you mean 'barriers'"],
-    ),
     "profile whose square overflows": (
         lambda: st.onset(make_problem(), np.full(256, 1e308), method=st.LocalCriterion()),
         ["strength", "finite", "1e+100"],
@@ -425,8 +417,3 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.load.profile[0] = 2.0
     error = st.InputError(["a", "b"])
     assert pickle.loads(pickle.dumps(error)).problems == ("a", "b")
-
-
-def test_wave_speeds_are_no_moduli():
-    with pytest.raises(st.InputError, match=r"Solid: wave speeds are not param.*= density c_s\^2"):
-        st.Solid(c_p=6000.0, c_s=3464.0, density=2670.0)

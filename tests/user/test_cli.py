@@ -320,7 +320,7 @@ def test_a_full_disk_is_called_so_and_leaves_nothing_half(command, monkeypatch, 
     monkeypatch.setattr(files.os, "fsync", fail)  # as of a file system that allocates late
     code, _, errors = command(*arguments)
     assert code == 1
-    assert "cannot be written: the disk is full" in errors
+    assert "cannot be written: No space left on device" in errors
     assert sorted(os.listdir()) == ["run", "study.toml"]
 
 

@@ -151,7 +151,10 @@ def test_stability_limits(mode, ratio, plane, courant):
 
 
 def test_a_coarse_grid_warns_with_the_error_to_expect():
-    for nodes, text in ((48, "spans 7.4 nodes: expect more than 15 %"), (80, "expect up to 6 %")):
+    for nodes, text in (
+        (48, "7.4 nodes .*: expect more than 15 %"),
+        (80, "expect up to 6 %"),
+    ):
         problem = make_problem(nodes=nodes)
         with pytest.warns(AccuracyWarning, match=text):
             METHOD.prepare(problem)(problem.sample(profile(nodes)))

@@ -48,16 +48,12 @@ def rough(tau_p):
 
 
 def test_no_law_is_taken_for_another(with_law, rough):
-    """Each method answers differently for another law, or refuses it."""
-    linear = with_law(st.LinearWeakening(weakening_rate=0.5e12))
-    for method, laws in (
-        (st.Equilibrium(), (DUAL, STEEPENING)),
-        (RUPTURE, (EXPONENTIAL, DUAL, STEEPENING)),
-    ):
-        base = st.onset(linear, rough, method=method).critical_stress.item()
-        for law in laws:
-            other = st.onset(with_law(law), rough, method=method).critical_stress.item()
-            assert abs(other / base - 1.0) > 1e-3
+    """By equilibrium; what ruptures make of each law is in tests/properties."""
+    base, *others = (
+        st.onset(with_law(law), rough, method=st.Equilibrium()).critical_stress.item()
+        for law in (st.LinearWeakening(weakening_rate=0.5e12), DUAL, STEEPENING)
+    )
+    assert all(abs(other / base - 1.0) > 1e-3 for other in others)
 
 
 def test_equilibrium_refuses_what_has_no_pieces(with_law, tau_p):
@@ -258,7 +254,7 @@ class Steeper(OwnLaw):
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        (Hump, "friction: Hump: strength must not rise with slip; fraction rises from 1 to 1.1"),
+        (Hump, "friction: Hump: strength must not rise with slip, as beyond u = 0"),
         (Late, r"friction: Late.fraction\(0\) must be 1, got 0.5"),
         (Steeper, r"Steeper: initial_slope is 2, but 1 by its fraction"),
         (Steeper, r"Steeper: the strength of its kernels at u = 0.568 is"),

@@ -105,7 +105,7 @@ class BumpLoad(LoadShape):
     """A load of one's own: higher within `width` (m) of the middle."""
 
     width: Positive
-    type: Literal["bump"] = "bump"
+    type: Literal["hump"] = "hump"
 
     def values(self, interface):
         return 1.0 + (distance(interface, 0.5) < self.width)
@@ -115,7 +115,7 @@ def test_a_load_of_ones_own():
     problem = loaded(BumpLoad(width=0.02))
     assert problem.load_profile.mean() == pytest.approx(1.0, abs=1e-14)
     plain = to_plain(problem)
-    assert plain["load"]["profile"] == {"type": "bump", "width": 0.02}
+    assert plain["load"]["profile"] == {"type": "hump", "width": 0.02}
     from_file = pydantic.TypeAdapter(st.Problem).validate_python(plain)
     assert from_file == problem
     tau_p = st.paper.strength(PLAIN).sample(PLAIN.interface, samples=2, seed=0)
@@ -123,7 +123,7 @@ def test_a_load_of_ones_own():
         found = st.onset(from_file, sample, method=st.LocalCriterion())
         assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
     with pytest.raises(st.InputError, match=r"BumpLoad.width: must be greater than 0"):
-        st.Load(profile={"type": "bump", "width": 0.0})
+        st.Load(profile={"type": "hump", "width": 0.0})
     with pytest.raises(st.InputError, match=r"Bump.* must be positive everywhere"):
         loaded(NegativeBump(width=0.02))
 

@@ -46,7 +46,7 @@ def test_a_wrong_unit_is_doubted(words):
 
 @pytest.mark.parametrize("changes", [{"modulus": 1e3}, {"length": 100.0}])
 def test_more_nodes_than_anybody_has_suggest_a_unit(changes):
-    with pytest.raises(st.InputError, match="so many suggest that a length, a modulus"):
+    with pytest.raises(st.InputError, match="check the units of all lengths, moduli"):
         problem(**changes)
 
 

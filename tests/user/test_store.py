@@ -358,7 +358,7 @@ def test_a_folder_that_vanishes(tmp_path, often):
     def vanish(done, total):
         shutil.rmtree(tmp_path / "run", ignore_errors=True)
 
-    with pytest.raises(StoreError, match="the folder is gone"):
+    with pytest.raises(StoreError, match="No such file"):
         make_study().run(out=tmp_path / "run", progress=vanish, workers=1)
 
 
@@ -382,19 +382,19 @@ def test_a_full_disk(small_disk, often, reference):
     ballast = small_disk / "ballast"
     ballast.write_bytes(b"\x00" * (700 << 10))
     for _ in range(2):
-        with pytest.raises(StoreError, match="the disk is full"):
+        with pytest.raises(StoreError, match="No space left on device"):
             make_study().run(out=small_disk / "run", workers=1)
         state = st.open_run(small_disk / "run").status()
         assert 0 < state.done < state.samples
         assert state.damaged == ()
         assert not list((small_disk / "run" / "chunks").glob("*.part"))
-    with pytest.raises(StoreError, match="the disk is full"):
+    with pytest.raises(StoreError, match="No space left on device"):
         st.open_run(small_disk / "run").export(small_disk / "result.nc")
     assert not (small_disk / "result.nc").exists()
     ballast.unlink()
     assert make_study().run(out=small_disk / "run").identical(reference)
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    with pytest.raises(StoreError, match="read-only"):
+    with pytest.raises(StoreError, match="Read-only"):
         make_study().run(out=small_disk / "other", executor=Forbidding())
 
 

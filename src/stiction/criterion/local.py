@@ -13,7 +13,7 @@ from stiction.arrays import Array
 from stiction.criterion.average import local_onset, minimum_rows
 from stiction.criterion.windows import Weights, Window, windows_of
 from stiction.errors import InputError, warn_accuracy
-from stiction.model import check, describe, is_real, model
+from stiction.model import check, describe, is_finite, model
 from stiction.problem import Problem, Sample
 from stiction.results import Variable, onset_variables, position
 
@@ -308,7 +308,7 @@ def check_window(problem: Problem, weights: Weights, aspect: Any) -> None:
     """Refuse the options of a plane on a line, and the other way round."""
     check("weights", weights, Literal["exact", "rounded"])
     plane = problem.interface.is_plane
-    if aspect is not None and not (plane and is_real(aspect) and 0.0 < aspect < np.inf):
+    if aspect is not None and not (plane and is_finite(aspect) and aspect > 0.0):
         valid = "a positive number" if plane else "left out on a line"
         raise InputError(f"aspect: must be {valid}, got {describe(aspect)}")
     if plane and weights != "exact":
@@ -318,9 +318,9 @@ def check_window(problem: Problem, weights: Weights, aspect: Any) -> None:
 def _refused_laws(problem: Problem) -> list[str]:
     """Return why the weakening rate at zero slip does not tell the onset; nothing if it does."""
     friction = problem.friction
-    if not friction.steepens:
-        return []
     times = friction.steepest_slope / friction.initial_slope
+    if times <= 1.0:
+        return []
     return [
         f"friction: the local criterion takes the weakening rate at zero slip, and this law falls"
         f" up to {times:.3g} times as steeply later, so that patches become unstable at lower"

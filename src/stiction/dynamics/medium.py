@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from contextlib import suppress
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.elasticity.memory_kernels import static_stiffness
 from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError
-from stiction.friction.kernels import registered
+from stiction.friction.parameters import FUNCTIONS
 from stiction.interface import Interface
 from stiction.model import check_memory
 from stiction.problem import Problem
@@ -56,9 +55,8 @@ class Medium:
 
 def refused_laws(problem: Problem) -> list[str]:
     """Why the friction law of a problem cannot be followed; nothing if it can."""
-    with suppress(NotImplementedError):
-        if registered(problem.friction.parameters):
-            return []
+    if type(problem.friction.parameters) in FUNCTIONS:
+        return []
     return [
         f"friction: {type(problem.friction).__name__} has no compiled strength; give its"
         " `parameters` a type that stiction.friction.kernels.register knows"

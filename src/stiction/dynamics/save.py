@@ -16,8 +16,8 @@ from stiction.dynamics.energies import fracture_energy, strain_energy
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import RECORD, Floats, State
 from stiction.dynamics.summary import per_area
-from stiction.errors import InputError, unknown_name
-from stiction.files import UNREADABLE, read_arrays, write_arrays, write_atomically
+from stiction.errors import InputError, StoreError, unknown_name
+from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface
 from stiction.model import Count, FilePath, Names, Text, checked, model, real_array
 from stiction.results import Variable, along, coordinate, to_dataset
@@ -272,10 +272,10 @@ class Recorder:
         path = folder / f"frames-{state.steps:012d}.nc"
         part = self.take()
         try:
-            write_atomically(path, lambda aside: part.to_netcdf(aside, engine="netcdf4"))
+            write_whole(path, lambda aside: part.to_netcdf(aside, engine="netcdf4"))
             if not interrupted:
                 write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
-        except (OSError, RuntimeError) as error:  # the NetCDF library reports a full disk so
+        except StoreError as error:
             raise OSError(
                 f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
                 "are complete and can be opened"
@@ -285,7 +285,7 @@ class Recorder:
         """Write what belongs to the run as a whole beside its frames."""
         if self.save.to is not None:
             whole = dataset.drop_dims(["time", "step"], errors="ignore")
-            write_atomically(
+            write_whole(
                 self.save.to / _SUMMARY, lambda aside: whole.to_netcdf(aside, engine="netcdf4")
             )
 

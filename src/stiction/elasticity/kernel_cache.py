@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from stiction.elasticity.exponential_sum import ExponentialSum, fit_exponentials
+from stiction.errors import StoreError
 from stiction.files import UNREADABLE, cache_folder, read_arrays, write_arrays
 
 logger = logging.getLogger("stiction")
@@ -38,7 +39,7 @@ def stored_kernel(mode: str, eta: float, tolerance: float, t_max: float) -> Expo
         kernel = fit_exponentials(mode, eta, tolerance, t_max)
         try:
             write_arrays(path, vars(kernel))
-        except OSError as error:
+        except StoreError as error:
             logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)
     return kernel
 

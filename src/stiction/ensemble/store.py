@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from stiction.ensemble.batches import versions
 from stiction.ensemble.table import Table, decode, digest, encode, joined
 from stiction.errors import StoreError, warn_user
-from stiction.files import PART, cannot_read, cannot_write, write_whole
+from stiction.files import PART, cannot, write_whole
 
 FORMAT = 4
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
@@ -97,7 +97,7 @@ class Store:
                 raise StoreError(f"{path}: holds other files ({some}); choose a new folder")
             (path / CHUNKS).mkdir(exist_ok=True)
         except OSError as error:
-            raise cannot_write(path, error) from error
+            raise cannot("written", path, error) from error
         store = cls(path, study)
         before: dict[str, Any] = {}
         try:
@@ -146,7 +146,7 @@ class Store:
         except FileNotFoundError:
             return set()
         except OSError as error:
-            raise cannot_read(self.path / CHUNKS, error) from error
+            raise cannot("read", self.path / CHUNKS, error) from error
         return {name for name in names if NAME.fullmatch(name)}
 
     def load(self, take: Callable[[list[Table]], None]) -> None:
@@ -307,7 +307,7 @@ def _read(file: Path) -> bytes:
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise cannot_read(file, error) from error
+        raise cannot("read", file, error) from error
 
 
 def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.friction import FrictionLaw
-from stiction.friction.kernels import registered
-from stiction.friction.parameters import Linear, Polygon
+from stiction.friction.parameters import FUNCTIONS, Linear, Polygon
 from stiction.jit import jit, jit_inside
 from stiction.problem import Sample as Samples
 
@@ -54,14 +53,10 @@ LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0
 
 def refused(law: FrictionLaw) -> list[str]:
     """Return why a law cannot be followed piece by piece; nothing if it can."""
-    name = type(law).__name__
-    try:
-        parameters = law.parameters
-    except NotImplementedError:
-        return [f"friction: {name} does not say what its parameters are"]
-    if isinstance(parameters, Linear | Polygon):
+    name, kind = type(law).__name__, type(law.parameters)
+    if kind in (Linear, Polygon):
         return []
-    instead = "use st.Rupture(...)" if registered(parameters) else "use another law"
+    instead = "use st.Rupture(...)" if kind in FUNCTIONS else "use another law"
     return [
         f"friction: equilibria are followed along straight pieces, and {name} has none;"
         f" use st.PiecewiseWeakening.from_law(friction, pieces=32), or {instead}"

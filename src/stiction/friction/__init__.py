@@ -1,8 +1,4 @@
-"""Friction laws: how strength falls with slip.
-
-`laws.py` holds the laws, `kernels.py` the functions by which compiled kernels evaluate them and
-`register` for those of others.
-"""
+"""Friction laws: the laws themselves, and in `kernels.py` what compiled kernels take of them."""
 
 from stiction.friction.laws import (
     SCALES,

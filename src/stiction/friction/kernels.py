@@ -1,15 +1,15 @@
-"""Strength and slope of any friction law at a slip, inside compiled kernels.
+"""Strength of any friction law at a slip, inside compiled kernels.
 
 A law hands kernels its numbers as a NamedTuple of its own type, and registers functions for that
-type with `register`. ``strength_at``, ``slope_at`` and ``line_at`` are resolved by the type when a
-kernel is compiled, so a law costs nothing that it does not use, and another law changes no kernel.
+type with `register`. ``strength_at`` and ``line_at`` are resolved by the type when a kernel is
+compiled, so a law costs nothing that it does not use, and another law changes no kernel.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba.extending import overload
@@ -46,18 +46,8 @@ def register(
     FUNCTIONS[parameters] = (strength, slope, line)
 
 
-def registered(law: NamedTuple) -> bool:
-    """Whether kernels can evaluate the law with these parameters."""
-    return type(law) in FUNCTIONS
-
-
-def _registered(law: Any, which: int) -> Callable[..., Any] | None:
-    kind = getattr(law, "instance_class", None)  # numba's types of NamedTuples have one
-    return FUNCTIONS[kind][which] if kind in FUNCTIONS else None
-
-
-def strength_at(law: NamedTuple, peak: float, residual: float, rate: float, slip: float) -> float:
-    """Strength tau_f, Pa, at a slip.
+def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float) -> float:
+    """Return the strength tau_f, Pa, at a slip.
 
     Parameters
     ----------
@@ -70,56 +60,43 @@ def strength_at(law: NamedTuple, peak: float, residual: float, rate: float, slip
     return result
 
 
-def slope_at(law: NamedTuple, peak: float, residual: float, rate: float, slip: float) -> float:
-    """How fast the strength falls at a slip, -d tau_f / d slip >= 0, Pa/m; see `strength_at`."""
-    result: float = FUNCTIONS[type(law)][1](law, peak, residual, rate, slip)
-    return result
-
-
 def line_at(
-    law: NamedTuple, peak: float, residual: float, rate: float, slip: float, ahead: float
+    law: Any, peak: float, residual: float, rate: float, slip: float, ahead: float
 ) -> tuple[float, float]:
-    """The straight line that the strength follows at ``slip + ahead``; see `strength_at`.
+    """Return the straight line that the strength follows at ``slip + ahead``.
 
-    Returns
-    -------
-    start, slope : float
-        What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law
-        it is the piece itself.
+    What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law it is
+    the piece itself. For the parameters see `strength_at`.
     """
     result: tuple[float, float] = FUNCTIONS[type(law)][2](law, peak, residual, rate, slip, ahead)
     return result
 
 
+def _registered(law: Any) -> tuple[Callable[..., Any], ...] | None:
+    return FUNCTIONS.get(getattr(law, "instance_class", type))  # of numba's types of NamedTuples
+
+
 # numba compares the names of arguments with their annotations, so these have none.
 @overload(strength_at)
 def _strength_at(law, peak, residual, rate, slip):  # type: ignore[no-untyped-def]
-    function = _registered(law, 0)
-    if function is None:
-        return None
-    return lambda law, peak, residual, rate, slip: function(law, peak, residual, rate, slip)
-
-
-@overload(slope_at)
-def _slope_at(law, peak, residual, rate, slip):  # type: ignore[no-untyped-def]
-    function = _registered(law, 1)
-    if function is None:
-        return None
-    return lambda law, peak, residual, rate, slip: function(law, peak, residual, rate, slip)
+    if found := _registered(law):
+        function = found[0]
+        return lambda law, peak, residual, rate, slip: function(law, peak, residual, rate, slip)
+    return None
 
 
 @overload(line_at)
 def _line_at(law, peak, residual, rate, slip, ahead):  # type: ignore[no-untyped-def]
-    function = _registered(law, 2)
-    if function is None:
-        return None
-    return lambda law, peak, residual, rate, slip, ahead: function(
-        law, peak, residual, rate, slip, ahead
-    )
+    if found := _registered(law):
+        function = found[2]
+        return lambda law, peak, residual, rate, slip, ahead: function(
+            law, peak, residual, rate, slip, ahead
+        )
+    return None
 
 
 @jit
-def strengths(law: NamedTuple, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
+def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
     """Strength tau_f at every node, Pa; all arrays (nodes,), see `strength_at`."""
     result = np.empty(slip.size)
     for i in range(slip.size):

@@ -8,33 +8,24 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, Union
 
 import numpy as np
 from pydantic import (
     BeforeValidator,
     Discriminator,
-    GetJsonSchemaHandler,
+    Field,
     Tag,
     WrapSerializer,
     WrapValidator,
     model_validator,
 )
-from pydantic_core import CoreSchema
 
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.friction.parameters import FUNCTIONS, Exponential, Linear, Polygon
-from stiction.model import (
-    OptionalProfile,
-    Profile,
-    Real,
-    as_list,
-    at_least,
-    checked,
-    is_unplaced,
-    model,
-)
+from stiction.model import OptionalProfile, Profile, Real, at_least, checked, is_unplaced, model
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
@@ -42,9 +33,11 @@ NEARLY_RESIDUAL = 0.01
 """Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
 
 
-def _known(value: Any) -> Array:
-    """The numbers to check now; a profile that is not placed yet is checked once it is."""
-    return np.empty(0) if value is None or is_unplaced(value) else np.asarray(value)
+def _outside(name: str, value: Any, valid: Callable[[Array], Any], words: str) -> list[str]:
+    """Refuse numbers out of range; a profile that is not placed yet is checked once it is."""
+    given = np.empty(0) if value is None or is_unplaced(value) else np.ravel(value)
+    wrong = given[~valid(given)]
+    return [f"{name} must {words}, got {wrong.min():g}"] if wrong.size else []
 
 
 @model
@@ -52,25 +45,10 @@ class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
 
     A law is the function f, with its slope at zero slip -f'(0) and its integral. The scale of slip
-    follows from one of W, d_c and Gamma.
+    follows from one of W, d_c and Gamma; the other two vary with tau_p - tau_r.
 
-    Parameters
-    ----------
-    weakening_rate : float or (nodes,) array, optional
-        W = -f'(0) (tau_p - tau_r)/d_c, at zero slip, Pa/m, positive.
-    critical_slip : float or (nodes,) array, optional
-        d_c, m, positive.
-    residual_strength : float or (nodes,) array
-        tau_r, Pa, not negative.
-    fracture_energy : float or (nodes,) array, optional
-        Gamma = (tau_p - tau_r) d_c times the integral of f, J/m², positive.
-    residual_ratio : float or (nodes,) array, optional
-        tau_r/tau_p in [0, 1), instead of `residual_strength`.
-
-    Raises
-    ------
-    InputError
-        If none or several of W, d_c and Gamma are given, or a value is out of range.
+    The parameters are those of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
+    Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
     weakening_rate: OptionalProfile = None
@@ -79,36 +57,21 @@ class FrictionLaw(ABC):
     fracture_energy: OptionalProfile = None
     residual_ratio: OptionalProfile = None
 
-    linear: ClassVar[bool] = False
-    """Whether strength falls along one straight line, to the residual strength."""
-
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
+        residual, ratio = self.residual_strength, self.residual_ratio
+        problems = _outside("residual_strength", residual, lambda r: r >= 0.0, "not be negative")
+        problems += _outside(
+            "residual_ratio", ratio, lambda r: (r >= 0.0) & (r < 1.0), "lie in [0, 1)"
+        )
         given = [name for name in SCALES if getattr(self, name) is not None]
-        problems = []
         if len(given) != 1:
-            found = " and ".join(given) if given else "none"
-            problems.append(
-                f"give one of weakening_rate, critical_slip and fracture_energy, got {found}"
-            )
+            found = " and ".join(given) or "none"
+            problems.append(f"give one of {', '.join(SCALES)}, got {found}")
         for name in given:
-            value = _known(getattr(self, name))
-            if not np.all(value > 0.0):
-                problems.append(
-                    f"{name} must be positive everywhere, smallest given is {value.min():g}"
-                )
-        residual, ratio = _known(self.residual_strength), _known(self.residual_ratio)
-        if not np.all(residual >= 0.0):
-            problems.append(
-                f"residual_strength must not be negative, smallest given is {residual.min():g}"
-            )
-        if not np.all((ratio >= 0.0) & (ratio < 1.0)):
-            problems.append(
-                "residual_ratio must lie in [0, 1), given are values from"
-                f" {ratio.min():g} to {ratio.max():g}"
-            )
-        both = is_unplaced(self.residual_strength) or np.any(residual != 0.0)
-        if self.residual_ratio is not None and both:
+            value = getattr(self, name)
+            problems += _outside(name, value, lambda v: v > 0.0, "be positive everywhere")
+        if ratio is not None and (is_unplaced(residual) or np.any(residual != 0.0)):
             problems.append("give either residual_strength or residual_ratio, got both")
         if problems:
             raise InputError(problems)
@@ -123,11 +86,6 @@ class FrictionLaw(ABC):
     def steepest_slope(self) -> float:
         """The largest -f'(u)."""
         return self.initial_slope
-
-    @property
-    def steepens(self) -> bool:
-        """Whether strength falls more steeply later than at zero slip."""
-        return self.steepest_slope > self.initial_slope
 
     @property
     @abstractmethod
@@ -152,10 +110,21 @@ class FrictionLaw(ABC):
         """What compiled kernels are given; see `stiction.friction.kernels`."""
 
     @property
+    def linear(self) -> bool:
+        """Whether strength falls along one straight line, to the residual strength."""
+        return isinstance(self.parameters, Linear)
+
+    @property
     def reach(self) -> float:
         """u from which strength counts as residual: 1 % is left of a law that never ends."""
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
+
+    @property
+    def scale(self) -> tuple[str, Any]:
+        """Which of W, d_c and Gamma was given, and its value."""
+        name = next(name for name in SCALES if getattr(self, name) is not None)
+        return name, getattr(self, name)
 
     def residual(self, strength: Array) -> Array:
         """Return tau_r, Pa, of a peak strength (Pa, any shape)."""
@@ -166,13 +135,7 @@ class FrictionLaw(ABC):
     def rate(self, drop: Array, scale: str, value: Any) -> Array:
         """Return the weakening rate W at zero slip, Pa/m.
 
-        Parameters
-        ----------
-        drop : array
-            tau_p - tau_r, Pa.
-        scale : {"weakening_rate", "critical_slip", "fracture_energy"}
-        value : array
-            In Pa/m, m or J/m².
+        `drop` is tau_p - tau_r, Pa; `value` that of one of `SCALES`, in Pa/m, m or J/m².
         """
         value = np.asarray(value, dtype=np.float64)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -182,12 +145,6 @@ class FrictionLaw(ABC):
                 return self.initial_slope * self.integral * drop**2 / value
         return np.broadcast_to(value, np.broadcast_shapes(value.shape, drop.shape))
 
-    @property
-    def scale(self) -> tuple[str, Any]:
-        """Which of W, d_c and Gamma was given, and its value."""
-        name = next(name for name in SCALES if getattr(self, name) is not None)
-        return name, getattr(self, name)
-
     def critical_slip_of(self, drop: Array, rate: Array) -> Array:
         """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
         return self.initial_slope * drop / rate
@@ -195,17 +152,8 @@ class FrictionLaw(ABC):
     def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
         """Return the energy dissipated above the residual strength up to a slip, J/m².
 
-        Parameters
-        ----------
-        slip : (..., nodes) array
-            m.
-        drop, rate : (nodes,) arrays
-            tau_p - tau_r (Pa), W (Pa/m).
-
-        Returns
-        -------
-        (..., nodes) array
-            (tau_p - tau_r) d_c times the integral of f.
+        It is (tau_p - tau_r) d_c times the integral of f. `slip` (m) is of shape (..., nodes),
+        `drop` = tau_p - tau_r (Pa) and `rate` = W (Pa/m) of shape (nodes,).
         """
         if self.linear:
             weakened = np.minimum(slip, drop / rate)
@@ -213,10 +161,6 @@ class FrictionLaw(ABC):
         critical = self.critical_slip_of(drop, rate)
         u = np.divide(slip, critical, out=np.zeros(np.shape(slip)), where=critical > 0.0)
         return drop * critical * self.area(u)
-
-    def fracture_energy_of(self, drop: Array, rate: Array) -> Array:
-        """Return Gamma, J/m², from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
-        return self.initial_slope * self.integral * drop**2 / rate
 
 
 @model
@@ -249,9 +193,9 @@ class LinearWeakening(FrictionLaw):
 
     type: Literal["linear"] = "linear"
 
-    linear: ClassVar[bool] = True
     initial_slope: ClassVar[float] = 1.0
     integral: ClassVar[float] = 0.5
+    parameters: ClassVar[Linear] = Linear()
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) = max(1 - u, 0)."""
@@ -266,28 +210,14 @@ class LinearWeakening(FrictionLaw):
         """Return u = 1 - f."""
         return 1.0 - fraction
 
-    @property
-    def parameters(self) -> Linear:
-        """For kernels."""
-        return Linear()
-
 
 @model
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    Parameters
-    ----------
-    weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        One of W at zero slip (Pa/m), d_c (m; slip at which 1/e of tau_p - tau_r is left) and
-        Gamma = (tau_p - tau_r) d_c (J/m²), positive.
-    residual_strength, residual_ratio : float or (nodes,) array, optional
-        tau_r (Pa) or tau_r/tau_p in [0, 1); approached and never reached.
-
-    Raises
-    ------
-    InputError
-        If none or several of W, d_c and Gamma are given, or a value is out of range.
+    The parameters are those of `LinearWeakening`. W is the weakening rate at zero slip, d_c the
+    slip at which 1/e of tau_p - tau_r is left, and Gamma = (tau_p - tau_r) d_c. The residual
+    strength is approached and never reached.
 
     Examples
     --------
@@ -301,6 +231,7 @@ class ExponentialWeakening(FrictionLaw):
 
     initial_slope: ClassVar[float] = 1.0
     integral: ClassVar[float] = 1.0
+    parameters: ClassVar[Exponential] = Exponential()
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) = exp(-u)."""
@@ -314,13 +245,10 @@ class ExponentialWeakening(FrictionLaw):
         """Return u = -ln f."""
         return -math.log(fraction) if fraction > 0.0 else math.inf
 
-    @property
-    def parameters(self) -> Exponential:
-        """For kernels."""
-        return Exponential()
 
-
-Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(as_list)]
+_listed = BeforeValidator(lambda value: list(value) if isinstance(value, np.ndarray) else value)
+Corners: TypeAlias = Annotated[tuple[Real, ...], _listed]
+Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
 
 
 @model(kw_only=True)
@@ -333,11 +261,9 @@ class PiecewiseWeakening(FrictionLaw):
         Corners u = d/d_c, rising from above 0 to 1; the corner at zero slip is understood.
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
-    weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        One of W of the first piece (Pa/m), d_c (m; slip at which the residual strength is
-        reached) and Gamma (J/m²), positive.
-    residual_strength, residual_ratio : float or (nodes,) array, optional
-        tau_r (Pa) or tau_r/tau_p in [0, 1).
+    weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
+        As for `LinearWeakening`; W is that of the first piece, and the residual strength is
+        reached at d_c.
 
     Raises
     ------
@@ -361,25 +287,19 @@ class PiecewiseWeakening(FrictionLaw):
 
     @model_validator(mode="after")
     def _falling(self) -> PiecewiseWeakening:
-        problems = []
-        slip, strength = np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
+        slip, strength = self.corners
         if slip.size != strength.size or slip.size < 2:
-            problems.append(
+            raise InputError(
                 "slip and strength: must have one entry for each corner, got"
                 f" {slip.size - 1} and {strength.size - 1}"
             )
-        else:
-            if not (np.diff(slip) > 0.0).all() or slip[-1] != 1.0:
-                problems.append(
-                    f"slip: must rise from above 0 to exactly 1 (d = d_c), got {self.slip}"
-                )
-            if not (np.diff(strength) < 0.0).all() or strength[-1] != 0.0:
-                problems.append(
-                    "strength: must fall from below 1 to exactly 0 (the residual strength), got"
-                    f" {self.strength}"
-                )
-        if problems:
-            raise InputError(problems)
+        if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
+            raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
+        if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
+            raise InputError(
+                "strength: must fall from below 1 to exactly 0 (the residual strength), got"
+                f" {self.strength}"
+            )
         return self
 
     @property
@@ -392,11 +312,6 @@ class PiecewiseWeakening(FrictionLaw):
         """-f' of each piece."""
         u, f = self.corners
         return -np.diff(f) / np.diff(u)
-
-    @property
-    def linear(self) -> bool:  # type: ignore[override]  # here it depends on the corners
-        """Whether it is a single piece: the linear law."""
-        return len(self.slip) == 1
 
     @property
     def initial_slope(self) -> float:
@@ -432,18 +347,18 @@ class PiecewiseWeakening(FrictionLaw):
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
 
-    @classmethod
-    def from_law(cls, law: FrictionLaw, pieces: int) -> PiecewiseWeakening:
-        """Make a polygon that follows another law.
+    @property
+    def parameters(self) -> Polygon | Linear:
+        """For kernels; a single piece is the linear law to the bit."""
+        return Linear() if len(self.slip) == 1 else Polygon(*self.corners)
 
-        Parameters
-        ----------
-        law : FrictionLaw
-            Such as `ExponentialWeakening`.
-        pieces : int
-            How many straight pieces, at least 2. Corners lie on the law where it has lost equal
-            shares of strength; the last piece of a law that never ends is so long that it
-            dissipates as much as all the rest of the law.
+    @classmethod
+    @checked
+    def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
+        """Make a polygon of so many `pieces`, at least 2, that follows another law.
+
+        Corners lie on the law where it has lost equal shares of strength; the last piece of a law
+        that never ends is so long that it dissipates as much as all the rest of the law.
 
         Returns
         -------
@@ -465,7 +380,8 @@ class PiecewiseWeakening(FrictionLaw):
         >>> round(float(polygon.weakening_rate) / 0.5e12, 3)
         0.984
         """
-        pieces = _check_pieces(law, pieces)
+        if problems := contradictions(law):
+            raise InputError([f"law: {text}" for text in problems])
         fraction = 1.0 - np.arange(1, pieces + 1) / pieces
         u = np.array([law.slip_at(float(f)) for f in fraction])
         if not np.isfinite(u[-1]):
@@ -491,34 +407,8 @@ class PiecewiseWeakening(FrictionLaw):
             **{scale: factors[scale] * value},
         )
 
-    @property
-    def parameters(self) -> Polygon | Linear:
-        """For kernels; a single piece is the linear law to the bit."""
-        return Linear() if self.linear else Polygon(*self.corners)
 
-
-Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
-
-
-@checked
-def _check_pieces(law: FrictionLaw, pieces: Pieces) -> int:
-    problems = contradictions(law)
-    scale, value = law.scale
-    if is_unplaced(value):
-        problems.append(
-            f"{scale} has points of its own; take the friction of a problem, which puts them on"
-            " its nodes"
-        )
-    if problems:
-        raise InputError([f"law: {text}" for text in problems])
-    return pieces
-
-
-LAWS = {
-    "linear": LinearWeakening,
-    "exponential": ExponentialWeakening,
-    "piecewise": PiecewiseWeakening,
-}
+LAWS = {law.type: law for law in (LinearWeakening, ExponentialWeakening, PiecewiseWeakening)}
 """The laws of study files by their `type`."""
 
 
@@ -530,39 +420,32 @@ def contradictions(law: FrictionLaw) -> list[str]:
     """
     if type(law) in LAWS.values():
         return []
-    name = type(law).__name__
+    name, step = type(law).__name__, 1e-6 * law.reach
     u = np.linspace(0.0, law.reach, 4097)
     f = np.asarray(law.fraction(u), dtype=np.float64)
-    rising = np.diff(f) > 1e-9
     if abs(f[0] - 1.0) > 1e-9:
         return [f"{name}.fraction(0) must be 1, got {f[0]:g}"]
-    if rising.any():
-        first = int(np.argmax(rising))
-        top = first + int(np.argmax(f[first:]))
-        return [
-            f"{name}: strength must not rise with slip; fraction rises from {f[first]:.4g} to"
-            f" {f[top]:.4g} between u = {u[first]:.4g} and {u[top]:.4g}"
-        ]
-    step = 1e-6 * law.reach
-    pairs = {
-        "initial_slope": (law.initial_slope, (1.0 - float(law.fraction(step))) / step),
-        "area(reach)": (float(law.area(law.reach)), float(np.trapezoid(f, u))),
-        "fraction(slip_at(0.5))": (float(law.fraction(law.slip_at(0.5))), 0.5),
+    if (rising := np.flatnonzero(np.diff(f) > 1e-9)).size:
+        return [f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}"]
+    pairs: dict[str, tuple[Any, Any]] = {
+        "initial_slope": (law.initial_slope, (1.0 - law.fraction(step)) / step),
+        "area(reach)": (law.area(law.reach), np.trapezoid(f, u)),
+        "fraction(slip_at(0.5))": (law.fraction(law.slip_at(0.5)), 0.5),
     }
     # In plain Python, so that nothing is compiled. With tau_p = 1, tau_r = 0 and d_c = 1 strength
     # is f and slip is u.
-    given = (law.parameters, 1.0, 0.0, law.initial_slope)
-    functions = FUNCTIONS.get(type(law.parameters), ())[:2]
-    plain = [getattr(function, "py_func", function) for function in functions]
-    for at in law.reach * np.array([0.0, 0.1234, 0.5678]) if plain else ():
-        here, ahead = float(law.fraction(at)), float(law.fraction(at + step))
-        for what, function, own in zip(
-            ("strength", "slope"), plain, (here, (here - ahead) / step), strict=True
+    kernels = FUNCTIONS.get(type(law.parameters), ())[:2]
+    for at in law.reach * np.array([0.0, 0.1234, 0.5678]) if kernels else ():
+        here, ahead = law.fraction(at), law.fraction(at + step)
+        for what, kernel, own in zip(
+            ("strength", "slope"), kernels, (here, (here - ahead) / step), strict=True
         ):
-            pairs[f"the {what} of its kernels at u = {at:.3g}"] = (function(*given, at), own)
+            plain = getattr(kernel, "py_func", kernel)
+            found = plain(law.parameters, 1.0, 0.0, law.initial_slope, at)
+            pairs[f"the {what} of its kernels at u = {at:.3g}"] = (found, own)
     tolerance = 1e-3 * max(1.0, law.steepest_slope)
     return [
-        f"{name}: {what} is {found:.3g}, but {own:.3g} by its fraction"
+        f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its fraction"
         for what, (found, own) in pairs.items()
         if abs(found - own) > tolerance
     ]
@@ -582,27 +465,24 @@ def _written(value: Any, handler: Any) -> Any:
     return handler(value)
 
 
-class _Schema:
-    """For editors: a table without a type is the linear law."""
-
-    def __get_pydantic_json_schema__(
-        self, core: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        linear, *others = handler(core)["oneOf"]
-        return {"anyOf": [linear, *({"allOf": [law, {"required": ["type"]}]} for law in others)]}
+def _for_editors(schema: dict[str, Any]) -> None:
+    """A table without a type is the linear law."""
+    linear, *others = schema.pop("oneOf")
+    schema["anyOf"] = [linear, *({"allOf": [law, {"required": ["type"]}]} for law in others)]
 
 
 def _tag(value: Any) -> str:
     return str(value.get("type", "linear") if isinstance(value, dict) else value.type)
 
 
-Friction: TypeAlias = Annotated[
-    Annotated[LinearWeakening, Tag("linear")]
-    | Annotated[ExponentialWeakening, Tag("exponential")]
-    | Annotated[PiecewiseWeakening, Tag("piecewise")],
-    Discriminator(_tag),
-    _Schema(),
-    WrapValidator(_law),
-    WrapSerializer(_written),
-]
+if TYPE_CHECKING:
+    Friction: TypeAlias = FrictionLaw
+else:
+    Friction = Annotated[
+        Union[tuple(Annotated[law, Tag(name)] for name, law in LAWS.items())],  # noqa: UP007
+        Discriminator(_tag),
+        Field(json_schema_extra=_for_editors),
+        WrapValidator(_law),
+        WrapSerializer(_written),
+    ]
 """Any friction law; in a study file ``type`` says which, linear if left out."""

@@ -15,7 +15,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
-from stiction.model import Number, check_memory, checked, describe, is_real, model
+from stiction.model import Number, check_memory, checked, describe, is_finite, model
 from stiction.problem import PROFILES
 from stiction.random.conditioning import Conditioning
 from stiction.random.mapping import from_normal
@@ -52,7 +52,7 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
         unknown = [unknown_name("correlation", str(n), NAMES) for n in pair if n not in NAMES]
         if unknown:
             raise InputError(unknown)
-        if not is_real(rho) or not -1.0 <= rho <= 1.0:
+        if not is_finite(rho) or not -1.0 <= rho <= 1.0:
             raise InputError(f"{', '.join(pair)}: must be a number in [-1, 1], got {describe(rho)}")
         first, second = sorted(pair, key=NAMES.index)
         if second in found.setdefault(first, {}):

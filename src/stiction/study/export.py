@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import os
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.errors import InputError, warn_accuracy
-from stiction.files import cannot_write, write_atomically, write_dataset
+from stiction.files import cannot, write_whole
 from stiction.results import DIRECTION
 
 OVERHEAD = 2**16
@@ -50,22 +52,23 @@ def export(result: xr.Dataset, path: Path) -> None:
         write_result(result, path)
         return
     frame = pd.DataFrame(columns(result))
-    try:
-        # Numbers are written as the shortest text that reads back to the same bits.
-        write_atomically(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
-    except OSError as error:
-        raise cannot_write(path, error) from error
+    # Numbers are written as the shortest text that reads back to the same bits.
+    write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as one NetCDF file with checksums, whole or not at all."""
-    try:
+    with suppress(OSError):
+        free = shutil.disk_usage(path.parent).free
         # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
-        if shutil.disk_usage(path.parent).free < 1.05 * result.nbytes + OVERHEAD:
-            raise OSError(errno.ENOSPC, "")
-        write_dataset(result, path)
-    except (OSError, RuntimeError) as error:  # the NetCDF library raises either
-        raise cannot_write(path, error) from error
+        if free < 1.05 * result.nbytes + OVERHEAD:
+            raise cannot("written", path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+    encoding = {
+        str(name): {"fletcher32": True}
+        for name, variable in result.variables.items()
+        if variable.ndim and variable.size and variable.dtype.kind in "fiub"
+    }
+    write_whole(path, lambda aside: result.to_netcdf(aside, engine="netcdf4", encoding=encoding))
 
 
 def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
