@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
+from typer import Argument, Option
 from typer.models import OptionInfo
 
 from stiction import __version__
@@ -25,6 +26,7 @@ from stiction.progress import Meter, duration
 
 SHOWN = 12
 """Points, failures or damaged chunks that are listed."""
+LEVELS = (0.05, 0.5, 0.95)
 PROBED = 5
 """Points of a sweep at which samples are timed."""
 BUDGET = 2.0
@@ -39,17 +41,10 @@ ONSET = (
 )  # fmt: skip
 """What is printed of an onset."""
 
-StudyFile = Annotated[
-    Path, typer.Argument(metavar="STUDY.toml", help="Study file; `stiction schema` describes it.")
-]
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")]
-Workers = Annotated[int | None, typer.Option(help="Threads; all cores by default.", min=1)]
-TimeLimit = Annotated[
-    float | None, typer.Option(help="Seconds; the result is what is done by then, and says so.")
-]
-LoadingRate = Annotated[
-    float, typer.Option(help="Of the dynamic method, Pa/s, unless the study gives one.")
-]
+StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
+RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
+Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
+LoadingRate = Annotated[float, Option(help="Pa/s, of a rupture that the study does not describe.")]
 
 
 # -- what commands share -------------------------------------------------------------------------
@@ -68,14 +63,9 @@ def echo(text: Any = "", *, err: bool = False) -> None:
 
 
 def in_options(text: str, command: Callable[..., Any] | None) -> str:
-    """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``.
+    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``.
 
-    Parameters
-    ----------
-    text : str
-        Message of a function of the package, which names its own arguments.
-    command : callable, optional
-        The function of a command, whose options have the names of those arguments.
+    The options of a command have the names of the arguments that functions of the package name.
     """
     parameters = {} if command is None else inspect.signature(command, eval_str=True).parameters
     for name, parameter in parameters.items():
@@ -125,30 +115,17 @@ def _executor(scheduler: str | None) -> Iterator[Any]:
 
 def run(
     study: StudyFile,
-    out: Annotated[
-        Path,
-        typer.Option(metavar="RUN", help="Folder in which results are stored as they are done."),
-    ],
+    out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
     workers: Workers = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="A running Dask scheduler, such as tcp://host:8786."),
+        str | None, Option(metavar="ADDRESS", help="Of a Dask scheduler, such as tcp://host:8786.")
     ] = None,
-    retry: Annotated[
-        bool, typer.Option("--retry", help="Compute stored samples that failed again.")
-    ] = False,
-    time_limit: TimeLimit = None,
+    retry: Annotated[bool, Option("--retry", help="Compute failed samples again.")] = False,
+    time_limit: Annotated[float | None, Option(help="Seconds; the rest is left.")] = None,
     part: Annotated[
-        str | None,
-        typer.Option(
-            metavar="K/N",
-            help="Compute the K-th of N parts only, for jobs that share the folder RUN and do not"
-            " know of each other.",
-        ),
+        str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
     ] = None,
-    pilot: Annotated[
-        bool, typer.Option(help="Compare the local criterion with the exact onset.")
-    ] = True,
+    pilot: Annotated[bool, Option(help="Compare with the exact onset.")] = True,
 ) -> None:
     """Run the study of a file, or what is missing of it.
 
@@ -189,7 +166,7 @@ def run(
             scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
             values = (result[name] * scale).to_dataframe()[name]
             table = values.groupby(dims) if dims else values
-            echo(f"{name}{unit}\n{table.describe(percentiles=[0.05, 0.5, 0.95]).to_string()}")
+            echo(f"{name}{unit}\n{table.describe(percentiles=LEVELS).to_string(max_rows=48)}")
     state = open_run(out).status()
     echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
     if state.failures:
@@ -230,9 +207,7 @@ def status(run: RunPath) -> None:
 
 def export(
     run: RunPath,
-    out: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="File to write: .nc (NetCDF) or .csv.")
-    ],
+    out: Annotated[Path, Argument(metavar="RESULT", help=".nc (NetCDF) or .csv.")],
 ) -> None:
     """Write a run as one file over the sweep and the samples; missing samples are NaN.
 
@@ -249,9 +224,7 @@ def export(
 
 def report(
     run: RunPath,
-    out: Annotated[
-        Path | None, typer.Option(help="HTML file; report.html in the run's folder by default.")
-    ] = None,
+    out: Annotated[Path | None, Option(help="HTML file; RUN/report.html by default.")] = None,
 ) -> None:
     """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
     from stiction.report import write_report
@@ -395,21 +368,12 @@ def read_strength(
     path: Path,
     problem: Any,
     *,
-    unit: Annotated[str | None, typer.Option(help="Of the values in PROFILE, such as MPa.")] = None,
-    x_unit: Annotated[str | None, typer.Option(help="Of x in PROFILE, such as mm.")] = None,
-    value: Annotated[
-        str | None, typer.Option(help="Column or variable of the values: name, or number from 0.")
-    ] = None,
-    x: Annotated[
-        str | None, typer.Option(help="Column or coordinate of x: name, or number from 0.")
-    ] = None,
-    interpolate: Annotated[
-        bool, typer.Option("--interpolate", help="Take points that lie elsewhere than the nodes.")
-    ] = False,
-    gaps: Annotated[
-        Literal["refuse", "fill"],
-        typer.Option(help="Refuse missing values, or fill them with straight lines."),
-    ] = "refuse",
+    unit: Annotated[str | None, Option(help="Of the values in PROFILE, such as MPa.")] = None,
+    x_unit: Annotated[str | None, Option(help="Of x in PROFILE, such as mm.")] = None,
+    value: Annotated[str | None, Option(help="Column of the values: name or number.")] = None,
+    x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
+    interpolate: Annotated[bool, Option("--interpolate", help="Points need no nodes.")] = False,
+    gaps: Annotated[Literal["refuse", "fill"], Option(help="Of missing values.")] = "refuse",
 ) -> Any:
     """Return the strength in a file, on the nodes of a problem."""
     from stiction.profiles import read_profile
@@ -441,26 +405,17 @@ def _with_reading(command: Callable[..., None]) -> Callable[..., None]:
 @_with_reading
 def onset(
     study: StudyFile,
-    strength: Annotated[
-        Path,
-        typer.Option(
-            metavar="PROFILE",
-            help="Peak strength: .npy, text (.csv, .txt, ...) or NetCDF, with or without x; in Pa"
-            " and m unless it states units, as in 'x (mm); strength (MPa)'. Of a plane: .npy of"
-            " shape (nx, ny).",
-        ),
-    ],
-    method: Annotated[
-        list[str] | None, typer.Option(help="Only this method; may be given several times.")
-    ] = None,
+    strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
+    method: Annotated[list[str] | None, Option(help="Only this one (repeatable).")] = None,
     loading_rate: LoadingRate = 2e7,
     **reading: Any,
 ) -> None:
     """At which load, and where, does one interface of given strength begin to slide?
 
-    Takes the problem from a study file, which needs nothing else, and the strength from PROFILE,
-    asks every method that applies, and prints a table. The method of the study, if it has one,
-    keeps its options; the others take their defaults.
+    Takes the problem from a study file, which needs nothing else, and the strength from PROFILE:
+    .npy, text (.csv, .txt, ...) or NetCDF, with or without x, in Pa and m unless it states units,
+    as in 'x (mm); strength (MPa)'; of a plane .npy of shape (nx, ny). Asks every method that
+    applies. That of the study keeps its options; the others take their defaults.
     """
     import pandas as pd
 
@@ -469,7 +424,8 @@ def onset(
     from stiction.study.export import columns
     from stiction.study.study import read_setup
 
-    problem, own, _ = read_setup(study)
+    setup = read_setup(study)
+    problem, own = setup.problem, setup.method
     if unknown := [name for name in method or () if name not in methods()]:
         raise InputError([unknown_name("--method", name, methods()) for name in unknown])
     profile = read_strength(strength, problem, **reading)
@@ -498,22 +454,13 @@ def onset(
 @_with_reading
 def rupture(
     study: StudyFile,
-    out: Annotated[Path, typer.Option(help="Folder for the result and its figures.")] = Path(
-        "stiction-rupture"
-    ),
-    sample: Annotated[
-        int, typer.Option(min=0, help="Number of the sample of the study's strength.")
-    ] = 0,
+    out: Annotated[Path, Option(help="Folder of result and figures.")] = Path("stiction-rupture"),
+    sample: Annotated[int, Option(min=0, help="Of the study's strength.")] = 0,
     strength: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PROFILE",
-            help="Peak strength instead of a sample, as of `stiction onset`; the study then needs"
-            " a problem only.",
-        ),
+        Path | None, Option(metavar="PROFILE", help="Instead of a sample; see `stiction onset`.")
     ] = None,
     loading_rate: LoadingRate = 2e7,
-    film: Annotated[bool, typer.Option("--film", help="Also a film, rupture.gif.")] = False,
+    film: Annotated[bool, Option("--film", help="Also a film, rupture.gif.")] = False,
     **reading: Any,
 ) -> None:
     """Simulate one interface from its first slip to global sliding, or as far as the study says.
@@ -537,7 +484,8 @@ def rupture(
         problem, method = point.problem, point.method
         profiles = point.profiles(point.draws(point.seed, sample, 1))
     else:
-        problem, method, save = read_setup(study)
+        setup = read_setup(study)
+        problem, method, save = setup.problem, setup.method, setup.save
         profiles = read_strength(strength, problem, **reading)
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=loading_rate)
@@ -566,19 +514,11 @@ def _summary(result: Any) -> str:
 
 def reliability(
     study: StudyFile,
-    out: Annotated[Path, typer.Option(help="Folder for table, data and figures.")] = Path(
-        "stiction-reliability"
-    ),
-    smallest: Annotated[
-        float, typer.Option(help="Probability down to which the curve goes.")
-    ] = 1e-9,
-    target_cv: Annotated[
-        float, typer.Option(help="Coefficient of variation at the smallest probability.")
-    ] = 0.3,
+    out: Annotated[Path, Option(help="Folder of the results.")] = Path("stiction-reliability"),
+    smallest: Annotated[float, Option(help="Probability down to which the curve goes.")] = 1e-9,
+    target_cv: Annotated[float, Option(help="Coefficient of variation at `smallest`.")] = 0.3,
     workers: Workers = None,
-    max_evaluations: Annotated[
-        int | None, typer.Option(help="Most samples to solve.", min=1)
-    ] = None,
+    max_evaluations: Annotated[int | None, Option(help="Most samples to solve.", min=1)] = None,
 ) -> None:
     """Failure probability of a study's interface, decade by decade.
 
@@ -636,10 +576,7 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[
-        bool,
-        typer.Option("--version", "-V", callback=_print_version, is_eager=True, help="Print it."),
-    ] = False,
+    version: Annotated[bool, Option("--version", callback=_print_version, is_eager=True)] = False,
 ) -> None:
     pass
 

@@ -10,26 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
+import xarray as xr
+from small_study import small_study
 
 import stiction as st
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
-STUDY = {
-    "problem": {
-        "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-        "interface": {"length": 0.1, "nodes": 128},
-        "friction": {"weakening_rate": 0.5e12},
-    },
-    "random": {
-        "strength": {
-            "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6},
-            "spectrum": {"type": "power_law", "correlation_length": 1.7e-3},
-        }
-    },
-    "method": {"type": "local_criterion"},
-    "ensemble": {"samples": 40, "seed": 3},
-}
+STUDY = small_study(
+    weakening_rate=0.5e12,
+    correlation_length=1.7e-3,
+    ensemble={"samples": 40, "seed": 3},
+)
 
 
 def changed(path, value):
@@ -79,8 +71,6 @@ def test_a_study_is_monte_carlo():
 def test_attributes_say_all_it_takes(tmp_path):
     result = st.Study.from_dict(STUDY | {"title": "a study"}).run()
     result.to_netcdf(tmp_path / "result.nc")
-    import xarray as xr
-
     with xr.open_dataset(tmp_path / "result.nc") as read:
         assert read.attrs["stiction_version"] == st.__version__
         assert read.attrs["seed"] == 3

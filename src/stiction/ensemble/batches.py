@@ -144,19 +144,8 @@ def solve_spans(
     the number of samples. An empty list is yielded about every second while nothing is done.
     Closing the generator cancels what has not begun.
 
-    Parameters
-    ----------
-    points : sequence of Experiment
-    spans : iterable of Span
-    executor : concurrent.futures.Executor, optional
-        Threads if left out.
-    workers : int
-        Threads, or how many workers the executor has if it does not say.
-
-    Raises
-    ------
-    WorkerError
-        If a worker is lost, or has other versions.
+    `workers` is the number of threads, or of workers if an executor does not say how many it has.
+    A worker that is lost, or has other versions, is a `WorkerError`.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in waiting)
@@ -209,13 +198,9 @@ def _result(future: Future[Table], span: Span, seed: int) -> Table:
 
 
 def missing_spans(done: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the stretches of samples that are not done, point after point.
+    """Return the stretches of samples that are not `done` (points, samples), point after point.
 
-    Parameters
-    ----------
-    done : (points, samples) array of bool
-    first : int
-        Number of the first sample.
+    The samples are numbered from `first`.
     """
     samples = done.shape[1]
     # A sample that is done before each point, and after the last one.

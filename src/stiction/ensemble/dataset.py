@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.table import Failure, Table
-from stiction.errors import warn_accuracy
 from stiction.model import check_memory
 from stiction.results import SAMPLE, Variable, coordinate, to_dataset
 
 FAILED = "failed_samples"
-SHOWN = 3
 
 
 @dataclass(frozen=True)
@@ -177,14 +175,3 @@ class Gathered:
         name = "position" if dim == "x" else f"position_{dim}"
         own = replace(meaning, dims=(*dims, dim))
         return {name: (np.reshape([places for places, _ in found], (*shape, -1)), own)}
-
-
-def warn_of_failures(failed: Sequence[Failure], samples: int) -> None:
-    """Warn of samples that failed, of `samples` in all."""
-    if failed:
-        some = "; ".join(str(failure) for failure in failed[:SHOWN])
-        more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""
-        warn_accuracy(
-            f"{len(failed)} of {samples} samples could not be solved and are NaN (the attribute"
-            f" {FAILED!r} lists them): {some}{more}"
-        )

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.batches import AnyExecutor, missing_spans, solve_spans, usable_cores
-from stiction.ensemble.dataset import Gathered, GridAxis, distinct, warn_of_failures
+from stiction.ensemble.dataset import FAILED, Gathered, GridAxis, distinct
 from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
@@ -23,7 +23,8 @@ from stiction.model import Count, Flag, Names, Number, Progress, Seconds, checke
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
-FEW = 4
+FEW, SHOWN = 4, 3
+"""Warnings and failures that are told one by one."""
 HOPELESS = 16
 """Samples that fail, with none solved, before the whole ensemble is given up."""
 
@@ -39,25 +40,11 @@ def compute(
     progress: Show = True,
     time_limit: float | None = None,
 ) -> None:
-    """Compute the samples of some points that are not done.
+    """Compute the samples of some points that are not done, (points, samples).
 
-    Parameters
-    ----------
-    points : sequence of Experiment
-    done : (points, samples) array of bool
-    take : callable
-        Gets tables as samples are solved, and an empty list now and then. When the seconds of
-        `time_limit` are over, the rest is left.
-    first : int
-        Number of the first sample.
-    workers, executor, progress, time_limit
-        See `monte_carlo`.
-
-    Raises
-    ------
-    InputError, RuntimeError
-        If no sample can be solved.
-    StoreError, WorkerError
+    `take` gets tables as samples are solved, and an empty list now and then. When the seconds of
+    `time_limit` are over, the rest is left. Other options are those of `monte_carlo`. If no sample
+    can be solved, the error of one is raised.
     """
     if done.all():
         return
@@ -105,13 +92,11 @@ def gather(
     pilot: bool = True,
     **options: Any,
 ) -> xr.Dataset:
-    """Compute an ensemble at every point, or what is not stored of it.
+    """Compute an ensemble at every point of a sweep, or what is not stored of it.
 
     Parameters
     ----------
-    points, axes
-        Of a sweep.
-    ensemble : Ensemble
+    points, ensemble, axes
     attributes : mapping
         Of the result.
     store : Store, optional
@@ -120,7 +105,6 @@ def gather(
         Compute stored samples that failed again.
     others : (points, samples) array of bool, optional
         Samples that somebody else computes.
-    pilot : bool
     **options
         See `compute`.
     """
@@ -149,7 +133,13 @@ def gather(
         if store is not None:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)
-    warn_of_failures(rows.failed, rows.done.size)
+    if failed := rows.failed:
+        some = "; ".join(str(failure) for failure in failed[:SHOWN])
+        more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""
+        warn_accuracy(
+            f"{len(failed)} of {rows.done.size} samples could not be solved and are NaN (the"
+            f" attribute {FAILED!r} lists them): {some}{more}"
+        )
     if store is None and "cut_short" in result.attrs:
         warn_accuracy(f"{result.attrs['cut_short']}; the others are NaN")
     return result

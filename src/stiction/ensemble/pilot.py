@@ -108,20 +108,9 @@ def pilot_attributes(
 ) -> dict[str, Any]:
     """Compare the first samples of some points, and warn of a difference beyond 1 %.
 
-    Parameters
-    ----------
-    points : sequence of Experiment
-        Of many, eight are taken, the first and the last among them.
-    samples, first : int
-        Of the ensemble.
-    show : bool
-        Whether progress is shown.
-
-    Returns
-    -------
-    dict
-        'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; empty if no
-        method has an exact counterpart.
+    Of many points, eight are taken, the first and the last among them. The result has
+    'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; it is empty if no
+    method has an exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     found: list[Pilot] = []

@@ -39,15 +39,7 @@ class Damaged(ValueError):
 
 
 class Chunk(NamedTuple):
-    """One file of samples.
-
-    Attributes
-    ----------
-    bytes : int
-    versions : str
-        Of the process that computed it.
-    table : Table
-    """
+    """One file of samples; `versions` are those of the process that computed it."""
 
     bytes: int
     versions: str
@@ -236,14 +228,7 @@ class Store:
 
 
 def read_chunk(file: Path) -> tuple[Chunk, str]:
-    """Return a chunk and the mark of its study.
-
-    Raises
-    ------
-    Damaged, FileNotFoundError
-    StoreError
-        If it is there and cannot be read.
-    """
+    """Return a chunk and the mark of its study, or raise `Damaged` or an error of `_read`."""
     data = _read(file)
     if not file.name.startswith(digest(data)[:32]):
         raise Damaged("fails its checksum")
@@ -270,14 +255,7 @@ def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_study(path: Path) -> dict[str, Any]:
-    """Return the study of a run in plain form.
-
-    Raises
-    ------
-    FileNotFoundError, Damaged
-    StoreError
-        If it is of another format, or cannot be read.
-    """
+    """Return the study of a run in plain form, or raise `Damaged` or an error of `_read`."""
     return _read_json(path / STUDY)
 
 
@@ -302,6 +280,7 @@ def _read_json(file: Path) -> dict[str, Any]:
 
 
 def _read(file: Path) -> bytes:
+    """Return what a file holds; what is there and cannot be read may be whole: a StoreError."""
     try:
         return file.read_bytes()
     except FileNotFoundError:
@@ -311,13 +290,7 @@ def _read(file: Path) -> bytes:
 
 
 def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
-    """Refuse a study that differs from the stored one in more than a growing number of samples.
-
-    Raises
-    ------
-    StoreError
-        Naming the differences.
-    """
+    """Refuse a study that differs from the stored one in more than a growing number of samples."""
     found = differences(_identity(here), _identity(there))
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     if now < before and not found:

@@ -46,6 +46,6 @@ def from_table(kinds: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
     name = rest.pop("type", None)
     if name is None:
         raise InputError(f"type: missing (valid: {', '.join(kinds)})")
-    if name not in kinds:
+    if not isinstance(name, str) or name not in kinds:
         raise InputError(unknown_name("type", str(name), kinds))
     return kinds[name](**rest)

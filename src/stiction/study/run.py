@@ -43,12 +43,7 @@ class Part(NamedTuple):
 
 
 def as_part(value: Any) -> Part:
-    """Return a part from a pair of numbers or a text such as '3/100'.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return a part from a pair of numbers or a text such as '3/100'."""
     pair: Any = value
     if isinstance(value, str) and re.fullmatch(r"\d{1,9}/\d{1,9}", value):
         pair = tuple(int(number) for number in value.split("/"))

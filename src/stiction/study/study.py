@@ -175,10 +175,11 @@ class Study:
     def attributes(self) -> dict[str, Any]:
         """What a result says about itself: enough to run it again."""
         try:
-            found: dict[str, Any] = {"study": self.to_dict(), "seed": self.ensemble.seed}
+            found: dict[str, Any] = {"study": self.to_dict()}
         except InputError as error:  # a function of the user's: the result says so
-            return {"study_incomplete": str(error), "seed": self.ensemble.seed}
-        return found | ({"title": self.title} if self.title else {})
+            found = {"study_incomplete": str(error)}
+        title = {"title": self.title} if self.title else {}
+        return found | {"seed": self.ensemble.seed} | title
 
     @checked
     def run(
@@ -215,12 +216,10 @@ class Study:
 
         Raises
         ------
-        InputError, RuntimeError
+        InputError, RuntimeError, WorkerError
             See `stiction.monte_carlo`.
         StoreError
             If `out` cannot be used.
-        WorkerError
-            If a worker is lost.
         """
         store = others = None
         if part is not None:
@@ -263,10 +262,7 @@ class Study:
     def to_toml(self, path: str | Path) -> None:
         """Write it as a TOML file.
 
-        Raises
-        ------
-        InputError
-            If something in it exists in Python only, or the file cannot be written.
+        What exists in Python only, and a file that cannot be written, are an `InputError`.
         """
         text = tomli_w.dumps(self.to_dict())
         try:
@@ -334,35 +330,31 @@ def study_schema() -> dict[str, Any]:
     return pydantic.TypeAdapter(Study).json_schema()
 
 
-def read_setup(path: Path) -> tuple[Problem, Any, Save | None]:
-    """Return problem, method and `save` of a study file, or None, for what draws no samples.
+@model(kw_only=True)
+class Setup:
+    """What a study file says of one interface, without what is random."""
 
-    Of a sweep, the first values.
-    """
-    given, folder = read_toml(path), path.parent
-    problems = [
-        unknown_name("study", name, Study.__dataclass_fields__)
-        for name in given
-        if name not in Study.__dataclass_fields__
-    ]
-    sweep, _ = read_sweep(given, folder, Study)
-    given = completed(given, sweep)
-    if "problem" not in given:
-        problems.append("problem: missing")
-    found: dict[str, Any] = {}
-    kinds: dict[str, Any] = {"problem": Problem, "method": AnyMethod, "save": Save}
-    for name, kind in kinds.items():
-        if name not in given:
-            continue
-        try:
-            found[name] = pydantic.TypeAdapter(kind).validate_python(
-                given[name], context=reading(folder)
-            )
-        except pydantic.ValidationError as error:
-            problems += explain(error, Study, prefix=(name,))
+    problem: Problem
+    method: AnyMethod | None = None
+    save: Save | None = None
+
+
+def read_setup(path: Path) -> Setup:
+    """Read what a study file says of one interface; of a sweep, the first values."""
+    given = read_toml(path)
+    known = Study.__dataclass_fields__
+    problems = [unknown_name("study", name, known) for name in given if name not in known]
+    given = completed(given, read_sweep(given, path.parent, Study)[0])
+    own = {name: given[name] for name in Setup.__dataclass_fields__ if name in given}
+    try:
+        setup: Setup = pydantic.TypeAdapter(Setup).validate_python(
+            own, context=reading(path.parent)
+        )
+    except pydantic.ValidationError as error:
+        problems += explain(error, Setup)
     if problems:
         raise InputError(problems)
-    return found["problem"], found.get("method"), found.get("save")
+    return setup
 
 
 def open_run(path: Any) -> StoredRun:

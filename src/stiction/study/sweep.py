@@ -10,7 +10,7 @@ import numbers
 import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import pydantic
@@ -18,7 +18,16 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction.ensemble.dataset import GridAxis
 from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import _models_in, describe, is_whole, keys_of, to_plain
+from stiction.model import (
+    Real,
+    _models_in,
+    at_least,
+    describe,
+    explain,
+    keys_of,
+    model,
+    to_plain,
+)
 from stiction.profiles import is_profile, profile_in_file
 from stiction.results import Variable
 
@@ -32,7 +41,6 @@ _FIXED = (
     "sweep",
 )
 _TABLES = ("problem", "random", "method", "ensemble", "save")
-_RANGE = ("start", "stop", "count", "spacing")
 _UNITS = {
     "length": "m",
     "correlation_length": "m",
@@ -65,37 +73,28 @@ class Point(NamedTuple):
     values: dict[str, Any]
 
 
-def _is_real(value: Any) -> bool:
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+@model(kw_only=True)
+class _Range:
+    """Values from start to stop, both included."""
+
+    start: Real
+    stop: Real
+    count: at_least(2)  # type: ignore[valid-type]  # a call makes it
+    spacing: Literal["linear", "log"] = "linear"
 
 
 def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
-    """Values of {start, stop, count, spacing = "linear" or "log"}, both ends included."""
-    problems = [unknown_name(key, name, _RANGE) for name in given if name not in _RANGE]
-    problems += [f"{key}.{name}: missing" for name in _RANGE[:3] if name not in given]
-    if problems:
-        raise InputError(problems)
-    start, stop, count = (given[name] for name in _RANGE[:3])
-    spacing = given.get("spacing", "linear")
-    for name in ("start", "stop"):
-        value = given[name]
-        if not _is_real(value) or not math.isfinite(value):
-            problems.append(f"{key}.{name}: must be a finite number, got {describe(value)}")
-    if not is_whole(count, 2):
-        problems.append(f"{key}.count: must be a whole number >= 2, got {describe(count)}")
-    elif count > MOST_POINTS:
-        problems.append(f"{key}.count: must be at most {MOST_POINTS}, got {describe(count)}")
-    if spacing not in ("linear", "log"):
-        problems.append(f"{key}.spacing: must be 'linear' or 'log', got {describe(spacing)}")
-    elif spacing == "log" and not problems and not (start > 0.0 and stop > 0.0):
-        problems.append(f"{key}: a log range needs positive ends, got {start!r} and {stop!r}")
-    if problems:
-        raise InputError(problems)
-    if spacing == "log":
-        values = np.geomspace(start, stop, int(count))
-    else:
-        values = np.linspace(start, stop, int(count))
-    whole = isinstance(start, numbers.Integral) and isinstance(stop, numbers.Integral)
+    try:
+        found: _Range = pydantic.TypeAdapter(_Range).validate_python(given)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(error, _Range, key)) from None
+    if found.count > MOST_POINTS:
+        raise InputError(f"{key}.count: must be at most {MOST_POINTS}, got {found.count}")
+    ends = found.start, found.stop
+    if found.spacing == "log" and min(ends) <= 0.0:
+        raise InputError(f"{key}: a log range needs positive ends, got {ends[0]!r} and {ends[1]!r}")
+    values = (np.geomspace if found.spacing == "log" else np.linspace)(*ends, found.count)
+    whole = all(isinstance(given[name], numbers.Integral) for name in ("start", "stop"))
     if whole and np.all(values == np.round(values)):
         return [int(value) for value in values]
     return [float(value) for value in values]
@@ -156,7 +155,7 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, value in given.items():
         name = f"{prefix}.{key}" if prefix else str(key)
-        if isinstance(value, Mapping) and not set(value) & set(_RANGE):
+        if isinstance(value, Mapping) and not {"start", "stop", "count"} & set(value):
             result |= _flat(value, name)
         else:
             result[name] = value
