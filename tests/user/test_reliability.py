@@ -130,13 +130,9 @@ def test_auto_says_why(system):
 def test_too_few_evaluations_return_what_there_is(system, algorithm):
     with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
         result = st.failure_probability(
-            *system,
-            0.665e6,
-            method=LOCAL,
-            algorithm=algorithm,
-            target_cv=0.01,
+            *system, 0.665e6, method=LOCAL, algorithm=algorithm, target_cv=0.01,
             max_evaluations=2000,
-        )
+        )  # fmt: skip
     assert result.evaluations <= 2000
     assert result.warnings
     low, high = result.interval
@@ -149,13 +145,9 @@ def test_too_few_evaluations_return_what_there_is(system, algorithm):
 def test_the_smallest_budgets_are_kept_to(system, algorithm, allowed):
     with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
         result = st.failure_probability(
-            *system,
-            0.665e6,
-            method=EXACT,
-            algorithm=algorithm,
-            target_cv=0.05,
+            *system, 0.665e6, method=EXACT, algorithm=algorithm, target_cv=0.05,
             max_evaluations=allowed,
-        )
+        )  # fmt: skip
     assert 0 < result.evaluations <= allowed
     # P is about 7e-5.
     assert result.interval[0] < 7e-5 < result.interval[1]
@@ -169,16 +161,13 @@ def test_auto_leaves_a_first_stage_that_picks_others():
         st.Beta(alpha=1.5, beta=3.0, low=0.1e6, high=4e6),
         st.PowerLawSpectrum(correlation_length=2.0 * base.nucleation_length),
     )
-    result = st.failure_probability(
-        base, field, 0.34e6, method=EXACT, target_cv=0.5, max_evaluations=1500
-    )
-    assert result.algorithm == "subset"
-    assert "the local criterion picks" in result.reason
-    answer = st.design_stress(
-        base, field, probability=5e-3, method=EXACT, target_cv=0.5, max_evaluations=1500
-    )
-    assert answer.algorithm == "subset"
-    assert "only" in answer.reason
+    options = {"method": EXACT, "target_cv": 0.5, "max_evaluations": 1000}
+    for answer in (
+        st.failure_probability(base, field, 0.34e6, **options),
+        st.design_stress(base, field, probability=5e-3, **options),
+    ):
+        assert answer.algorithm == "subset"
+        assert "the local criterion picks" in answer.reason
 
 
 @pytest.mark.slow
@@ -238,14 +227,9 @@ def test_small_runs_whose_states_tie(seed):
     field = st.paper.strength(problem, 0.5)
     with pytest.warns(st.AccuracyWarning):
         found = st.failure_probability(
-            problem,
-            field,
-            0.66001e6,
-            method=LOCAL,
-            algorithm="subset",
-            max_evaluations=100 + 50 * (seed % 2),
-            seed=seed // 2,
-        )
+            problem, field, 0.66001e6, method=LOCAL, algorithm="subset",
+            max_evaluations=100 + 50 * (seed % 2), seed=seed // 2,
+        )  # fmt: skip
     assert found.interval[0] < 1e-12 < found.interval[1]
 
 
