@@ -104,7 +104,9 @@ def fields():
         phase = 2 * np.pi * np.outer(np.arange(1, sigma.size + 1), np.arange(1024) / 1024)
 
         def plain(strength=strength, draws=draws, sigma=sigma, phase=phase):
-            z = (draws[:, ::2] * sigma) @ np.cos(phase) + (draws[:, 1::2] * sigma) @ np.sin(phase)
+            z = (draws[:, ::2] * sigma) @ np.cos(phase) + (draws[:, 1::2] * sigma) @ np.sin(
+                phase
+            )
             return strength.marginal.distribution.ppf(ndtr(z))
 
         row(f"xi_0/h_n = {ratio}", ours, [("sum of cosines", timed(plain, 3) / 16)])

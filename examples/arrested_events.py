@@ -26,7 +26,9 @@ onset = onsets.isel(sample=busiest)
 loads = np.linspace(0.9 * float(onset.first_instability), float(onset.critical_load), 20)[:-1]
 path = st.equilibrium_path(problem, tau_p[busiest], loads)
 slipping = 100.0 * float((path.slip[-1] > 0.0).mean())
-print(f"sample {busiest}: {int(path.arrested_events[-1])} events before {loads[-1] / 1e6:.3f} MPa;")
+print(
+    f"sample {busiest}: {int(path.arrested_events[-1])} events before {loads[-1] / 1e6:.3f} MPa;"
+)
 print(f"{slipping:.0f} % of the interface has slipped by then; it slides at", end=" ")
 print(f"{float(onset.critical_stress) / 1e6:.3f} MPa")
 st.plot.equilibrium_path(path.isel(load=slice(None, None, 4)))

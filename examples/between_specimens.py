@@ -6,7 +6,9 @@
 import stiction as st
 
 problem = st.paper.problem(nodes=512)
-within = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3), mean_mode=True)
+within = st.RandomField(
+    st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3), mean_mode=True
+)
 cases = {
     "within only": st.RandomInterface(strength=within),
     "within and between": st.RandomInterface(

@@ -27,7 +27,9 @@ STRENGTH, RESIDUAL, CRITICAL_SLIP = 81.24e6, 63.0e6, 0.40
 AROUND, INSIDE = 70.0e6, 81.6e6
 FAULT, SQUARE = (30 * KM, 15 * KM), 3 * KM
 PERIOD = (60 * KM, 42 * KM)  # images of the fault are 27 km away: 4.5 s for the fastest waves
-BROKEN = 1e-3  # share of the strength lost; 0.4 mm of slip, at once after a point begins to slip
+BROKEN = (
+    1e-3  # share of the strength lost; 0.4 mm of slip, at once after a point begins to slip
+)
 STATIONS = {"along the slip": (7.5, 0.0), "across it": (0.0, 6.0), "oblique": (7.5, 4.5)}  # km
 RECORDED = ("slip", "slip_rate", "shear_stress")
 
@@ -74,7 +76,9 @@ def simulate(spacing: float, end_time: float = 9.0) -> Found:
             end_time=end_time,
             arrival=BROKEN,
         ),
-        save=st.Save([], stations={n: middle + KM * np.array(at) for n, at in STATIONS.items()}),
+        save=st.Save(
+            [], stations={n: middle + KM * np.array(at) for n, at in STATIONS.items()}
+        ),
     )
     x, y = (run[dim].values - length / 2 for dim, length in zip("xy", PERIOD, strict=True))
     return Found(x, y, run.arrival_time.values, run)
@@ -93,7 +97,9 @@ def draw(found: Found, title: str) -> Figure:
     figure = Figure(figsize=(6.75, 7.6), layout="constrained")
     upper, lower, lowest = figure.subplots(3, 1, height_ratios=[1.3, 1.0, 1.0])
     levels = np.arange(0.5, np.nanmax(found.rupture_time), 0.5)
-    lines = upper.contour(found.x / KM, found.y / KM, found.rupture_time.T, levels, cmap="viridis")
+    lines = upper.contour(
+        found.x / KM, found.y / KM, found.rupture_time.T, levels, cmap="viridis"
+    )
     upper.clabel(lines, levels[1::2], fmt="%.0f s")
     upper.set(xlim=(-15.5, 15.5), ylim=(-8, 8), aspect="equal", title=title)
     upper.set(xlabel="$x$, along the slip (km)", ylabel="$y$ (km)")
@@ -114,7 +120,12 @@ def report(spacing: float, out: Path) -> None:
     found = simulate(spacing)
     along, across = at_axes(found, [3 * KM, 6 * KM, 7.5 * KM, 9 * KM, 12 * KM])
     print(f"{spacing:g} m: rupture time (s) at 3, 6, 7.5 km")
-    print("  along x:", "  ".join(f"{t:.3f}" for t in along[:3]), " 9, 12 km:", *along[3:].round(3))
+    print(
+        "  along x:",
+        "  ".join(f"{t:.3f}" for t in along[:3]),
+        " 9, 12 km:",
+        *along[3:].round(3),
+    )
     print("  along y:", "  ".join(f"{t:.3f}" for t in across[:3]))
     for number, name in enumerate(STATIONS):
         record = found.run.sel(station=name)

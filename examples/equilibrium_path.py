@@ -61,7 +61,9 @@ def main() -> None:
     tau_p, onset, path = compute()
     slipping = (path.slip.values > 0.0).mean(axis=1)
     print(f"critical stress {onset.critical_stress.item() / 1e6:.4f} MPa, by")
-    print(f"{onset.slip_patches.item()} patches on {100 * slipping[-1]:.0f} % of the interface;")
+    print(
+        f"{onset.slip_patches.item()} patches on {100 * slipping[-1]:.0f} % of the interface;"
+    )
     print(f"certified to {onset.certificate_gap.item():.1e} Pa")
     draw(folder, tau_p, onset, path)
 

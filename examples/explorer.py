@@ -245,7 +245,9 @@ class Explorer:
         )
         self.sample = pn.widgets.IntSlider(name="sample shown", start=0, end=99, width=_WIDTH)
         self.words, self.doubts = pn.pane.HTML(""), pn.pane.Alert(visible=False)
-        self.profile, self.slip, self.density, self.tail = (ColumnDataSource() for _ in range(4))
+        self.profile, self.slip, self.density, self.tail = (
+            ColumnDataSource() for _ in range(4)
+        )
         self.place = ColumnDataSource({"x": [], "y": []})
         save = pn.widgets.FileDownload(
             callback=self._file, filename="study.toml", label="save as study", width=_WIDTH
@@ -347,7 +349,9 @@ class Explorer:
         wide.line(
             "x", "stress", source=self.profile, color=color(2), legend_label="shear stress now"
         )
-        wide.scatter("x", "y", source=self.place, color=ACCENT, size=10, legend_label="exact onset")
+        wide.scatter(
+            "x", "y", source=self.place, color=ACCENT, size=10, legend_label="exact onset"
+        )
         patches = figure(
             **options, x_range=wide.x_range, title="slip patches at this load",
             x_axis_label="position (mm)", y_axis_label="slip (\N{MICRO SIGN}m)",

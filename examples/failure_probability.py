@@ -9,7 +9,9 @@ import stiction as st
 problem = st.paper.problem(nodes=512)
 strength = st.paper.strength(problem, correlation_ratio=0.5)
 
-found = st.failure_probability(problem, strength, 0.664e6, method=st.Equilibrium(), target_cv=0.3)
+found = st.failure_probability(
+    problem, strength, 0.664e6, method=st.Equilibrium(), target_cv=0.3
+)
 print(found)
 again = st.failure_probability(
     problem, strength, 0.664e6, method=st.LocalCriterion(), target_cv=0.3

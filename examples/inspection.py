@@ -20,7 +20,9 @@ SHARES = {"a tenth": 0.1, "a third": 1 / 3, "all": 1.0}
 STRESS, NOISE = 0.68e6, 20e3  # Pa
 
 
-def probabilities(specimens: int = 40, samples: int = 1000) -> tuple[float, dict[str, np.ndarray]]:
+def probabilities(
+    specimens: int = 40, samples: int = 1000
+) -> tuple[float, dict[str, np.ndarray]]:
     """Return P of an unknown specimen, and of each one given a scan of each share."""
     problem = st.paper.problem(nodes=512)
     strength = st.paper.strength(problem, correlation_ratio=1.0)
@@ -50,13 +52,17 @@ def draw(before: float, after: dict[str, np.ndarray]):
         figure, axes = plt.subplots(figsize=(4.5, 3.0))
         rng = np.random.default_rng(0)
         for place, values in enumerate(after.values()):
-            axes.plot(place + rng.uniform(-0.2, 0.2, values.size), values, "o", ms=3, mfc="none")
+            axes.plot(
+                place + rng.uniform(-0.2, 0.2, values.size), values, "o", ms=3, mfc="none"
+            )
             axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color="k")
         axes.axhline(before, color="0.6", ls="--", lw=0.8)
         axes.text(2.45, before, "without a scan", ha="right", va="bottom", color="0.4")
         axes.set_xticks(range(len(after)), after)
         axes.set(
-            xlabel="scanned part of the interface", ylabel="failure probability", ylim=(-0.02, 1.02)
+            xlabel="scanned part of the interface",
+            ylabel="failure probability",
+            ylim=(-0.02, 1.02),
         )
     return figure
 

@@ -198,7 +198,9 @@ def rank_correlation(pairs: np.ndarray) -> float:
 def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> Estimate:
     """A statistic of independent rows, with the standard error from resampling them."""
     random = np.random.default_rng(0)
-    again = [statistic(rows[random.integers(len(rows), size=len(rows))]) for _ in range(resampled)]
+    again = [
+        statistic(rows[random.integers(len(rows), size=len(rows))]) for _ in range(resampled)
+    ]
     return Estimate(statistic(rows), float(np.std(again, ddof=1)))
 
 
@@ -256,7 +258,9 @@ def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate
             seen = mean(before) - mean(after)
             rows[name].append(seen.scaled(100.0 / reference))
             link = bootstrap(lambda v: v.mean() - weakest_link(v), before)
-            rows["link" if name == "exact" else "local link"].append(link.scaled(100.0 / reference))
+            rows["link" if name == "exact" else "local link"].append(
+                link.scaled(100.0 / reference)
+            )
     return rows
 
 
@@ -306,7 +310,9 @@ def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
     table("Samples with an arrested event, %", parts, lambda part, i: part["arrested, text"][i])
     table("Of these, sliding load over first instability, %", parts, plain("rise"))
     for kind, effect in effects.items():
-        table(f"Fall of the mean onset on a {kind} four times as large, %", effect, plain_estimate)
+        table(
+            f"Fall of the mean onset on a {kind} four times as large, %", effect, plain_estimate
+        )
         error = grid_error(found[f"{kind}, small"], found[f"{kind}, small, fine"])
         table(f"Change on a {kind} by half the spacing, %", error, plain_estimate)
     return "\n".join(lines)

@@ -86,8 +86,12 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
         for i, ratio in enumerate(ratios):
             values = np.sort(lowered[name].isel(ratio=i).values)
             above = 100.0 * (1.0 - np.arange(values.size) / values.size)
-            axes.step(values, above, where="pre", label=rf"$\xi_0/h_n = {ratio:g}$", **series(i))
-        axes.set(xscale="log", xlabel="lowered by more than (%)", xlim=(LEAST, 10.0), ylim=(0, 102))
+            axes.step(
+                values, above, where="pre", label=rf"$\xi_0/h_n = {ratio:g}$", **series(i)
+            )
+        axes.set(
+            xscale="log", xlabel="lowered by more than (%)", xlim=(LEAST, 10.0), ylim=(0, 102)
+        )
         axes.set_title(NAMES[name], pad=10)
         panel(axes, letter)
     panels[0].set_ylabel("share of the samples (%)")
@@ -111,7 +115,9 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
 def _against_ratio(axes: Axes, ratios: Any, cases: dict[str, list]) -> None:
     for name, estimates in cases.items():
         values, errors = ([getattr(e, key) for e in estimates] for key in ("value", "error"))
-        axes.errorbar(ratios, values, yerr=errors, label=NAMES[name], capsize=1.5, **STYLES[name])
+        axes.errorbar(
+            ratios, values, yerr=errors, label=NAMES[name], capsize=1.5, **STYLES[name]
+        )
     axes.set(xscale="log", xlabel=r"correlation length $\xi_0/h_n$")
     axes.set_xticks(ratios, [f"{ratio:g}" for ratio in ratios])
     axes.minorticks_off()
@@ -141,7 +147,10 @@ def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
     panels[1, 1].set(ylabel="fall of the mean onset (%)", ylim=(0, None))
     handles = [
         Line2D(
-            [], [], color=STYLES[f"{kind}, large"]["color"], label=f"{kind}, four times as large"
+            [],
+            [],
+            color=STYLES[f"{kind}, large"]["color"],
+            label=f"{kind}, four times as large",
         )
         for kind in effects
     ]
@@ -165,7 +174,9 @@ def patches(shown: dict) -> Figure:
 def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     axes = figure.subplots()
     ends = (-0.5 / case.nodes, case.size - 0.5 / case.nodes)
-    image = axes.imshow(tau_p.T * 1e-6, origin="lower", extent=ends * 2, cmap="Greys_r", vmin=0.55)
+    image = axes.imshow(
+        tau_p.T * 1e-6, origin="lower", extent=ends * 2, cmap="Greys_r", vmin=0.55
+    )
     figure.colorbar(image, ax=axes, location="bottom", label="strength (MPa)", shrink=0.8)
     at = np.arange(case.size * case.nodes) / case.nodes
     moves = (onset.slip.values > 0.0).astype(float)
@@ -202,5 +213,11 @@ def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
         axes.axhline(load, color=QUIET, linewidth=0.7)
         axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(low, high))
     axes.text(
-        window[1], load - 0.01, "stress at onset ", ha="right", va="top", color=QUIET, fontsize=7.5
+        window[1],
+        load - 0.01,
+        "stress at onset ",
+        ha="right",
+        va="top",
+        color=QUIET,
+        fontsize=7.5,
     )

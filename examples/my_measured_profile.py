@@ -25,5 +25,7 @@ profile = st.read_profile(Path("strength.csv"), interface=problem.interface, int
 for method in (st.LocalCriterion(), st.Equilibrium()):
     onset = st.onset(problem, profile, method=method).isel(sample=0)
     stress, place = float(onset.critical_stress), float(onset.critical_position)
-    print(f"{method.label}: slides at {stress / 1e6:.4f} MPa, beginning at {place * 1e3:.1f} mm")
+    print(
+        f"{method.label}: slides at {stress / 1e6:.4f} MPa, beginning at {place * 1e3:.1f} mm"
+    )
 st.plot.onset(st.onset(problem, profile, method=st.Equilibrium()), profile)

@@ -25,7 +25,11 @@ alike = power_law.with_efolding_length(own.efolding_length)
 onsets = {}
 for name, spectrum in {"machined": own, "power law": alike}.items():
     onsets[name] = st.monte_carlo(
-        problem, st.RandomField(marginal, spectrum), method=st.Equilibrium(), samples=300, seed=0
+        problem,
+        st.RandomField(marginal, spectrum),
+        method=st.Equilibrium(),
+        samples=300,
+        seed=0,
     ).critical_stress
     mean, spread = float(onsets[name].mean()), float(onsets[name].std())
     print(

@@ -41,7 +41,9 @@ def main(
         save=st.Save(every=4),
     )  # fmt: skip
     save(rupture(run, problem), folder / "rupture.png")
-    first, last = (1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3])
+    first, last = (
+        1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3]
+    )
     return first, last
 
 
@@ -80,7 +82,12 @@ def monte_carlo(
             )
             seen = estimate.value > 2e-3 * estimate.value.max()
             onset.fill_betweenx(
-                estimate.x[seen], 0, estimate.value[seen], color=color(i), alpha=0.18, linewidth=0
+                estimate.x[seen],
+                0,
+                estimate.value[seen],
+                color=color(i),
+                alpha=0.18,
+                linewidth=0,
             )
             label = rf"$\xi_0/h_\mathrm{{n}} = {ratio:g}$"
             onset.plot(estimate.value[seen], estimate.x[seen], label=label, **style)
@@ -121,4 +128,6 @@ def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
 
 if __name__ == "__main__":
     found = main(*sys.argv[1:2])
-    print("median critical stress: {:.4f} MPa at xi_0/h_n = 0.25, {:.4f} MPa at 2".format(*found))
+    print(
+        "median critical stress: {:.4f} MPa at xi_0/h_n = 0.25, {:.4f} MPa at 2".format(*found)
+    )

@@ -26,5 +26,7 @@ for length in result.correlation_length.values:
         result.critical_stress.sel(correlation_length=length), [0.05, 0.5, 0.95]
     )
     low, median, high = found.value / 1e6
-    print(f"xi_0 = {length * 1e3:.2f} mm: {median:.3f} MPa, 5 to 95 %: {low:.3f} to {high:.3f} MPa")
+    print(
+        f"xi_0 = {length * 1e3:.2f} mm: {median:.3f} MPa, 5 to 95 %: {low:.3f} to {high:.3f} MPa"
+    )
 st.plot.quantiles(result)

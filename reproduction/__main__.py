@@ -65,13 +65,17 @@ def main(arguments: list[str] | None = None) -> None:
         wanted = _wanted(options.figures)
         data = claims.Data(_compute(run, wanted), size)
         images = _draw(run, data, options.figures, out / "figures")
-    warned = sorted({str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning)})
+    warned = sorted(
+        {str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning)}
+    )
     if options.figures:
         run.say(f"figures in {out / 'figures'}")
         return
     rows = statements_onset.GROUPS | statements_rupture.GROUPS
     rows |= {"Which modulus": modulus.CLAIMS}
-    groups = {title: [claims.judge(claim, data) for claim in each] for title, each in rows.items()}
+    groups = {
+        title: [claims.judge(claim, data) for claim in each] for title, each in rows.items()
+    }
     claims.write_csv([found for each in groups.values() for found in each], out / "claims.csv")
     page.write(out / "report.html", data, groups, images, run, warned)
     run.say(f"done in {time.monotonic() - started:.0f} s: {out / 'report.html'}")
@@ -105,7 +109,11 @@ def _numbers(text: str) -> tuple[int, ...]:
 def _cores() -> int:
     import os
 
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return (
+        len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count() or 1
+    )
 
 
 def _wanted(figures) -> set[str]:

@@ -26,13 +26,21 @@ STYLES = {
     Verdict.OPEN: "open",
     Verdict.HOLDS: "holds",
 }
-_SYMBOLS = {"xi": "ξ", "tau": "τ", "nu": "\N{GREEK SMALL LETTER NU}", "delta": "δ", "lambda": "λ"}
+_SYMBOLS = {
+    "xi": "ξ",
+    "tau": "τ",
+    "nu": "\N{GREEK SMALL LETTER NU}",
+    "delta": "δ",
+    "lambda": "λ",
+}
 _NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
 
 
 def physics(text: str) -> Markup:
     """Return text as HTML, with symbols such as xi_0 and <tau_p> as they are printed."""
-    plain = str(escape(text)).replace("&lt;", "⟨").replace("&gt;", "⟩").replace("G*", "<i>G</i>*")
+    plain = (
+        str(escape(text)).replace("&lt;", "⟨").replace("&gt;", "⟩").replace("G*", "<i>G</i>*")
+    )
 
     def symbol(match: re.Match) -> str:
         name, index = match.groups()

@@ -33,7 +33,9 @@ class Rule:
     judge: Callable[[Sequence[Numbers]], Verdict]
 
     def __call__(self, series: Sequence[Numbers]) -> Verdict:
-        return self.judge(series) if series and all(len(row) for row in series) else Verdict.OPEN
+        return (
+            self.judge(series) if series and all(len(row) for row in series) else Verdict.OPEN
+        )
 
 
 def _range(number: Number) -> tuple[float, float]:

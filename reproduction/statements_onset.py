@@ -69,13 +69,17 @@ def _above_bound(value: Number) -> Number:
 def trend(d: Data, function, factor: float, mode: int = 0) -> list[tuple[float, Number]]:
     """Return a statistic of tau_cr over the wide range of correlation lengths."""
     study = d["trend"]["critical_stress"].sel(mean_mode=mode)
-    return [(float(r), function(study.sel(ratio=r).values) * factor) for r in study.ratio.values]
+    return [
+        (float(r), function(study.sel(ratio=r).values) * factor) for r in study.ratio.values
+    ]
 
 
 def _spreads(d: Data):
     wide = Series("median less lower quartile, L fixed", "kPa", trend(d, lower_spread, KPA))
     return wide, [
-        over_ratios("median less lower quartile", "kPa", lambda r: lower_spread(d.stress(r)) * KPA),
+        over_ratios(
+            "median less lower quartile", "kPa", lambda r: lower_spread(d.stress(r)) * KPA
+        ),
         over_ratios("standard deviation", "kPa", lambda r: deviation(d.stress(r)) * KPA),
         Series("standard deviation, L fixed", "kPa", trend(d, deviation, KPA)),
     ]
@@ -350,7 +354,9 @@ def _distances(d: Data) -> Series:
 def _by_dynamics(d: Data, function, label: str, unit: str) -> list[Series]:
     if "dynamic" not in d:
         return []
-    return [over_ratios(f"{label}, by ruptures", unit, lambda r: function(d.stress(r, "dynamic")))]
+    return [
+        over_ratios(f"{label}, by ruptures", unit, lambda r: function(d.stress(r, "dynamic")))
+    ]
 
 
 def dynamic_mean(d: Data, ratio: float) -> Number:

@@ -40,7 +40,8 @@ SLIGHT = below(0.05, "slightly: one sample in twenty")
 def _levels(d: Data, name: str) -> list[tuple[str, Number]]:
     study = d["growth"][name].sel(correlation_ratio=RATIOS[0])
     return [
-        (f"{level:g} tau_cr", mean(study.sel(level=level).values)) for level in (0.92, 0.96, 0.999)
+        (f"{level:g} tau_cr", mean(study.sel(level=level).values))
+        for level in (0.92, 0.96, 0.999)
     ]
 
 
@@ -271,7 +272,8 @@ def _lengths(d: Data, function, factor: float) -> list[tuple[str, Number]]:
     rows = d["length"]["critical_stress"].values
     extents = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8)
     return [
-        (f"{1e3 * x:g} mm", function(row) * factor) for x, row in zip(extents, rows, strict=True)
+        (f"{1e3 * x:g} mm", function(row) * factor)
+        for x, row in zip(extents, rows, strict=True)
     ]
 
 
@@ -395,7 +397,9 @@ CASES = {
 
 def shares(d: Data, name: str, chosen=None, *, inertia: bool = False) -> Series:
     """Return the share of samples with an arrested event at points of a what-if."""
-    label = "share with an arrested event, " + ("with inertia" if inertia else "without inertia")
+    label = "share with an arrested event, " + (
+        "with inertia" if inertia else "without inertia"
+    )
     if inertia:
         study = d[f"{name}-inertia"]["arrested_events"].values
         rows = list(zip(points(name), study, strict=True))
@@ -404,7 +408,9 @@ def shares(d: Data, name: str, chosen=None, *, inertia: bool = False) -> Series:
         study = d[name]["arrested_events"].values
         rows = [(i, study[i]) for i in range(len(study))]
     chosen = chosen or range(len(CASES[name]))
-    return Series(label, "", [(CASES[name][i], share(row > 0)) for i, row in rows if i in chosen])
+    return Series(
+        label, "", [(CASES[name][i], share(row > 0)) for i, row in rows if i in chosen]
+    )
 
 
 def _both(name: str, *chosen: int):

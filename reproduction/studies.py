@@ -100,7 +100,10 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
             name: ("sample", np.concatenate([each[name] for each in found]))
             for name in found[0] if name not in ("powers", "counts")
         }  # fmt: skip
-        part["powers"] = (("sample", "order"), np.concatenate([each["powers"] for each in found]))
+        part["powers"] = (
+            ("sample", "order"),
+            np.concatenate([each["powers"] for each in found]),
+        )
         part["counts"] = ("cell", sum(each["counts"] for each in found))
         parts.append(xr.Dataset(part))
     return along("correlation_ratio", RATIOS, parts)
@@ -262,7 +265,8 @@ def convergence(run: Runner, count: int) -> xr.Dataset:
     names = ("critical_stress", "critical_position", "offset")
     dims = ("case", "sample")
     return xr.Dataset(
-        {name: (dims, found[:, :, i]) for i, name in enumerate(names)}, coords={"case": list(cases)}
+        {name: (dims, found[:, :, i]) for i, name in enumerate(names)},
+        coords={"case": list(cases)},
     )
 
 
@@ -298,7 +302,9 @@ def window(run: Runner, samples: int) -> xr.Dataset:
         count = min(250, samples - first)
         friction = dataclasses.replace(fine.friction, weakening_rate=setting.W * factor)
         problem = dataclasses.replace(fine, friction=friction)
-        tau_p = strength(ratio).sample(fine.interface, samples=count, seed=run.seed, first=first)
+        tau_p = strength(ratio).sample(
+            fine.interface, samples=count, seed=run.seed, first=first
+        )
         tau_n = st.theory.nucleation_stress(problem, tau_p)
         return tau_n.min(axis=1), tau_p.min(axis=1)
 
@@ -684,7 +690,11 @@ def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
         {key: [values[i] for i in chosen] for key, values in axis.items()}
         for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
     ]
-    plain["method"] = {"type": "rupture", "loading_rate": setting.LOADING_RATE, "stop": "runaway"}
+    plain["method"] = {
+        "type": "rupture",
+        "loading_rate": setting.LOADING_RATE,
+        "stop": "runaway",
+    }
     plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
     return stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
 

@@ -123,7 +123,9 @@ def _range(d: Data) -> str:
 def _arrest(d: Data) -> str:
     rows = [(case, number) for name in ("wide_strength", "random_load", "random_residual")
             for case, number in shares(d, name, inertia=True).rows]  # fmt: skip
-    parts = ", ".join(f"{case}: {100 * n.value:.0f} ± {100 * n.error:.0f} %" for case, n in rows)
+    parts = ", ".join(
+        f"{case}: {100 * n.value:.0f} ± {100 * n.error:.0f} %" for case, n in rows
+    )
     few = "" if d.size.arrests >= 100 else (
         f" Only {d.size.arrests} ruptures each: 'python reproduction --full' takes 200."
     )  # fmt: skip
@@ -180,9 +182,7 @@ def _arrested_again(d: Data) -> str:
 
 def _rates(d: Data) -> str:
     parts = ", ".join(f"{case} the usual rate {rounded(n)} %" for case, n in rate_offsets(d))
-    return (
-        f"At {parts}: what separates a rupture from equilibrium is the loading rate, not inertia."
-    )
+    return f"At {parts}: what separates a rupture from equilibrium is the loading rate, not inertia."
 
 
 OURS = {

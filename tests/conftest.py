@@ -94,7 +94,9 @@ def make_strength(problem):
         return st.RandomField(
             marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
             spectrum=st.PowerLawSpectrum(
-                correlation_length=ratio * problem.nucleation_length, exponent=4.0, truncation=2.5
+                correlation_length=ratio * problem.nucleation_length,
+                exponent=4.0,
+                truncation=2.5,
             ),
             **options,
         )

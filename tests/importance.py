@@ -206,7 +206,9 @@ class Mixture:
         projected = self.projections(draws)
         square = float(self.shift @ self.shift)
         parts = [logsumexp(a * projected, axis=1) - 0.5 * a * a * square for a in self.sizes]
-        mixture: Array = logsumexp(np.stack(parts), axis=0) - np.log(self.nodes * len(self.sizes))
+        mixture: Array = logsumexp(np.stack(parts), axis=0) - np.log(
+            self.nodes * len(self.sizes)
+        )
         return -mixture
 
 
@@ -233,7 +235,9 @@ def by_importance(
     point = design_point(problem, field, stress)
     assert point.converged
     modes = field.modes(problem.interface)
-    mixture = Mixture(point.draws, problem.interface.shape, modes.numbers[:, 1:], field.mean_mode)
+    mixture = Mixture(
+        point.draws, problem.interface.shape, modes.numbers[:, 1:], field.mean_mode
+    )
     state = st.external.limit_state(problem, field, method, event=event)
     rng = np.random.default_rng((seed, 4))
     weights = np.empty(0)

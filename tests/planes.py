@@ -23,7 +23,9 @@ class Lattice(Plane):
         )
         k = np.hypot(first, second)
         k[0, 0] = 1.0
-        return 0.5 * self.shear_modulus * (first**2 / (1.0 - self.poisson_ratio) + second**2) / k
+        return (
+            0.5 * self.shear_modulus * (first**2 / (1.0 - self.poisson_ratio) + second**2) / k
+        )
 
 
 WAVENUMBERS = {"spectral": Plane, "lattice": Lattice}
@@ -32,5 +34,7 @@ WAVENUMBERS = {"spectral": Plane, "lattice": Lattice}
 def plane_sample(strength, residual, rate):
     """A sample on a plane under a uniform load, of (nx, ny) fields or numbers."""
     shape = np.shape(strength)
-    whole = (np.broadcast_to(given, shape).flatten() for given in (strength, residual, 1.0, rate))
+    whole = (
+        np.broadcast_to(given, shape).flatten() for given in (strength, residual, 1.0, rate)
+    )
     return make_sample(*whole, LINEAR)

@@ -53,7 +53,9 @@ def draw(folder: Path) -> None:
         names = ("work", "fracture_energy", "strain_energy", "radiated_energy")
         for letter, axes, run in zip("ab", figure.subplots(1, 2), runs, strict=True):
             for i, name in enumerate(names):
-                axes.plot(run["time"] * 1e6, run[name], label=name.replace("_", " "), **series(i))
+                axes.plot(
+                    run["time"] * 1e6, run[name], label=name.replace("_", " "), **series(i)
+                )
             axes.set_xlabel("$t$ (µs)")
             axes.set_ylabel("energy (J/m)")
             axes.legend(loc="upper left" if letter == "a" else (0.5, 0.5))

@@ -75,7 +75,9 @@ def truth_of(case: Case, noise: float) -> dict[str, float]:
         "noise": noise * deviation,
     }
     names = ("alpha", "beta", "mean", "cv")
-    return values | {f"marginal.{n}": getattr(marginal, n) for n in names if hasattr(marginal, n)}
+    return values | {
+        f"marginal.{n}": getattr(marginal, n) for n in names if hasattr(marginal, n)
+    }
 
 
 def record(case: Case, lengths: int, noise: float, seed: int) -> np.ndarray:

@@ -52,7 +52,9 @@ def compute(
             for i, (fine, critical) in enumerate(reference):
                 slip, stress = after_onset(nodes, ratio, i)
                 same = fine[:: grids[-1] // nodes]
-                errors.append((np.abs(slip - same).max() / fine.max(), abs(stress / critical - 1)))
+                errors.append(
+                    (np.abs(slip - same).max() / fine.max(), abs(stress / critical - 1))
+                )
             found[ratio, nodes] = np.array(errors).T
     return found
 

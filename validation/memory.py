@@ -77,7 +77,9 @@ def compute() -> dict[str, np.ndarray]:
     full = by_convolution(times)
     scale = full.max()
     found = {
-        f"exponentials, {tolerance:.0e}": np.abs(by_exponentials(tolerance)[1] - full).max(axis=1)
+        f"exponentials, {tolerance:.0e}": np.abs(by_exponentials(tolerance)[1] - full).max(
+            axis=1
+        )
         for tolerance in (1e-4, 1e-6)
     }
     found["history cut at 100"] = np.abs(by_convolution(times, 100.0) - full).max(axis=1)

@@ -84,7 +84,9 @@ def main():
     counts = [
         np.concatenate([s(s.draws(7, i, 1000)) for i in range(0, 40_000, 1000)]) for s in states
     ]
-    print("four times the length: P(L), P(4L) by 40,000 plain samples each, weakest link, subset")
+    print(
+        "four times the length: P(L), P(4L) by 40,000 plain samples each, weakest link, subset"
+    )
     for chance in (0.1, 0.01):
         stress = float(np.quantile(counts[0], chance))
         counted = float(np.mean(counts[1] < stress))

@@ -94,7 +94,9 @@ def main() -> None:
     """Print and draw."""
     errors = compute()
     for (steps, error), (_, next_error) in zip(errors, [*errors[1:], (0, np.nan)], strict=True):
-        print(f"{steps:5d} steps: error {error:.2e}, ratio to the next {error / next_error:.3f}")
+        print(
+            f"{steps:5d} steps: error {error:.2e}, ratio to the next {error / next_error:.3f}"
+        )
     draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), errors)
 
 

@@ -25,7 +25,9 @@ def peaks() -> list[tuple[float, float]]:
     rng = np.random.default_rng(15)
     found = []
     for length, nodes, tests in TESTS:
-        problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=length, nodes=nodes))
+        problem = dataclasses.replace(
+            PROBLEM, interface=st.Interface(length=length, nodes=nodes)
+        )
         onset = st.monte_carlo(
             problem, STRENGTH, method=st.Equilibrium(), samples=tests, seed=15, first=nodes
         )
@@ -36,7 +38,10 @@ def peaks() -> list[tuple[float, float]]:
 
 def main() -> None:
     """Write the table beside this script."""
-    lines = ["# synthetic: made by make_peaks.py, not measured", "test; length [mm]; peak [MPa]"]
+    lines = [
+        "# synthetic: made by make_peaks.py, not measured",
+        "test; length [mm]; peak [MPa]",
+    ]
     lines += [f"{i}; {length:g}; {peak:.4f}" for i, (length, peak) in enumerate(peaks(), 1)]
     path = Path(__file__).parent / "peaks.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -9,7 +9,18 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.claims import Data, Series
-from reproduction.figures.style import COLOURS, GREY, INK, RED, TAU_CR, XI, dots, letter, line, new
+from reproduction.figures.style import (
+    COLOURS,
+    GREY,
+    INK,
+    RED,
+    TAU_CR,
+    XI,
+    dots,
+    letter,
+    line,
+    new,
+)
 from reproduction.numbers_with_errors import deviation, mean
 from reproduction.setting import HIGH, MEAN, RATIOS, SIMULATED, H, L
 from reproduction.statements_rupture import arrested, shares
@@ -200,7 +211,9 @@ def figure_16(d: Data):
     skew.legend(title="mean, and its deviation", loc="upper right")
     for k, ratio in enumerate(SIMULATED):
         usual = d.what_if("exponent", "critical_stress", 4 * k + 2).mean()
-        rows = [d.what_if("exponent", "critical_stress", 4 * k + j) / usual - 1 for j in range(4)]
+        rows = [
+            d.what_if("exponent", "critical_stress", 4 * k + j) / usual - 1 for j in range(4)
+        ]
         spectrum.plot((1.5, 2, 4, 8), [100 * row.mean() for row in rows],
                       **{**dots(ratio), "linestyle": "-"}, ms=4, label=f"{ratio:g}")  # fmt: skip
     spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",

@@ -21,7 +21,17 @@ from reproduction.figures.style import (
     thin,
 )  # fmt: skip
 from reproduction.numbers_with_errors import mean, quantile
-from reproduction.setting import DEVIATION, HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, L, strength
+from reproduction.setting import (
+    DEVIATION,
+    HIGH,
+    LOW,
+    MEAN,
+    PROBLEM,
+    RATIOS,
+    SIMULATED,
+    L,
+    strength,
+)
 from reproduction.statements_onset import dynamic_mean
 
 

@@ -44,7 +44,9 @@ ONSET = (
 StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
-LoadingRate = Annotated[float, Option(help="Pa/s, of a rupture that the study does not describe.")]
+LoadingRate = Annotated[
+    float, Option(help="Pa/s, of a rupture that the study does not describe.")
+]
 
 
 # -- what commands share -------------------------------------------------------------------------
@@ -118,12 +120,14 @@ def run(
     out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
     workers: Workers = None,
     scheduler: Annotated[
-        str | None, Option(metavar="ADDRESS", help="Of a Dask scheduler, such as tcp://host:8786.")
+        str | None,
+        Option(metavar="ADDRESS", help="Of a Dask scheduler, such as tcp://host:8786."),
     ] = None,
     retry: Annotated[bool, Option("--retry", help="Compute failed samples again.")] = False,
     time_limit: Annotated[float | None, Option(help="Seconds; the rest is left.")] = None,
     part: Annotated[
-        str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
+        str | None,
+        Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN."),
     ] = None,
     pilot: Annotated[bool, Option(help="Compare with the exact onset.")] = True,
 ) -> None:
@@ -193,7 +197,9 @@ def status(run: RunPath) -> None:
     if study.sweep and not state.complete:
         each = study.ensemble.samples
         counts = zip(study.points, state.done_by_point, strict=True)
-        some = [f"{name_point(point)}: {done} of {each}" for point, done in counts if done < each]
+        some = [
+            f"{name_point(point)}: {done} of {each}" for point, done in counts if done < each
+        ]
         _show_some(some, "  ")
     if state.damaged:
         _show_some(state.damaged, "  damaged   ")
@@ -304,7 +310,9 @@ def _methods_that_apply(experiment: Any) -> dict[str, str]:
     from stiction.ensemble.pilot import compare, first_samples
     from stiction.methods import methods
 
-    local, exact, dynamic = (methods()[n] for n in ("local_criterion", "equilibrium", "rupture"))
+    local, exact, dynamic = (
+        methods()[n] for n in ("local_criterion", "equilibrium", "rupture")
+    )
     lines = {}
     for method, text in (
         (local(), "applies"),
@@ -454,10 +462,13 @@ def onset(
 @_with_reading
 def rupture(
     study: StudyFile,
-    out: Annotated[Path, Option(help="Folder of result and figures.")] = Path("stiction-rupture"),
+    out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
+        "stiction-rupture"
+    ),
     sample: Annotated[int, Option(min=0, help="Of the study's strength.")] = 0,
     strength: Annotated[
-        Path | None, Option(metavar="PROFILE", help="Instead of a sample; see `stiction onset`.")
+        Path | None,
+        Option(metavar="PROFILE", help="Instead of a sample; see `stiction onset`."),
     ] = None,
     loading_rate: LoadingRate = 2e7,
     film: Annotated[bool, Option("--film", help="Also a film, rupture.gif.")] = False,
@@ -576,7 +587,9 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[bool, Option("--version", callback=_print_version, is_eager=True)] = False,
+    version: Annotated[
+        bool, Option("--version", callback=_print_version, is_eager=True)
+    ] = False,
 ) -> None:
     pass
 

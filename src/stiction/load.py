@@ -190,15 +190,23 @@ class Load:
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         profile, pressure, problems = self.profile, self.normal_pressure, []
-        if not isinstance(profile, LoadShape) and not is_unplaced(profile) and np.min(profile) <= 0:
+        if (
+            not isinstance(profile, LoadShape)
+            and not is_unplaced(profile)
+            and np.min(profile) <= 0
+        ):
             problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
         if pressure is not None and not is_unplaced(pressure) and np.mean(pressure) <= 0.0:
             mean = np.mean(pressure)
-            problems.append(f"normal_pressure must be positive on average, its mean is {mean:g}")
+            problems.append(
+                f"normal_pressure must be positive on average, its mean is {mean:g}"
+            )
         if problems:
             raise InputError(problems)
         return self
 
     def profile_on(self, interface: Interface) -> Any:
         """p as a number, or at the nodes."""
-        return self.profile.on(interface) if isinstance(self.profile, LoadShape) else self.profile
+        return (
+            self.profile.on(interface) if isinstance(self.profile, LoadShape) else self.profile
+        )

@@ -170,7 +170,9 @@ def _check_values(
             problems.append(f"returns {name!r}, which is none of its variables")
         elif found.shape != shape and None not in shape:
             over = ", ".join(dims)
-            problems.append(f"returns {name!r} of shape {found.shape}, not {shape} over ({over})")
+            problems.append(
+                f"returns {name!r} of shape {found.shape}, not {shape} over ({over})"
+            )
     if problems:
         raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
 
@@ -186,7 +188,9 @@ def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Sho
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
-def variables_of(problem: Problem, method: Method, pressure: bool = False) -> dict[str, Variable]:
+def variables_of(
+    problem: Problem, method: Method, pressure: bool = False
+) -> dict[str, Variable]:
     """Return the variables of a prepared solver; `pressure`: if that differs by sample."""
     variables = dict(method.variables(problem))
     if pressure or problem.load.normal_pressure is not None:

@@ -267,7 +267,9 @@ def _parameters(owner: Any) -> dict[str, Any]:
     return dict.fromkeys(inspect.signature(owner).parameters) if owner else {}
 
 
-def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str], list[Any]]:
+def _walk(
+    owner: Any, location: tuple[int | str, ...]
+) -> tuple[list[str], list[str], list[Any]]:
     """Path as the user wrote it, the keys valid in its last-but-one step, models valid in the last.
 
     Pydantic numbers positional arguments and puts the chosen member of a union into the path.
@@ -286,7 +288,11 @@ def _walk(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[
         inside = _models_in(found.get(str(step)))
         if inside and number < len(location):
             owners = inside
-    return path, list(dict.fromkeys(name for one in owners for name in _parameters(one))), inside
+    return (
+        path,
+        list(dict.fromkeys(name for one in owners for name in _parameters(one))),
+        inside,
+    )
 
 
 def explain(
@@ -368,7 +374,9 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
-    decorate = pydantic_dataclass(frozen=True, eq=False, repr=False, kw_only=kw_only, config=config)
+    decorate = pydantic_dataclass(
+        frozen=True, eq=False, repr=False, kw_only=kw_only, config=config
+    )
     wrapped: Any = decorate(cls)
     validated_init = wrapped.__init__
 
@@ -448,14 +456,18 @@ def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> Non
 
 def _instances(annotation: Any) -> Any:
     """The annotation with model classes that take instances only."""
-    union = isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union
+    union = (
+        isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union
+    )
     members = typing.get_args(annotation) if union else (annotation,)
     classes = tuple(
         cls for cls in members if isinstance(cls, type) and dataclasses.is_dataclass(cls)
     )
     if not classes:
         return annotation
-    own = _must(_one_of(cls.__name__ for cls in classes), lambda value: isinstance(value, classes))
+    own = _must(
+        _one_of(cls.__name__ for cls in classes), lambda value: isinstance(value, classes)
+    )
     rest = (one for one in members if one not in classes)
     return typing.Union[(Annotated[Any, own], *rest)]
 

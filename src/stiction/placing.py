@@ -75,7 +75,9 @@ def place(
     for dim, n, length, offset in zip(
         interface.dims, shape, interface.lengths, offsets, strict=True
     ):
-        step = np.round(places[dim] / (length / n) - (offset if offset and not between else 0.0))
+        step = np.round(
+            places[dim] / (length / n) - (offset if offset and not between else 0.0)
+        )
         index.append(np.mod(step, n).astype(np.int64))
     node, first, twins = np.unique(
         np.ravel_multi_index(index, shape), return_index=True, return_inverse=True
@@ -168,7 +170,9 @@ def _elsewhere(
             )
     missing = int(np.isnan(points.values).sum())
     if missing and gaps == "refuse":
-        problems.append(f"{missing} points have no value (NaN); fill such gaps with gaps='fill'")
+        problems.append(
+            f"{missing} points have no value (NaN); fill such gaps with gaps='fill'"
+        )
     return problems
 
 
@@ -297,7 +301,9 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
         first = interface.describe_node(int(np.argmax(maps[row])))
         return f"are no values (NaN) at {count}, the first at {first}"
     spans = gaps_of(maps[row], interface)
-    at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in spans[:SHOWN])
+    at = ", ".join(
+        f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in spans[:SHOWN]
+    )
     more = f" and {len(spans) - SHOWN} more gaps" if len(spans) > SHOWN else ""
     return f"are no values (NaN) at x = {at}{more} ({count})"
 
@@ -319,7 +325,9 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Mask | None) -> xr.Dat
     ):
         if where.any():
             first = places[int(np.argmax(where))]
-            at = ", ".join(f"{d} = {v:.6g} m" for d, v in zip(interface.dims, first, strict=True))
+            at = ", ".join(
+                f"{d} = {v:.6g} m" for d, v in zip(interface.dims, first, strict=True)
+            )
             warn_accuracy(
                 f"{what.format(at)} a gap of the profile ({where.sum()} of {where.size} samples):"
                 " the strength there was filled in, not measured"
@@ -340,7 +348,9 @@ def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[f
         missing = ~maps[i]
         for axis, nodes in enumerate(interface.coordinates.values()):
             length = interface.lengths[axis]
-            apart = np.abs(np.mod(nodes - places[i, axis] + 0.5 * length, length) - 0.5 * length)
+            apart = np.abs(
+                np.mod(nodes - places[i, axis] + 0.5 * length, length) - 0.5 * length
+            )
             missing = np.compress(apart < (1.0 - 1e-9) * reach[axis], missing, axis=axis)
         found[i] = missing.any()
     return found

@@ -238,7 +238,9 @@ class Problem:
             )
         elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
             scale, value = self.friction.scale
-            rate = float(self.friction.rate(np.array(strength - residual), scale, np.median(value)))
+            rate = float(
+                self.friction.rate(np.array(strength - residual), scale, np.median(value))
+            )
             self._warn_if_short(max(rate, 1e-300))
 
     @property
@@ -395,7 +397,9 @@ class Problem:
                 )
         if too_few := self._too_few_nodes(steepest_rate(strength, residual, rates)):
             raise InputError(too_few)
-        profile = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=np.float64)
+        profile = np.array(
+            np.broadcast_to(self.load_profile, interface.shape), dtype=np.float64
+        )
         return Sample(strength, residual, rates, initial, profile, pressure)
 
     def _impossible(
@@ -433,7 +437,11 @@ class Problem:
 
 
 def profiles_of(
-    name: str, value: Any, interface: Interface, samples: int | None = None, infinite: bool = False
+    name: str,
+    value: Any,
+    interface: Interface,
+    samples: int | None = None,
+    infinite: bool = False,
 ) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError` naming it.
 

@@ -173,7 +173,10 @@ def simplified(value: Any, quantity: str) -> Any:
         plain = not value.dims and not hasattr(value, "data_vars")
         return _values(value, quantity, None, UNITS[quantity]) if plain else value
     index = getattr(value, "index", None)
-    if hasattr(value, "to_xarray") and getattr(getattr(index, "dtype", None), "kind", "") == "f":
+    if (
+        hasattr(value, "to_xarray")
+        and getattr(getattr(index, "dtype", None), "kind", "") == "f"
+    ):
         return value.to_xarray()
     return _magnitude(value, UNITS[quantity])
 
@@ -248,11 +251,15 @@ def points_of(
         measured = mask.values.astype(bool)
     units = {"x": x_unit}
     places = {
-        dim: _values(array[dim], dim, units.get(dim), "m") for dim in dims if dim in array.coords
+        dim: _values(array[dim], dim, units.get(dim), "m")
+        for dim in dims
+        if dim in array.coords
     }
     if places and "row" not in array.dims and len(dims) == 2:  # each point of a grid on its own
         if len(places) == 1:
-            raise InputError(f"has the coordinate {min(places)!r} only; a map has x and y, or none")
+            raise InputError(
+                f"has the coordinate {min(places)!r} only; a map has x and y, or none"
+            )
         grid = np.meshgrid(*places.values(), indexing="ij")
         places = {dim: at.ravel() for dim, at in zip(dims, grid, strict=True)}
         values = values.reshape(*values.shape[:-2], -1)
@@ -472,7 +479,9 @@ def on_nodes(name: str, given: Any, interface: Interface) -> Any:
             given = xr.DataArray.from_dict(dict(given))
             options = {key: given.attrs[key] for key in ("interpolate", "gaps")}
         except (ValueError, TypeError, KeyError, AttributeError):
-            raise InputError(f"{name}: a profile as a table has a file, in a study file") from None
+            raise InputError(
+                f"{name}: a profile as a table has a file, in a study file"
+            ) from None
     return np.asarray(at_nodes(name, given, quantity_of(name), interface, **options)[0])
 
 

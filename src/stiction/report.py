@@ -102,7 +102,12 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    names = ["critical_stress", "first_instability", "friction_coefficient", "critical_position"]
+    names = [
+        "critical_stress",
+        "first_instability",
+        "friction_coefficient",
+        "critical_position",
+    ]
     result = run.dataset(only=[*names, "arrested_events"])
     dims = [axis.dim for axis in run.study.axes]
     page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
@@ -112,11 +117,15 @@ def write_report(run: StoredRun, path: Path) -> None:
         page.text("The run is not complete.", warning=True)
     with paper_style():
         add_figures(page, result, dims)
-    add_tables(page, result, dims, [name for axis in run.study.axes for name in axis.coordinates])
+    add_tables(
+        page, result, dims, [name for axis in run.study.axes for name in axis.coordinates]
+    )
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
-    page.listing("The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict()))
+    page.listing(
+        "The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict())
+    )
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
     page.text(
         f"Computed with {'; '.join(state.versions)}; page written with stiction"
@@ -152,7 +161,8 @@ def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
         page.figure(
             figure,
             f"Median of the {what} with its 95 % confidence interval{fixed}; band: between"
-            " quartiles" + ("." if within else ", pale band: between the 5 % and 95 % quantiles."),
+            " quartiles"
+            + ("." if within else ", pale band: between the 5 % and 95 % quantiles."),
         )
 
 

@@ -47,7 +47,9 @@ DIRECTION = "direction"
 ONSET_VARIABLES: dict[str, Variable] = {
     "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
     "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
-    "first_instability": Variable("Pa", "mean interface stress when the first patch is unstable"),
+    "first_instability": Variable(
+        "Pa", "mean interface stress when the first patch is unstable"
+    ),
     "critical_position": Variable("m", "position of the critical patch"),
 }
 

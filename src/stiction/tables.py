@@ -48,7 +48,14 @@ def load(path: Path, dims: tuple[str, ...]) -> xr.Dataset | xr.DataArray:
                     if one.dtype.kind in "fiu" and one.squeeze().ndim == len(dims)
                 ]
                 return opened[kept].squeeze(drop=True).load()
-        except (OSError, ValueError, RuntimeError, KeyError, AttributeError, TypeError) as error:
+        except (
+            OSError,
+            ValueError,
+            RuntimeError,
+            KeyError,
+            AttributeError,
+            TypeError,
+        ) as error:
             raise InputError(f"is no NetCDF file of numbers: {error}") from None
     if ending != ".npy":
         raise InputError(
@@ -187,7 +194,9 @@ def _number(cell: str, separator: str) -> float | None:
         return None
 
 
-def _headings(header: list[tuple[int, list[str]]], width: int) -> list[tuple[str, dict[str, str]]]:
+def _headings(
+    header: list[tuple[int, list[str]]], width: int
+) -> list[tuple[str, dict[str, str]]]:
     """Name and attributes of each column."""
     if not header:
         return [(str(number), {}) for number in range(width)]
@@ -204,7 +213,9 @@ def _headings(header: list[tuple[int, list[str]]], width: int) -> list[tuple[str
         for number, cells in rows[1:]:
             below = cells[column].strip("()[]{} ")
             if below and unit:
-                raise InputError(f"line {number}: {describe(below)} is neither a number nor a unit")
+                raise InputError(
+                    f"line {number}: {describe(below)} is neither a number nor a unit"
+                )
             unit = unit or below
         found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
     return found

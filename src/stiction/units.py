@@ -25,7 +25,14 @@ _BASE = {
     "Pa": Unit(1.0, _STRESS),
     "bar": Unit(1e5, _STRESS),
 }
-_WORDS = {"meter": "m", "metre": "m", "second": "s", "newton": "N", "joule": "J", "pascal": "Pa"}
+_WORDS = {
+    "meter": "m",
+    "metre": "m",
+    "second": "s",
+    "newton": "N",
+    "joule": "J",
+    "pascal": "Pa",
+}
 _PREFIXES = {
     "": ("", 1.0), "T": ("tera", 1e12), "G": ("giga", 1e9), "M": ("mega", 1e6),
     "k": ("kilo", 1e3), "c": ("centi", 1e-2), "m": ("milli", 1e-3), "u": ("micro", 1e-6),

@@ -21,7 +21,9 @@ def rupture(nodes, steps):
         load=([0.0, 1.0], [7.5e5, 7.5e5]), stop="time", end_time=1.0, implicit=False,
         time_step=END / steps,
     )  # fmt: skip
-    run = make_run(method, problem.friction, method.medium(problem), problem.sample(strength), 0)
+    run = make_run(
+        method, problem.friction, method.medium(problem), problem.sample(strength), 0
+    )
     state = run.start(0.0)
     run.advance(state, steps)
     energy = radiated_energy(problem.friction, run.setting.nodes, run.medium.grid, state)

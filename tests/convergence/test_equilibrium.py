@@ -21,7 +21,9 @@ def relative_error(nodes_per_patch, periods):
     problem = st.Problem(solid, interface, friction)
     # The dip lies off the nodes, so that they do not share its symmetry.
     offset = (interface.x - 0.5 * interface.length + 0.3 * interface.spacing) / patch
-    onset = st.onset(problem, 1e6 - DEPTH * np.exp(-((offset / 2.0) ** 2)), method=Equilibrium())
+    onset = st.onset(
+        problem, 1e6 - DEPTH * np.exp(-((offset / 2.0) ** 2)), method=Equilibrium()
+    )
     t = (np.arange(4000) + 0.5) * np.pi / 4000.0
     measure = np.sin(t) * np.pi / 4000.0
     mean = np.sum(exact_weight().at(np.cos(t)) * np.exp(-((np.cos(t) / 4.0) ** 2)) * measure)

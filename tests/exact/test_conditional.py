@@ -125,7 +125,9 @@ def test_conditional_probabilities_average_to_the_unconditional_one():
 
 
 def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
-    residual = st.RandomField(st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6), FIELD.spectrum)
+    residual = st.RandomField(
+        st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6), FIELD.spectrum
+    )
     known = on_line(LINE.x[10:30], scan(LINE, LINE.x[None, 10:30]))
     random = st.RandomInterface(
         strength=FIELD.given(known, noise=2e3),
@@ -145,7 +147,9 @@ def test_variance_of_the_peak_is_that_within_and_between(within):
     """Without scatter within, the peak is the factor; with one value along it, the product."""
     problem = coarse()
     marginal = st.Lognormal(mean=1e6, cv=0.15 if within else 1e-4)
-    field = st.RandomField(marginal, st.PowerLawSpectrum(100.0 if within else 0.02), mean_mode=True)
+    field = st.RandomField(
+        marginal, st.PowerLawSpectrum(100.0 if within else 0.02), mean_mode=True
+    )
     random = st.RandomInterface(
         strength=field, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
     )

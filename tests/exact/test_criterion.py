@@ -114,7 +114,9 @@ def test_strength_that_cannot_break_is_refused_with_a_way_out(problem):
 def test_uniform_strength_lets_go_at_its_value(problem):
     result = st.onset(problem, np.full(256, 0.9e6), method=st.LocalCriterion())
     assert float(result.critical_load[0]) == pytest.approx(0.9e6, rel=1e-14)
-    rounded = st.onset(problem, np.full(256, 0.9e6), method=st.LocalCriterion(weights="rounded"))
+    rounded = st.onset(
+        problem, np.full(256, 0.9e6), method=st.LocalCriterion(weights="rounded")
+    )
     # 0.751 times the integral of the rounded eigenfunction is 0.751 pi/2 (0.925 - 0.077).
     factor = 0.751 * np.pi / 2.0 * (0.925 - 0.308 / 4.0)
     assert float(rounded.critical_load[0]) == pytest.approx(0.9e6 * factor, rel=1e-12)
@@ -315,7 +317,9 @@ def test_slip_of_a_critical_patch_of_parabolic_strength(dimension, eigenvalue):
     mass = (poly * measure * root**2) @ poly.T
     inverse = scipy.linalg.eigh(mass, 0.5 * (stiffness + stiffness.T), eigvals_only=True)[-1]
     assert 0.5 / inverse == pytest.approx(eigenvalue, rel=2e-5)
-    uniform, parabola = ((poly * measure * root) @ values for values in (np.ones_like(r), r * r))
+    uniform, parabola = (
+        (poly * measure * root) @ values for values in (np.ones_like(r), r * r)
+    )
     rim = np.array([eval_jacobi(k, 0.5, half - 1.0, 1.0) for k in n])
     system = np.block([[stiffness * inverse - mass, -uniform[:, None]], [rim[None], 0.0]])
     found = np.linalg.solve(system, np.append(-parabola, 0.0))[:-1]  # W slip

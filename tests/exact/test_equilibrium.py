@@ -59,7 +59,14 @@ def test_growing_factor_is_the_cholesky_factor(groups):
     size = 0
     for group in groups:
         size = append(
-            factor, size, members, nodes[size:].copy(), group, column, np.full(256, column[0]), 0.0
+            factor,
+            size,
+            members,
+            nodes[size:].copy(),
+            group,
+            column,
+            np.full(256, column[0]),
+            0.0,
         )
     reference = np.linalg.cholesky(matrix)
     rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(size)]
@@ -107,7 +114,14 @@ def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
     factor = np.empty(row_start(nodes + 4))
     members = np.empty(nodes + 4, dtype=np.int64)
     size = append(
-        factor, 0, members, np.arange(nodes), nodes, column, np.full(nodes, column[0] - rate), 0.0
+        factor,
+        0,
+        members,
+        np.arange(nodes),
+        nodes,
+        column,
+        np.full(nodes, column[0] - rate),
+        0.0,
     )
     assert size == width - 1
 
@@ -208,7 +222,9 @@ def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide,
     count = 0
     for strength in tau_p:
         plain = st.equilibrium_path(problem, strength, [0.0])
-        shifted = st.equilibrium_path(problem, {"strength": strength, "initial_stress": 5e4}, [0.0])
+        shifted = st.equilibrium_path(
+            problem, {"strength": strength, "initial_stress": 5e4}, [0.0]
+        )
         count += plain.sizes["event"]
         np.testing.assert_allclose(shifted["event_stress"], plain["event_stress"], rtol=1e-9)
         np.testing.assert_allclose(shifted["event_load"], plain["event_load"] - 5e4, rtol=1e-9)
@@ -242,7 +258,9 @@ def test_sensitivity_where_nodes_are_at_the_residual(wide):
 @pytest.fixture
 def humped(solid):
     """A line whose law falls more steeply beyond half of its slip, and smooth strengths."""
-    friction = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=8.6e10)
+    friction = st.PiecewiseWeakening(
+        slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=8.6e10
+    )
     problem = st.Problem(solid, st.Interface(0.1, 96), friction)
     field = st.RandomField(
         marginal=st.Lognormal(mean=1e6, cv=0.25),

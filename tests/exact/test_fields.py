@@ -56,13 +56,17 @@ def test_efolding_lengths():
     assert rough.efolding_length == pytest.approx(0.7, rel=3e-6)
     power = st.PowerLawSpectrum(correlation_length=0.7, exponent=2.0)
     again = power.with_efolding_length(0.2)
-    assert float(again.correlation(np.array([0.2]))[0]) == pytest.approx(np.exp(-1.0), rel=1e-12)
+    assert float(again.correlation(np.array([0.2]))[0]) == pytest.approx(
+        np.exp(-1.0), rel=1e-12
+    )
     assert again.exponent == 2.0
 
 
 def test_efolding_length_of_the_strength_is_where_its_correlation_is_one_over_e(make_strength):
     strength = make_strength(1.0).with_efolding_length(0.004, of="strength")
-    interface = st.Interface(length=0.4, nodes=4000)  # a node at 0.004 m; long, so nearly infinite
+    interface = st.Interface(
+        length=0.4, nodes=4000
+    )  # a node at 0.004 m; long, so nearly infinite
     at_length = strength.correlation(interface)[40]
     # Left over: truncation (3e-4 of the power) and the missing mean mode.
     assert at_length == pytest.approx(np.exp(-1.0), abs=2e-2)
@@ -401,4 +405,7 @@ def test_custom_spectra_with_steps_and_lines():
 def test_a_density_whose_integral_does_not_converge_is_refused():
     with pytest.raises(st.InputError, match=r"does not converge; give max_wavenumber"):
         st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k))
-    assert st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k), max_wavenumber=1e3).cutoff() == 1e3
+    assert (
+        st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k), max_wavenumber=1e3).cutoff()
+        == 1e3
+    )

@@ -92,7 +92,10 @@ def test_a_map_has_the_correlation_of_the_plane():
     rho = grid.correlation(grid.power(spectrum, 1.5))
     interface = st.Interface(length=(192 * 1e-4, 160 * 1.2e-4), nodes=(192, 160))
     field = st.RandomField(
-        st.Beta(alpha=2.0, beta=2.0, low=0.0, high=1.0), spectrum, mean_mode=True, anisotropy=1.5
+        st.Beta(alpha=2.0, beta=2.0, low=0.0, high=1.0),
+        spectrum,
+        mean_mode=True,
+        anisotropy=1.5,
     )
     expected = field.correlation(interface, of="z")
     # The truncation fades here and is sharp there: a per cent of the power lies beside it.

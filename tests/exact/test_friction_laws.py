@@ -61,7 +61,9 @@ def test_energy_is_the_area_under_the_law(law):
         assert energy[0] == pytest.approx(DROP * critical * area, rel=1e-11)
     assert float(law.area(100.0)) == pytest.approx(law.integral, rel=1e-14)
     assert float(law.fraction(law.slip_at(0.37))) == pytest.approx(0.37, rel=1e-14)
-    assert float(law.fraction(law.reach)) == pytest.approx(0.01 if law.type == "exponential" else 0)
+    assert float(law.fraction(law.reach)) == pytest.approx(
+        0.01 if law.type == "exponential" else 0
+    )
 
 
 def test_each_scale_means_the_same_law():
@@ -101,7 +103,9 @@ def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
     linear = dataclasses.replace(problem, friction=st.LinearWeakening(**scale))
     piece = dataclasses.replace(problem, friction=st.PiecewiseWeakening(**ONE_PIECE, **scale))
     tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=4)
-    wide = 0.4e6 + 3.0 * (tau_p - tau_p.min())  # the residual strength is reached, events arrest
+    wide = 0.4e6 + 3.0 * (
+        tau_p - tau_p.min()
+    )  # the residual strength is reached, events arrest
     for method, strength in (
         (st.Equilibrium(slip=True, sensitivity=True), wide),
         (st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4), tau_p[:1]),

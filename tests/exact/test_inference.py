@@ -62,7 +62,9 @@ PRESSED = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6))
 WAVE = 1.0 + 0.7 * np.cos(2.0 * np.pi * np.arange(256) / 256)
 UNEVEN = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6 * WAVE))
 COEFFICIENTS = st.RandomField(
-    st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6), STRENGTH.spectrum, of="friction_coefficient"
+    st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6),
+    STRENGTH.spectrum,
+    of="friction_coefficient",
 )
 
 SCALING = {
@@ -135,7 +137,8 @@ NOT_SCALING = {
     ),
     "load profile": (
         dataclasses.replace(
-            PROBLEM, load=st.Load(profile=1.0 + 0.3 * np.cos(2.0 * np.pi * np.arange(256) / 256))
+            PROBLEM,
+            load=st.Load(profile=1.0 + 0.3 * np.cos(2.0 * np.pi * np.arange(256) / 256)),
         ),
         STRENGTH,
         LOCAL,

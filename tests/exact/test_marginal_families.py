@@ -128,6 +128,8 @@ def test_parameters_that_shift_or_scale_are_declared(marginal):
     for name in marginal.affine:
         moved = dataclasses.replace(marginal, **{name: 1.1 * getattr(marginal, name)})
         c, d = moved.location_and_scale
-        np.testing.assert_allclose((moved.distribution.ppf([0.2, 0.9]) - c) / d, shape, rtol=1e-9)
+        np.testing.assert_allclose(
+            (moved.distribution.ppf([0.2, 0.9]) - c) / d, shape, rtol=1e-9
+        )
     bounded = isinstance(marginal, st.Beta)
     assert bool(marginal.affine) == (bounded or marginal.low == 0.0)

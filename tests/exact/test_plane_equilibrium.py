@@ -16,8 +16,13 @@ FRICTION = st.LinearWeakening(weakening_rate=RATE)
 @pytest.mark.parametrize("mode", ["II", "III"])
 def test_strength_along_one_axis_equals_the_line(solid, mode):
     nodes, across, length = 128, 8, 0.04
-    load = {"initial_stress": np.linspace(0.0, 2e5, nodes), "profile": np.linspace(1.0, 1.2, nodes)}
-    line = st.Problem(solid, st.Interface(length, nodes), FRICTION, load=st.Load(**load), mode=mode)
+    load = {
+        "initial_stress": np.linspace(0.0, 2e5, nodes),
+        "profile": np.linspace(1.0, 1.2, nodes),
+    }
+    line = st.Problem(
+        solid, st.Interface(length, nodes), FRICTION, load=st.Load(**load), mode=mode
+    )
     short = length / nodes * across
 
     def spread(profile):
@@ -25,7 +30,9 @@ def test_strength_along_one_axis_equals_the_line(solid, mode):
         return wide if mode == "II" else np.swapaxes(wide, -1, -2)
 
     shape = (
-        ((length, short), (nodes, across)) if mode == "II" else ((short, length), (across, nodes))
+        ((length, short), (nodes, across))
+        if mode == "II"
+        else ((short, length), (across, nodes))
     )
     plane = st.Problem(
         solid,
@@ -33,7 +40,9 @@ def test_strength_along_one_axis_equals_the_line(solid, mode):
         FRICTION,
         load=st.Load(**{name: spread(profile) for name, profile in load.items()}),
     )
-    tau_p = st.paper.strength(line, correlation_ratio=1.0).sample(line.interface, samples=3, seed=1)
+    tau_p = st.paper.strength(line, correlation_ratio=1.0).sample(
+        line.interface, samples=3, seed=1
+    )
     exact = st.onset(line, tau_p, method=st.Equilibrium(sensitivity=True))
     found = st.onset(
         plane, spread(tau_p), method=st.Equilibrium(gap=1e-10, sensitivity=True, slip=True)

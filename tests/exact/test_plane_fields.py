@@ -87,7 +87,8 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     wave = 2.0 * np.pi / 0.3
     k = np.array([0.0, 0.3, 1.0, 2.0]) * wave
     across = [
-        quad(lambda q, a=a: spectrum.density(np.hypot(a, q * wave), 2), 0.0, np.inf)[0] for a in k
+        quad(lambda q, a=a: spectrum.density(np.hypot(a, q * wave), 2), 0.0, np.inf)[0]
+        for a in k
     ]
     np.testing.assert_allclose(
         np.array(across) / across[0],
@@ -99,7 +100,9 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     inside = quad(lambda k: k * spectrum.density(k, 2), 0.0, cutoff, limit=200)[0]
     whole = inside + quad(lambda k: k * spectrum.density(k, 2), cutoff, np.inf, limit=200)[0]
     assert inside / whole == pytest.approx(spectrum.power_within(cutoff, 2), rel=1e-6)
-    assert inside / whole == pytest.approx(spectrum.power_kept or spectrum.default_power, rel=1e-6)
+    assert inside / whole == pytest.approx(
+        spectrum.power_kept or spectrum.default_power, rel=1e-6
+    )
 
 
 def test_own_spectrum_is_the_density_on_the_plane():
@@ -152,7 +155,9 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
         field_of(st.PowerLawSpectrum(correlation_length=0.25)),
         field_of(st.PowerLawSpectrum(correlation_length=0.25, truncation=1.5)),
         field_of(st.PowerLawSpectrum(correlation_length=0.25), anisotropy=2.5),
-        field_of(st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.8), mean_mode=True),
+        field_of(
+            st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.8), mean_mode=True
+        ),
     ]
     known = {}
     for field in fields:

@@ -110,6 +110,8 @@ def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
     # So wide a weak strip that the first node to slip is nearly unstable.
     wave = 1e6 + 1e5 * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)[:, None] * one
     # Views of any layout are taken.
-    found = plane_onset(plane, np.asfortranarray(wave), np.broadcast_to(1.0, one.shape), RATE * one)
+    found = plane_onset(
+        plane, np.asfortranarray(wave), np.broadcast_to(1.0, one.shape), RATE * one
+    )
     assert found.closed
     assert 0.9e6 < found.lower < 1e6

@@ -55,7 +55,9 @@ def test_bounds_follow_load_and_initial_stress():
     below = st.failure_probability(problem, field, 0.5499e6, method=st.LocalCriterion())
     assert below.lower_bound == pytest.approx(0.55e6, rel=1e-12)
     assert below.probability == 0.0
-    onset = st.onset(problem, field.sample(base.interface, samples=500), method=st.LocalCriterion())
+    onset = st.onset(
+        problem, field.sample(base.interface, samples=500), method=st.LocalCriterion()
+    )
     assert float(onset["critical_stress"].min()) > below.lower_bound
 
 
@@ -151,7 +153,9 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
     if most == 10**6:
         assert reported.max() <= target_cv
-    inside = [low <= chance <= high for low, high in (count.interval(0.95) for count, _ in counts)]
+    inside = [
+        low <= chance <= high for low, high in (count.interval(0.95) for count, _ in counts)
+    ]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
     assert all(count.samples <= evaluations <= most for count, evaluations in counts)
@@ -178,7 +182,13 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
     found = np.array(
         [
             st.failure_probability(
-                problem, field, stress, method=method, algorithm=algorithm, target_cv=0.3, seed=i
+                problem,
+                field,
+                stress,
+                method=method,
+                algorithm=algorithm,
+                target_cv=0.3,
+                seed=i,
             ).probability
             for i in range(150)
         ]
@@ -209,7 +219,9 @@ class KnownRun:
 
 
 def test_runs_are_pooled_by_their_size():
-    tail = Tail([KnownRun(1000, 1e-3, 0.04), KnownRun(3000, 2e-3, 0.01), KnownRun(1000, 0.0, 9.0)])
+    tail = Tail(
+        [KnownRun(1000, 1e-3, 0.04), KnownRun(3000, 2e-3, 0.01), KnownRun(1000, 0.0, 9.0)]
+    )
     assert tail.probability(1.0) == pytest.approx(0.2 * 1e-3 + 0.6 * 2e-3)
     # Standard errors of the parts: 0.2 * 1e-3 * 0.2 and 0.6 * 2e-3 * 0.1; nothing seen adds none.
     error = math.hypot(0.4e-4, 1.2e-4)

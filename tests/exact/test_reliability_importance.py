@@ -33,9 +33,9 @@ def test_design_point_of_a_gaussian_strength_is_exact(system, mean_mode):
 def test_design_point_lies_on_the_limit_and_nowhere_nearer(system):
     field = st.paper.strength(system, 0.5)
     point = design_point(system, field, 0.67e6)
-    tau = st.theory.nucleation_stress(system, field.profiles(system.interface, point.draws[None]))[
-        0
-    ]
+    tau = st.theory.nucleation_stress(
+        system, field.profiles(system.interface, point.draws[None])
+    )[0]
     assert tau[0] == pytest.approx(0.67e6, abs=1.0)
     assert np.argmin(tau) == 0
     # Random neighbours at a distance closer to the origin do not fail at x = 0.

@@ -44,7 +44,9 @@ def small_chunks(monkeypatch):
     """Chunks of a few samples at once, which are joined soon."""
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
     monkeypatch.setattr(store, "MANY", 4)
-    monkeypatch.setattr(batches, "piece_size", lambda experiment, span, *rest: min(7, span.samples))
+    monkeypatch.setattr(
+        batches, "piece_size", lambda experiment, span, *rest: min(7, span.samples)
+    )
 
 
 def write(folder):

@@ -126,7 +126,9 @@ def mutation(chance: random.Random) -> tuple[str, bytes]:
             elif kind == 2:
                 data[place:place] = bytes(data[: chance.randint(1, 80)])
             else:
-                data[place:place] = chance.choice((b"[" * 2000, b"\xff", b"9" * 400, b"\n", b'"""'))
+                data[place:place] = chance.choice(
+                    (b"[" * 2000, b"\xff", b"9" * 400, b"\n", b'"""')
+                )
         return "bytes", bytes(data)
     tree = tomllib.loads(STUDY)
     texts = [_mutated_tree(tree, chance) for _ in range(chance.choice((1, 1, 1, 2, 3)))]

@@ -20,7 +20,9 @@ def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes,
     )
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
     half = problem.nucleation_length / 2.0
-    t = (np.arange(400) + 0.5) * np.pi / 400.0  # midpoint rule in the angle: spectrally accurate
+    t = (
+        (np.arange(400) + 0.5) * np.pi / 400.0
+    )  # midpoint rule in the angle: spectrally accurate
     s, measure = np.cos(t), np.sin(t) * np.pi / 400.0
     spectrum = np.fft.rfft(tau_p, axis=1) / nodes
     spectrum[:, 1:-1] *= 2.0
@@ -56,7 +58,9 @@ def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, la
     assert np.all(found >= tau_p.min(axis=1))
     # A fine spacing off by half costs (dx/2)^2/2 times the curvature at most.
     at = np.arange(512), fine.argmin(axis=1)
-    curvature = fine[at[0], at[1] - 1] + fine[at[0], (at[1] + 1) % (16 * nodes)] - 2.0 * fine[at]
+    curvature = (
+        fine[at[0], at[1] - 1] + fine[at[0], (at[1] + 1) % (16 * nodes)] - 2.0 * fine[at]
+    )
     error = (found - (fine[at] - 0.0625 * curvature)) / 0.2e6
     allowed = 0.0625 * curvature / 0.2e6
     assert np.sqrt(np.mean(np.maximum(np.abs(error) - allowed, 0.0) ** 2)) < rms

@@ -33,7 +33,9 @@ def direct_convolution(run, start, steps):
                 np.r_[0.0, dynamic * (lag + weights[0] * mean_hat) - static * slip_hat], n
             )
             limit = np.maximum(nodes.strength - nodes.weakening * fresh, nodes.residual)
-            return fresh, np.maximum(stress + load * nodes.profile + nodes.initial - limit, 0.0) / z
+            return fresh, np.maximum(
+                stress + load * nodes.profile + nodes.initial - limit, 0.0
+            ) / z
 
         _, guess = moved(rate)
         mean = 0.5 * (rate + guess)

@@ -134,7 +134,9 @@ def test_an_arrested_event_is_the_one_that_equilibrium_finds():
     exact = st.onset(problem, tau_p, method=st.Equilibrium())
     found = Rupture(loading_rate=1e5).prepare(problem)(problem.sample(tau_p))
     assert found["arrested_events"] == exact["arrested_events"].values == 1
-    assert found["first_instability"] == pytest.approx(exact["first_instability"].values, rel=5e-6)
+    assert found["first_instability"] == pytest.approx(
+        exact["first_instability"].values, rel=5e-6
+    )
     # The arrested rupture overshoots its least equilibrium: 3e-5 lower seen for the second onset.
     assert found["critical_stress"] == pytest.approx(exact["critical_stress"].values, rel=2e-4)
     assert found["first_instability"][0] < 0.96 * found["critical_stress"][0]

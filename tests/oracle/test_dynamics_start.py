@@ -28,7 +28,8 @@ def both(problem, tau_p, **options):
     """Onsets from the equilibrium and from rest."""
     rows = problem.sample(tau_p)
     return [
-        Rupture(start=start, **options).prepare(problem)(rows) for start in ("equilibrium", "rest")
+        Rupture(start=start, **options).prepare(problem)(rows)
+        for start in ("equilibrium", "rest")
     ]
 
 
@@ -166,7 +167,9 @@ def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits(problem):
     other = st.Problem(
         problem.solid,
         interface,
-        st.LinearWeakening(weakening_rate=4e11 + 5e10 * wave, residual_strength=1e5 + 2e4 * wave),
+        st.LinearWeakening(
+            weakening_rate=4e11 + 5e10 * wave, residual_strength=1e5 + 2e4 * wave
+        ),
         st.Load(profile=1.0 + 0.1 * np.roll(wave, 40), initial_stress=2e4 * np.roll(wave, 90)),
     )
     rng = np.random.default_rng(7)

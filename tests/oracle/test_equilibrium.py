@@ -133,7 +133,9 @@ def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
 def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, rough):
     x = np.arange(2048) / 2048
     rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
-    problem = st.Problem(solid, st.Interface(0.2, 2048), st.LinearWeakening(weakening_rate=rate))
+    problem = st.Problem(
+        solid, st.Interface(0.2, 2048), st.LinearWeakening(weakening_rate=rate)
+    )
     program = LineProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     for row in range(4):
@@ -152,7 +154,9 @@ def test_conjugate_gradients_agree_with_the_dense_factor(solid, make_strength, r
 
 def test_onset_of_a_long_line(solid, make_strength):
     """Certified, and with the quick test for arrest, as shorter lines are."""
-    problem = st.Problem(solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
     onset = st.onset(problem, tau_p, method=Equilibrium(sensitivity=True))
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
@@ -204,7 +208,9 @@ def test_events_against_relaxation(problem, low, high):
 
 def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
     """Most samples slide at the first instability; the few that do not are not an artefact."""
-    problem = st.Problem(solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
     onset = st.onset(problem, tau_p, method=Equilibrium())
     arrested = np.flatnonzero(onset.arrested_events.values)
@@ -224,7 +230,9 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
     # Slip is steep in the load just before the event: 1e-12 of the load counts.
     assert event.event_moment.item() == pytest.approx(moment, rel=1e-2)
     assert added.max() / 5 < event.event_mean_slip.item() < added.max()
-    share = event.event_mean_slip * event.event_length * solid.shear_modulus / event.event_moment
+    share = (
+        event.event_mean_slip * event.event_length * solid.shear_modulus / event.event_moment
+    )
     assert 0.9 < share.item() <= 1.0  # the patch has most of the moment
     events = st.onset(problem, tau_p, method=Equilibrium(events=8))
     count = np.isfinite(events.event_stress).sum("event")
@@ -252,7 +260,9 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
 
 def test_window_of_a_long_interface_decides_arrest_like_the_whole(solid):
     """With everything outside a window fixed, and without: the same outcome, twice each."""
-    problem = st.Problem(solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=2.6e6),
         spectrum=st.PowerLawSpectrum(
@@ -291,7 +301,9 @@ def test_nodes_that_do_not_weaken(problem, solid, make_strength, law):
     problem = st.Problem(solid, problem.interface, friction)
     constant = tau_p <= 0.8e6
     assert constant.any(axis=1).all()
-    with pytest.warns(st.AccuracyWarning, match=f"{100.0 * constant.mean():.2g} % of the nodes"):
+    with pytest.warns(
+        st.AccuracyWarning, match=f"{100.0 * constant.mean():.2g} % of the nodes"
+    ):
         onset = st.onset(problem, tau_p, method=Equilibrium())
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
     for row, profile in enumerate(tau_p):
@@ -324,7 +336,9 @@ def test_estimated_error_is_of_the_size_of_the_error(solid):
     """Against the same fields on a grid eight times as fine."""
     fine, friction = st.Interface(0.1, 2048), st.LinearWeakening(weakening_rate=0.5e12)
     reference = st.Problem(solid, fine, friction)
-    tau_p = st.paper.strength(reference, correlation_ratio=0.25).sample(fine, samples=40, seed=3)
+    tau_p = st.paper.strength(reference, correlation_ratio=0.25).sample(
+        fine, samples=40, seed=3
+    )
     exact = st.onset(reference, tau_p, method=Equilibrium()).first_instability.values
     for nodes, resolves in ((256, 8.8), (512, 17.7)):
         problem = st.Problem(solid, st.Interface(0.1, nodes), friction)
@@ -334,7 +348,9 @@ def test_estimated_error_is_of_the_size_of_the_error(solid):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", st.AccuracyWarning)
             onset = st.onset(
-                problem, tau_p[:, :: 2048 // nodes], method=Equilibrium(discretization_error=True)
+                problem,
+                tau_p[:, :: 2048 // nodes],
+                method=Equilibrium(discretization_error=True),
             )
         error = np.abs(onset.first_instability.values - exact)
         estimate = onset.discretization_error.values
@@ -347,7 +363,9 @@ def test_estimated_error_is_of_the_size_of_the_error(solid):
 @pytest.mark.parametrize("high", [1.66e6, 2.66e6])
 def test_sliding_is_proved(solid, high):
     """Without any length taken for unstoppable, the same loads and events."""
-    problem = st.Problem(solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=high),
         spectrum=st.PowerLawSpectrum(

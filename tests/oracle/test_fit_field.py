@@ -68,7 +68,9 @@ def test_lengths_are_translated_as_the_page_says(exponent):
     ours = st.PowerLawSpectrum(2e-3, exponent, power_kept=0.9)
     length = np.sqrt(exponent - 0.5) * 2e-3 / (2.0 * np.pi)
     matern = gstools.Matern(dim=1, nu=exponent - 0.5, len_scale=length)
-    np.testing.assert_allclose(matern.correlation(x), ours.untruncated_correlation(x), atol=1e-12)
+    np.testing.assert_allclose(
+        matern.correlation(x), ours.untruncated_correlation(x), atol=1e-12
+    )
     gaussian = gstools.Gaussian(dim=1, len_scale=0.5 * np.sqrt(np.pi) * 2e-3)
     squared = st.SquaredExponentialSpectrum(2e-3)
     np.testing.assert_allclose(gaussian.correlation(x), squared.untruncated_correlation(x))
@@ -88,7 +90,12 @@ def test_correlation_length_against_a_variogram():
     values = truth.sample(interface, seed=4)[0, :4000]
     piece = st.Interface(length=0.4, nodes=4000)
     fit = st.fit_field(
-        values, piece, marginal="lognormal", spectrum="exponential", bootstrap=20, progress=False
+        values,
+        piece,
+        marginal="lognormal",
+        spectrum="exponential",
+        bootstrap=20,
+        progress=False,
     )
     bins = np.arange(0.0, 3.0, 0.1)  # mm, MPa: its search begins at numbers about one
     centres, gamma = gstools.vario_estimate(1e3 * piece.x, 1e-6 * values, bins)

@@ -18,7 +18,10 @@ LAWS = {
         st.ExponentialWeakening(weakening_rate=0.5e12, residual_strength=0.2e6), 8
     ),
     "uniform critical slip": st.PiecewiseWeakening(
-        slip=[0.3, 0.6, 1.0], strength=[0.5, 0.2, 0.0], critical_slip=8e-6, residual_strength=0.2e6
+        slip=[0.3, 0.6, 1.0],
+        strength=[0.5, 0.2, 0.0],
+        critical_slip=8e-6,
+        residual_strength=0.2e6,
     ),
     "steepening": st.PiecewiseWeakening(
         slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=0.25e12, residual_strength=0.2e6

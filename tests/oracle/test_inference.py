@@ -25,7 +25,9 @@ def problem(nodes=NODES, share=0.1, residual_ratio=None, **load):
 
 
 def beta(low, high, of=None):
-    return st.RandomField(st.Beta(alpha=2.0, beta=3.0, low=low, high=high), SPECTRUM, True, of=of)
+    return st.RandomField(
+        st.Beta(alpha=2.0, beta=3.0, low=low, high=high), SPECTRUM, True, of=of
+    )
 
 
 def lognormal(cv):
@@ -64,7 +66,13 @@ def by_counting(base, field, method, values, peaks, samples):
     found = np.empty(values.size)
     for i, value in enumerate(values):
         simulated = st.monte_carlo(
-            base, field(value), method=method, samples=samples, seed=99, progress=False, pilot=False
+            base,
+            field(value),
+            method=method,
+            samples=samples,
+            seed=99,
+            progress=False,
+            pilot=False,
         ).critical_stress.values
         kernels = scipy.stats.gaussian_kde(simulated, "silverman")
         found[i] = kernels.logpdf(peaks).sum()
@@ -103,7 +111,10 @@ def test_posterior_of_one_parameter(name):
     assert own.std() == pytest.approx(deviation, rel=0.4)
     # The box that was simulated holds it.
     model = found.likelihood.model
-    for end, side in ((model.low[0], found.u[:, 0]), (1.0 - model.high[0], 1.0 - found.u[:, 0])):
+    for end, side in (
+        (model.low[0], found.u[:, 0]),
+        (1.0 - model.high[0], 1.0 - found.u[:, 0]),
+    ):
         assert end == 0.0 or np.mean(side < end + 0.05 * (model.high - model.low)[0]) < 2e-3
 
 

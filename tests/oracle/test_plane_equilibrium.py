@@ -89,7 +89,9 @@ def by_relaxation(problem, sample, load, slip, limit=60_000):
     critical = (sample.strength - sample.residual_strength)[0] / RATE
     for _ in range(limit):
         stress = load - np.fft.irfft2(symbol * np.fft.rfft2(slip), interface.shape)
-        drive = stress - np.maximum(sample.strength[0] - RATE * slip, sample.residual_strength[0])
+        drive = stress - np.maximum(
+            sample.strength[0] - RATE * slip, sample.residual_strength[0]
+        )
         if drive.max() < 1e-8 * sample.strength.mean():
             return slip
         if (slip > critical).all():
@@ -108,7 +110,9 @@ def wide():
         st.Interface((5.0 * LENGTH, 5.0 * LENGTH), shape),
         st.LinearWeakening(weakening_rate=RATE, residual_strength=3.5e5),
     )
-    strength = [0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(s), shape) for s in (20, 23, 0)]
+    strength = [
+        0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(s), shape) for s in (20, 23, 0)
+    ]
     return problem, np.array(strength)
 
 
@@ -135,7 +139,9 @@ def test_arrest_equals_relaxation_node_by_node(wide):
             # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
             assert np.abs(ours - slip).max() < 1e-4 * 9e-6
         assert by_relaxation(problem, sample, loads[3], slip) is None
-        around = st.equilibrium_path(problem, strength[number], first * (1 + np.r_[-1e-7, 3e-6]))
+        around = st.equilibrium_path(
+            problem, strength[number], first * (1 + np.r_[-1e-7, 3e-6])
+        )
         moved = np.diff(around["slip"].values, axis=0)
         moment = problem.solid.shear_modulus * moved.sum() * problem.interface.cell
         # Slip goes with the root of the distance to the instability, and this jump is a short one.

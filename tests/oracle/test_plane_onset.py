@@ -24,7 +24,8 @@ def smooth_noise(shape, correlation, rng):
     """Field between 0 and 1 with a correlation length given in nodes."""
     kx, ky = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :]
     filtered = np.fft.irfft2(
-        np.fft.rfft2(rng.standard_normal(shape)) * np.exp(-((correlation * np.hypot(kx, ky)) ** 2)),
+        np.fft.rfft2(rng.standard_normal(shape))
+        * np.exp(-((correlation * np.hypot(kx, ky)) ** 2)),
         shape,
     )
     return (filtered - filtered.min()) / np.ptp(filtered)
@@ -33,7 +34,9 @@ def smooth_noise(shape, correlation, rng):
 def dense_stiffness(plane, shape):
     """K as a matrix, from its first column."""
     column = np.fft.irfft2(plane.symbol(shape), shape)
-    rows = [np.roll(column, np.unravel_index(i, shape), (0, 1)).ravel() for i in range(column.size)]
+    rows = [
+        np.roll(column, np.unravel_index(i, shape), (0, 1)).ravel() for i in range(column.size)
+    ]
     return np.array(rows)
 
 
@@ -116,7 +119,9 @@ def program(solid):
     """Equilibria of a small plane on a lattice."""
     length = 5.0 * LENGTH
     friction = st.LinearWeakening(weakening_rate=RATE)
-    fine = st.Interface((length, length), (40, 40))  # a problem may not have as few nodes as SHAPE
+    fine = st.Interface(
+        (length, length), (40, 40)
+    )  # a problem may not have as few nodes as SHAPE
     found = PlaneProgram(st.Problem(solid, fine, friction))
     found.plane, found.shape = Lattice((length, length), 1e9, 0.33), SHAPE
     return found

@@ -28,13 +28,19 @@ def onsets(nodes, lengths, ratio, samples):
 def test_first_instability_at_a_slow_rate_is_the_exact_equilibrium_onset(ratio):
     exact, slow = onsets(48, 5, ratio, 2)
     # Equilibrium brackets to 1e-6; inertia at 1e4 Pa/s and the sizes of implicit steps leave less.
-    assert slow.first_instability.values == pytest.approx(exact.first_instability.values, rel=1e-5)
+    assert slow.first_instability.values == pytest.approx(
+        exact.first_instability.values, rel=1e-5
+    )
     apart = np.abs(slow.critical_position - exact.critical_position).max(axis=1).values
-    assert np.all((apart < H_N) | (apart > 4.0 * H_N))  # the same patch, perhaps around the period
+    assert np.all(
+        (apart < H_N) | (apart > 4.0 * H_N)
+    )  # the same patch, perhaps around the period
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_twenty_samples_agree():
     exact, slow = onsets(80, 8, 0.5, 20)
-    assert slow.first_instability.values == pytest.approx(exact.first_instability.values, rel=1e-5)
+    assert slow.first_instability.values == pytest.approx(
+        exact.first_instability.values, rel=1e-5
+    )

@@ -13,7 +13,9 @@ EXPECTED = {0.25: (4.1e3, 27.0), 0.5: (1.5e3, 9.0), 1.0: (0.3e3, 2.8), 2.0: (0.0
 
 
 def compare(solid, ratio, samples):
-    problem = st.Problem(solid, st.Interface(0.1, 1024), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.1, 1024), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     strength = st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
         spectrum=st.PowerLawSpectrum(

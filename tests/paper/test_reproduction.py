@@ -102,7 +102,9 @@ def test_only_public_names_are_used():
             if isinstance(node, ast.ImportFrom):
                 assert not (node.module or "").startswith("stiction"), path
             if isinstance(node, ast.Import):
-                assert all(a.name == "stiction" for a in node.names if "stiction" in a.name), path
+                assert all(a.name == "stiction" for a in node.names if "stiction" in a.name), (
+                    path
+                )
             if not (isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)):
                 continue
             if node.value.id == "st":
@@ -195,7 +197,12 @@ def test_the_main_results_stand_and_the_bound_holds_in_every_sample(pipeline):
     out, _ = pipeline
     with (out / "claims.csv").open(encoding="utf-8") as file:
         verdicts = {row["claim"]: row["verdict"] for row in csv.DictReader(file)}
-    for name in ("lower-friction", "good-prediction", "interaction-suffices", "neighbours-lower"):
+    for name in (
+        "lower-friction",
+        "good-prediction",
+        "interaction-suffices",
+        "neighbours-lower",
+    ):
         assert verdicts[name] == HOLDS.value, name
     assert verdicts["effective-modulus"] == FAILS.value
     page = (out / "report.html").read_text(encoding="utf-8")

@@ -61,7 +61,9 @@ def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
 @given(seed=some.integers(0, 10_000), shift=some.integers(1, NODES - 1))
 def test_onset_moves_with_the_profile_and_mirrors_with_it(seed, shift):
     profile = strength(seed)
-    rows = PROBLEM.sample(np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)]))
+    rows = PROBLEM.sample(
+        np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)])
+    )
     found = METHOD.prepare(PROBLEM)(rows)
     loads = found["critical_stress"]
     # Step sizes are chosen by thresholds, which round-off may tip: the accuracy of the method.

@@ -76,7 +76,9 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
         assert values.tobytes() == whole[name][first : first + samples].tobytes()
 
 
-@given(samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9))
+@given(
+    samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9)
+)
 def test_batches_cover_all_samples_once(samples, size, first):
     problem = st.paper.problem(nodes=256)
     experiment = Experiment(problem, st.paper.strength(problem), st.LocalCriterion())

@@ -83,7 +83,9 @@ def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
     # The strength is far above the residual one here: floors would make it neither.
     high = 50e6
     three = np.array([tau_p, other, weight * tau_p + (1.0 - weight) * other]) + high
-    first = solve(problem, three).first_instability.values - high * np.mean(problem.load.profile)
+    first = solve(problem, three).first_instability.values - high * np.mean(
+        problem.load.profile
+    )
     if not np.ptp(problem.load.profile):
         # 1e-12 of 50 MPa is round-off.
         assert first[2] >= weight * first[0] + (1.0 - weight) * first[1] - 5e-5
@@ -145,7 +147,9 @@ def test_results_do_not_depend_on_the_batch():
     together = st.onset(problem, {"strength": tau_p, "weakening_rate": rates}, method=METHOD)
     for row in (0, 1, 5, 23):
         alone = st.onset(
-            problem, {"strength": tau_p[row], "weakening_rate": rates[row : row + 1]}, method=METHOD
+            problem,
+            {"strength": tau_p[row], "weakening_rate": rates[row : row + 1]},
+            method=METHOD,
         )
         for name in together.data_vars:
             np.testing.assert_array_equal(alone[name].values[0], together[name].values[row])

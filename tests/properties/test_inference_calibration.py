@@ -29,7 +29,9 @@ def test_more_tests_find_the_truth():
     """The lower bound, which the peaks see; 16 times the tests, a good half of the error."""
     errors = []
     for tests in (10, 160):
-        names, _, truth, means = VALIDATION["ranks"](25, tests, seed=3, points=20_000, samples=2000)
+        names, _, truth, means = VALIDATION["ranks"](
+            25, tests, seed=3, points=20_000, samples=2000
+        )
         i = names.index("marginal.low")
         errors.append(np.sqrt(np.mean((means[:, i] - truth[:, i]) ** 2)))
     # The bound hides behind the correlation length, so that it is not a quarter.

@@ -81,7 +81,9 @@ def test_translations_and_reflections_change_nothing(plane, change):
 
 def test_between_least_and_greatest_strength(plane):
     interface = plane.interface
-    strength = np.where(np.random.default_rng(0).random((2, *interface.shape)) < 0.5, 0.7e6, 1.6e6)
+    strength = np.where(
+        np.random.default_rng(0).random((2, *interface.shape)) < 0.5, 0.7e6, 1.6e6
+    )
     averages = st.theory.nucleation_stress(plane, strength)
     assert averages.min() >= 0.7e6
     assert averages.max() <= 1.6e6
@@ -186,10 +188,16 @@ def test_refusals_name_what_is_wrong(plane):
 
 
 def test_coarse_directions_are_named(plane):
-    coarse = dataclasses.replace(plane, interface=st.Interface(plane.interface.length, (48, 26)))
-    with pytest.warns(st.AccuracyWarning, match=r"9\.6 nodes along x and, in mode III, 4\.4 along"):
+    coarse = dataclasses.replace(
+        plane, interface=st.Interface(plane.interface.length, (48, 26))
+    )
+    with pytest.warns(
+        st.AccuracyWarning, match=r"9\.6 nodes along x and, in mode III, 4\.4 along"
+    ):
         st.onset(coarse, np.full((48, 26), 1e6), method=METHOD)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        fine = dataclasses.replace(plane, interface=st.Interface(plane.interface.length, (60, 72)))
+        fine = dataclasses.replace(
+            plane, interface=st.Interface(plane.interface.length, (60, 72))
+        )
         st.onset(fine, np.full((60, 72), 1e6), method=METHOD)

@@ -52,11 +52,18 @@ def test_translations_and_reflections(plane, change, move):
     for name in ("first_instability", "critical_load"):
         # The gap asked for.
         assert second[name].item() == pytest.approx(first[name].item(), rel=2e-9)
-    for name in ("slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events"):
+    for name in (
+        "slip_patches",
+        "critical_patch_extent",
+        "critical_patch_area",
+        "arrested_events",
+    ):
         assert np.array_equal(second[name].values, first[name].values)
     spacings, lengths = np.array(plane.interface.spacings), np.array(plane.interface.lengths)
     place = np.array(move(*(first["critical_position"].values[0] / spacings))) * spacings
-    off = (second["critical_position"].values[0] - place + 0.5 * lengths) % lengths - 0.5 * lengths
+    off = (
+        second["critical_position"].values[0] - place + 0.5 * lengths
+    ) % lengths - 0.5 * lengths
     # y goes with the root of the gap.
     assert np.abs(off).max() < 1e-2 * spacings.min()
     for name in ("slip", "sensitivity"):
@@ -175,7 +182,9 @@ def test_discretization_error_is_of_the_size_of_the_error(solid):
     fields = np.fft.irfft2(np.fft.rfft2(noise) * np.exp(-((k / 8.0) ** 2)), (128, 128))
     fields = 0.7e6 + 1e6 * (fields - fields.min()) / np.ptp(fields)
     exact = st.onset(fine, fields, method=st.Equilibrium())["first_instability"].values
-    found = st.onset(coarse, fields[:, ::4, ::4], method=st.Equilibrium(discretization_error=True))
+    found = st.onset(
+        coarse, fields[:, ::4, ::4], method=st.Equilibrium(discretization_error=True)
+    )
     error = np.abs(found["first_instability"].values - exact)
     estimate = found["discretization_error"].values
     # The estimate is meant to be twice the error at most, and not a hundred times as much.

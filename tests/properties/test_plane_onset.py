@@ -86,7 +86,10 @@ def test_multiplier_is_the_derivative_by_the_strength():
     found = onset_of(strength, gap=1e-10)
     direction = np.random.default_rng(0).standard_normal(SHAPE)
     direction *= 1e-4 * strength.mean() / np.abs(direction).max()
-    up, down = onset_of(strength + direction, gap=1e-10), onset_of(strength - direction, gap=1e-10)
+    up, down = (
+        onset_of(strength + direction, gap=1e-10),
+        onset_of(strength - direction, gap=1e-10),
+    )
     slope = (found.multiplier * direction).sum()
     # second order: the step changes the slope itself
     assert 0.5 * (up.upper - down.upper) == pytest.approx(slope, rel=0.02)
@@ -96,7 +99,8 @@ def test_local_criterion_is_an_upper_bound_for_every_aspect():
     plane = PLANES["lattice"]
     symbol = plane.symbol(SHAPE)
     windows = [
-        ellipse_window(symbol, SHAPE, plane.lengths, RATE, aspect) for aspect in (1.0, 1.25, 1.5)
+        ellipse_window(symbol, SHAPE, plane.lengths, RATE, aspect)
+        for aspect in (1.0, 1.25, 1.5)
     ]
     for seed in range(4):
         strength = strength_of(seed)

@@ -13,7 +13,9 @@ pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
 PLANE = st.Interface(length=(0.04, 0.03), nodes=(40, 36))
-PROBLEM = st.Problem(SOLID, PLANE, st.LinearWeakening(weakening_rate=3e11, residual_strength=2e5))
+PROBLEM = st.Problem(
+    SOLID, PLANE, st.LinearWeakening(weakening_rate=3e11, residual_strength=2e5)
+)
 METHOD = st.Rupture(loading_rate=1e8)
 X, Y = np.meshgrid(*PLANE.coordinates.values(), indexing="ij")
 

@@ -110,7 +110,9 @@ def test_weak_places_are_spread_over_the_interface(system):
         result = st.failure_probability(
             *system, 0.667e6, method=LOCAL, algorithm="subset", target_cv=0.3, seed=seed
         )
-        places = result.failing_profiles["critical_position"].values / system[0].interface.length
+        places = (
+            result.failing_profiles["critical_position"].values / system[0].interface.length
+        )
         positions.append(places)
         runs.append(np.exp(2j * np.pi * places).mean())
     # L/h_n is about 32: a single run's few failures lie in many different places.
@@ -164,7 +166,9 @@ def test_more_that_is_random_is_sampled_with_it(system):
     )
     result = st.failure_probability(
         problem,
-        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
+        st.RandomInterface(
+            strength=strength, residual_strength=residual, initial_stress=initial
+        ),
         0.68e6,
         method=LOCAL,
         algorithm="plain",
@@ -172,7 +176,9 @@ def test_more_that_is_random_is_sampled_with_it(system):
     )
     ensemble = st.monte_carlo(
         problem,
-        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
+        st.RandomInterface(
+            strength=strength, residual_strength=residual, initial_stress=initial
+        ),
         method=LOCAL,
         samples=result.evaluations,
     )
@@ -180,7 +186,9 @@ def test_more_that_is_random_is_sampled_with_it(system):
     assert set(result.failing_profiles.data_vars) >= {"strength", "residual_strength"}
     rare = st.failure_probability(
         problem,
-        st.RandomInterface(strength=strength, residual_strength=residual, initial_stress=initial),
+        st.RandomInterface(
+            strength=strength, residual_strength=residual, initial_stress=initial
+        ),
         0.68e6,
         method=LOCAL,
         algorithm="subset",

@@ -80,7 +80,9 @@ def test_a_restart_records_the_rest_to_the_bit(case, tmp_path):
     save = st.Save(stations=stations, to=tmp_path / "run")
     short = st.Rupture(loading_rate=1e8, max_steps=60)
     for method in (short, METHOD):
-        st.simulate_rupture(problem, strength(problem), method=method, save=save, progress=False)
+        st.simulate_rupture(
+            problem, strength(problem), method=method, save=save, progress=False
+        )
     streamed = open_rupture(tmp_path / "run", fields=())
     assert len(list((tmp_path / "run").glob("frames-*.nc"))) > 1
     for name in (*RECORDED, "step_time"):

@@ -23,7 +23,11 @@ SOURCES = ROOT / "src" / "stiction"
 
 def test_imports_run_downwards():
     """Those inside functions and under TYPE_CHECKING included."""
-    command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as f; f()"]
+    command = [
+        sys.executable,
+        "-c",
+        "from importlinter.cli import lint_imports_command as f; f()",
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -36,12 +36,18 @@ def make_study(**options):
 
 
 CASES = {
-    "wrong type": (lambda: st.Solid(**GOOD_SOLID | {"density": "heavy"}), ["density", "'heavy'"]),
+    "wrong type": (
+        lambda: st.Solid(**GOOD_SOLID | {"density": "heavy"}),
+        ["density", "'heavy'"],
+    ),
     "a number as text": (lambda: st.Solid(**GOOD_SOLID | {"density": "1170"}), ["density"]),
     "a boolean": (lambda: st.Interface(length=True, nodes=64), ["length", "True"]),
     "not finite": (lambda: st.Interface(length=np.inf, nodes=64), ["length", "finite", "inf"]),
     "nan": (lambda: st.Solid(**GOOD_SOLID | {"density": np.nan}), ["density", "nan"]),
-    "incompressible": (lambda: st.Solid(**GOOD_SOLID | {"poisson_ratio": 0.5}), ["0.5", "less"]),
+    "incompressible": (
+        lambda: st.Solid(**GOOD_SOLID | {"poisson_ratio": 0.5}),
+        ["0.5", "less"],
+    ),
     "plane": (lambda: st.Solid(**GOOD_SOLID, plane="stran"), ["plane", "'strain'", "'stran'"]),
     "unknown key": (
         lambda: st.Solid(**GOOD_SOLID, plan="stress"),
@@ -61,7 +67,10 @@ CASES = {
         lambda: st.LinearWeakening(weakening_rate=1.0, critical_slip=1.0),
         ["rate and critical_slip"],
     ),
-    "negative rate": (lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]), ["-2", "positive"]),
+    "negative rate": (
+        lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]),
+        ["-2", "positive"],
+    ),
     "negative residual": (
         lambda: st.LinearWeakening(weakening_rate=1.0, residual_strength=-1.0),
         ["residual_strength", "-1"],
@@ -261,7 +270,9 @@ CASES = {
     ),
     "rate that varies": (
         lambda: st.onset(
-            make_problem(friction=st.LinearWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)),
+            make_problem(
+                friction=st.LinearWeakening(weakening_rate=np.linspace(1, 2, 256) * 1e11)
+            ),
             np.ones(256),
             method=st.LocalCriterion(),
         ),
@@ -355,7 +366,9 @@ def test_message(case):
 
 def test_grid_coarser_than_the_spectrum_warns_how_much():
     strength = make_strength(spectrum=st.PowerLawSpectrum(correlation_length=8e-4))
-    with pytest.warns(st.AccuracyWarning, match=r"52 % of the variance .*interface.nodes >= 624"):
+    with pytest.warns(
+        st.AccuracyWarning, match=r"52 % of the variance .*interface.nodes >= 624"
+    ):
         strength.sample(st.Interface(length=0.1, nodes=64))
 
 

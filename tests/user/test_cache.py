@@ -19,7 +19,10 @@ def run(tmp_path):
 
     def run(code, cache):
         (tmp_path / "own_module.py").write_text(code)
-        environment = os.environ | {"PYTHONPATH": str(SOURCES), "STICTION_CACHE_DIR": str(cache)}
+        environment = os.environ | {
+            "PYTHONPATH": str(SOURCES),
+            "STICTION_CACHE_DIR": str(cache),
+        }
         environment.pop("NUMBA_CACHE_DIR", None)
         command = [sys.executable, "-B", "-c", "import own_module"]
         done = subprocess.run(
@@ -45,7 +48,9 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
         if edited:
             with (copy / edited).open("a") as file:
                 file.write("\n# edited\n")
-        folders.append([find(f"stiction.{m}") for m in ("dynamics.explicit", "random.synthesis")])
+        folders.append(
+            [find(f"stiction.{m}") for m in ("dynamics.explicit", "random.synthesis")]
+        )
     before, message, own, law = folders
     assert before[0].parent == tmp_path / "cache" / "compiled"
     assert message == before

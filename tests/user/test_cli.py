@@ -65,7 +65,9 @@ def test_check_says_what_will_be_done(command):
 
 
 def test_check_lists_every_mistake(command, study):
-    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace("samples = 100", "samples=0")
+    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace(
+        "samples = 100", "samples=0"
+    )
     study.write_text(text + '\n[[sweep]]\n"ensemble.sed" = [1]\n')
     code, out, err = command("check", study)
     assert (code, out) == (2, "")
@@ -225,7 +227,9 @@ def test_onset_by_every_method(command):
 
 @pytest.mark.slow
 def test_rupture_writes_result_figures_and_film(command, study, tmp_path):
-    plain = small_study(length=0.05, correlation_length=6e-3, ensemble={"samples": 2, "seed": 3})
+    plain = small_study(
+        length=0.05, correlation_length=6e-3, ensemble={"samples": 2, "seed": 3}
+    )
     plain["problem"]["solid"]["plane"] = "stress"
     study.write_text(tomli_w.dumps(plain))
     code, text, _ = command("rupture", study, "--out", "rupture", "--film", "--sample", 1)
@@ -283,7 +287,11 @@ def test_rupture_of_an_overstressed_patch_under_a_load_of_its_own(command, study
         (["report", "study.toml"], 1, "there is no run here"),
         (["onset", "study.toml", "--strength", "missing.npy"], 2, "missing.npy"),
         (["onset", "study.toml", "--strength", "missing.tif"], 2, ".npy"),
-        (["onset", "study.toml", "--strength", "p.npy", "--method", "local"], 2, "local_criterion"),
+        (
+            ["onset", "study.toml", "--strength", "p.npy", "--method", "local"],
+            2,
+            "local_criterion",
+        ),
         (["rupture", "study.toml", "--out", "study.toml"], 1, "File exists"),
         (["rupture", "study.toml", "--loading-rate", "-1"], 2, "loading_rate"),
         (["rupture", "study.toml", "--sample", "-1"], 2, "--sample"),
@@ -364,7 +372,9 @@ def test_a_cache_that_others_can_write_is_refused(tmp_path):
     open_to_all = tmp_path / "shared"
     open_to_all.mkdir()
     open_to_all.chmod(0o777)
-    with pytest.raises(st.InputError, match="can be written by others.*STICTION_CACHE_DIR.*go-w"):
+    with pytest.raises(
+        st.InputError, match="can be written by others.*STICTION_CACHE_DIR.*go-w"
+    ):
         private_folder(open_to_all, "compiled")
     open_to_all.chmod(0o755)
     made = private_folder(open_to_all, "compiled", "digest")

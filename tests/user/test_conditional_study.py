@@ -6,7 +6,10 @@ from small_study import small_study
 
 import stiction as st
 
-SWEEP = [{"random.strength.given.noise": [5e3, 20e3]}, {"random.between.strength.cv": [0.05, 0.2]}]
+SWEEP = [
+    {"random.strength.given.noise": [5e3, 20e3]},
+    {"random.between.strength.cv": [0.05, 0.2]},
+]
 
 
 @pytest.fixture

@@ -18,7 +18,9 @@ PAGES = sorted((ROOT / "docs").glob("*.md"))
 def blocks(page, language):
     """Fenced blocks of a page, without the indentation that they have inside a list."""
     text = (ROOT / page).read_text("utf-8")
-    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE)
+    found = re.findall(
+        rf"^( *)```{language}\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE
+    )
     return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
 
 
@@ -59,7 +61,9 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < scope["found"].probability < 0.5
     assert 0.2e6 < scope["design"].stress < 1e6
-    joint = st.Problem(**tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"])
+    joint = st.Problem(
+        **tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"]
+    )
     assert joint == scope["joint"]
 
 

@@ -94,7 +94,9 @@ def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(heigh
     assert run.attrs["stopped"] == "onset"
     # The same where the barrier is weak enough to have passed before.
     same = simulate(barred(4e6), problem, stop="onset")
-    assert float(run["critical_stress"]) == pytest.approx(float(same["critical_stress"]), rel=1e-4)
+    assert float(run["critical_stress"]) == pytest.approx(
+        float(same["critical_stress"]), rel=1e-4
+    )
 
 
 def test_a_grid_too_coarse_for_the_steepest_weakening_warns():
@@ -186,7 +188,9 @@ def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
     assert np.isnan(float(run["critical_load"]))
     assert float(run["critical_stress"]) <= initial.mean() * (1.0 + 1e-12)
     # Nor where nothing becomes unstable.
-    run = simulate(TAU_P, load=([0.0, 0.1, 0.2], [0.0, 7.6e5, 7.6e5]), stop="time", end_time=0.3)
+    run = simulate(
+        TAU_P, load=([0.0, 0.1, 0.2], [0.0, 7.6e5, 7.6e5]), stop="time", end_time=0.3
+    )
     assert np.isnan(float(run["critical_load"]))
 
 
@@ -216,7 +220,9 @@ def test_a_stress_below_minus_the_strength_is_said():
         simulate(TAU_P, load=low)
     with pytest.warns(AccuracyWarning, match="would slip in reverse"):
         simulate(TAU_P, load=([0.0, 0.3], [-2e6, 2e6]), stop="onset")
-    behind = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=np.where(X > 0.9, -2e6, 0.0)))
+    behind = dataclasses.replace(
+        PROBLEM, load=st.Load(initial_stress=np.where(X > 0.9, -2e6, 0.0))
+    )
     with pytest.warns(AccuracyWarning, match="would slip in reverse"):
         st.onset(behind, TAU_P, method=dataclasses.replace(METHOD, stop="onset"))
     with warnings.catch_warnings():

@@ -115,7 +115,9 @@ START = np.zeros(NODES)
 )
 def test_runs_that_cannot_be(options, text):
     with pytest.raises(InputError, match=text):
-        simulate_rupture(make_problem(), **({"profiles": profile(), "method": METHOD} | options))
+        simulate_rupture(
+            make_problem(), **({"profiles": profile(), "method": METHOD} | options)
+        )
 
 
 @pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
@@ -144,7 +146,10 @@ def test_unstable_time_step_is_refused_with_the_limit():
 )
 def test_stability_limits(mode, ratio, plane, courant):
     solid = st.Solid(shear_modulus=1.0, poisson_ratio=ratio, density=1.0, plane=plane)
-    line, friction = st.Interface(length=64.0, nodes=64), st.LinearWeakening(weakening_rate=0.05)
+    line, friction = (
+        st.Interface(length=64.0, nodes=64),
+        st.LinearWeakening(weakening_rate=0.05),
+    )
     problem = st.Problem(solid, line, friction, mode=mode)
     # The figures are known to two digits.
     assert METHOD.medium(problem).largest_step == pytest.approx(courant, abs=0.006)
@@ -216,7 +221,9 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, ever
         for name in whole.data_vars:
             assert np.array_equal(read[name].values, whole[name].values, equal_nan=True), name
             if name in found:
-                assert np.array_equal(found[name].values, whole[name].values, equal_nan=True), name
+                assert np.array_equal(found[name].values, whole[name].values, equal_nan=True), (
+                    name
+                )
         assert found.attrs["stopped"] == whole.attrs["stopped"]
         assert "critical_stress" in found
 

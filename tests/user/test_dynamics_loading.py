@@ -41,7 +41,9 @@ def test_a_load_that_goes_down_and_up_again_is_no_instability(exact, stop):
     assert int(run["arrested_events"]) == 0
     assert float(run["first_instability"]) == float(run["critical_stress"])
     # Reached at 2e6 Pa/s: inertia lifts it by 1e-5.
-    assert float(run["critical_stress"]) == pytest.approx(float(exact.critical_stress[0]), rel=5e-5)
+    assert float(run["critical_stress"]) == pytest.approx(
+        float(exact.critical_stress[0]), rel=5e-5
+    )
 
 
 def test_a_load_that_stops_below_the_onset_lets_the_run_end():
@@ -118,12 +120,16 @@ def test_rates_that_cannot_be_resolved_are_said(exact):
     assert np.isnan(slow.rupture_speed[0])
     with pytest.raises(InputError, match="first slip would come after"):
         st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e-300))
-    with pytest.warns(AccuracyWarning, match="the load rises by 0.16 of .* use time_step=5e-09"):
+    with pytest.warns(
+        AccuracyWarning, match="the load rises by 0.16 of .* use time_step=5e-09"
+    ):
         fast = st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e12))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fine = st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e12, time_step=4.9e-9))
     # The peak is sampled by 18 steps.
-    assert float(fast.critical_stress[0]) == pytest.approx(float(fine.critical_stress[0]), rel=1e-2)
+    assert float(fast.critical_stress[0]) == pytest.approx(
+        float(fine.critical_stress[0]), rel=1e-2
+    )
     with pytest.raises(InputError, match="loading_rate: in one explicit step"):
         st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e15))

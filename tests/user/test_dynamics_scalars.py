@@ -19,7 +19,8 @@ PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
     st.Interface(length=LENGTH, nodes=NODES),
     st.LinearWeakening(
-        weakening_rate=0.2e12 + 2e10 * np.sin(ANGLE), residual_strength=3e5 + 5e4 * np.cos(ANGLE)
+        weakening_rate=0.2e12 + 2e10 * np.sin(ANGLE),
+        residual_strength=3e5 + 5e4 * np.cos(ANGLE),
     ),
     st.Load(profile=1.2 + 0.2 * np.cos(ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * ANGLE)),
 )
@@ -38,7 +39,9 @@ def test_loads(run):
     profile, initial = PROBLEM.load.profile.mean(), PROBLEM.load.initial_stress.mean()
     critical = float(run["critical_stress"])
     assert critical == run["step_mean_stress"].values.max()
-    assert float(run["critical_load"]) == pytest.approx((critical - initial) / profile, rel=1e-12)
+    assert float(run["critical_load"]) == pytest.approx(
+        (critical - initial) / profile, rel=1e-12
+    )
     assert float(run["applied_load"]) > float(run["critical_load"])
     stress = run["shear_stress"].values.mean(axis=1)
     # Explicit steps know the mean stress to round-off, implicit ones to 1e-9 of the drop.

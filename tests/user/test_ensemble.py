@@ -33,7 +33,10 @@ def test_one_sample_that_the_grid_does_not_resolve_does_not_end_an_ensemble():
         strength=field(scipy.stats.lognorm(0.25, scale=2e6), 0.04),
         residual_strength=field(scipy.stats.beta(2, 2, loc=2e5, scale=4e5), 0.04),
         fracture_energy=field(scipy.stats.gamma(9, scale=2e12 / rate / 9), 0.05),
-        correlation={("strength", "residual_strength"): 0.8, ("strength", "fracture_energy"): 0.5},
+        correlation={
+            ("strength", "residual_strength"): 0.8,
+            ("strength", "fracture_energy"): 0.5,
+        },
     )
     given = {"method": st.Equilibrium(), "seed": 991, "samples": 10, "first": 12_580}
     with pytest.warns(st.AccuracyWarning, match=r"1 of 10 samples could not be solved.*12584"):
@@ -62,7 +65,9 @@ def far_from_the_criterion():
 def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
     problem, strength = far_from_the_criterion()
     given = {"method": st.LocalCriterion(), "samples": 200, "seed": 11}
-    with pytest.warns(st.AccuracyWarning, match=r"differs from the exact onset by .*a pilot of 32"):
+    with pytest.warns(
+        st.AccuracyWarning, match=r"differs from the exact onset by .*a pilot of 32"
+    ):
         found = st.monte_carlo(problem, strength, **given)
     alone = st.monte_carlo(problem, strength, **given, pilot=False)
     np.testing.assert_array_equal(found.critical_stress, alone.critical_stress)
@@ -96,7 +101,9 @@ def test_coefficients_are_stresses_times_the_pressure():
     experiment = Experiment(pressed, share, st.LocalCriterion())
     draws = experiment.draws(3, 0, 4)
     found = experiment.profiles(draws)["strength"]
-    ratio = found / Experiment(problem, strength, st.LocalCriterion()).profiles(draws)["strength"]
+    ratio = (
+        found / Experiment(problem, strength, st.LocalCriterion()).profiles(draws)["strength"]
+    )
     # lognorm(0.5, scale=0.2) is lognorm(0.5, scale=1e6) times 2e-7, to round-off.
     np.testing.assert_allclose(ratio, np.broadcast_to(2e-7 * pressure, ratio.shape), rtol=1e-9)
 

@@ -27,7 +27,9 @@ def test_weakening_rate_negative_somewhere(problem):
     rate[3] = -1.0
     with pytest.raises(st.InputError, match="weakening_rate"):
         st.onset(
-            problem, {"strength": np.full(256, 0.9e6), "weakening_rate": rate}, method=Equilibrium()
+            problem,
+            {"strength": np.full(256, 0.9e6), "weakening_rate": rate},
+            method=Equilibrium(),
         )
 
 
@@ -93,7 +95,9 @@ def test_error_of_the_grid_needs_two_grids(solid):
 
 
 def test_warning_says_the_estimated_error(solid):
-    problem = st.Problem(solid, st.Interface(0.1, 128), st.LinearWeakening(weakening_rate=0.5e12))
+    problem = st.Problem(
+        solid, st.Interface(0.1, 128), st.LinearWeakening(weakening_rate=0.5e12)
+    )
     rng = np.random.default_rng(0)
     with pytest.warns(st.AccuracyWarning, match="by an estimated .* of 3 samples"):
         st.onset(

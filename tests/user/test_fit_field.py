@@ -9,7 +9,9 @@ import xarray as xr
 import stiction as st
 from stiction.inference import bootstrap
 
-FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True)
+FIELD = st.RandomField(
+    st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
+)
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(length=COUNT * SPACING, nodes=COUNT)
 VALUES = FIELD.sample(st.Interface(length=3 * PIECE.length, nodes=3 * COUNT), seed=5)[0, :COUNT]
@@ -67,7 +69,9 @@ def test_missing_values_are_left_out_and_counted(plain):
     assert fit.parameters == left_out.parameters
     length = "spectrum.correlation_length"
     assert fit.parameters[length] == pytest.approx(plain.parameters[length], rel=0.15)
-    with pytest.warns(st.AccuracyWarning, match="filled"):  # what was filled in is no measurement
+    with pytest.warns(
+        st.AccuracyWarning, match="filled"
+    ):  # what was filled in is no measurement
         filled = st.read_profile(labelled(values), interface=PIECE, gaps="fill")
     assert st.fit_field(filled, **QUICK).parameters == fit.parameters
 

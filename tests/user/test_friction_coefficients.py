@@ -6,7 +6,9 @@ import pytest
 import stiction as st
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
-COEFFICIENT = st.RandomField(st.Lognormal(mean=0.5, cv=0.15), SPECTRUM, of="friction_coefficient")
+COEFFICIENT = st.RandomField(
+    st.Lognormal(mean=0.5, cv=0.15), SPECTRUM, of="friction_coefficient"
+)
 PRESSURE = 2e6
 LOCAL = st.LocalCriterion()
 
@@ -32,7 +34,10 @@ def test_youngs_modulus_is_the_shear_modulus_in_other_words():
     ("given", "text"),
     [
         ({"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3}, "and not both"),
-        ({"youngs_modulus": -1e9, "poisson_ratio": 0.3}, "youngs_modulus: must be greater than 0"),
+        (
+            {"youngs_modulus": -1e9, "poisson_ratio": 0.3},
+            "youngs_modulus: must be greater than 0",
+        ),
         ({"youngs_modulus": 1e9}, "poisson_ratio: missing"),
     ],
 )
@@ -57,7 +62,12 @@ def test_a_random_pressure_carries_the_strength_with_it():
     pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)
     random = st.RandomInterface(strength=COEFFICIENT, normal_pressure=pressure)
     result = st.monte_carlo(
-        joint(None), random, method=LOCAL, samples=4, seed=1, keep=["strength", "normal_pressure"]
+        joint(None),
+        random,
+        method=LOCAL,
+        samples=4,
+        seed=1,
+        keep=["strength", "normal_pressure"],
     )
     mu = result["strength"] / result["normal_pressure"]
     np.testing.assert_allclose(mu, COEFFICIENT.sample(joint(None).interface, samples=4, seed=1))

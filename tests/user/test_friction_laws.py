@@ -62,7 +62,9 @@ def test_equilibrium_refuses_what_has_no_pieces(with_law, tau_p):
         lambda: st.onset(problem, tau_p, method=st.Equilibrium()),
         lambda: st.equilibrium_path(problem, tau_p, [0.6e6]),
     ):
-        with pytest.raises(st.InputError, match=r"ExponentialWeakening has none.*from_law.*Rupt"):
+        with pytest.raises(
+            st.InputError, match=r"ExponentialWeakening has none.*from_law.*Rupt"
+        ):
             call()
 
 
@@ -150,7 +152,9 @@ def test_residual_ratio_and_fracture_energy_are_taken(problem, tau_p):
         st.LinearWeakening(fracture_energy=1.0),
         st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3),
     ):
-        found = st.onset(dataclasses.replace(problem, friction=law), tau_p, method=st.Equilibrium())
+        found = st.onset(
+            dataclasses.replace(problem, friction=law), tau_p, method=st.Equilibrium()
+        )
         assert found.critical_stress.item() > tau_p.min()
 
 
@@ -207,7 +211,9 @@ def test_law_of_ones_own(with_law, tau_p):
     found, expected = (
         st.onset(problem, tau_p, method=RUPTURE) for problem in (own, with_law(EXPONENTIAL))
     )
-    assert found.critical_stress.item() == pytest.approx(expected.critical_stress.item(), rel=1e-12)
+    assert found.critical_stress.item() == pytest.approx(
+        expected.critical_stress.item(), rel=1e-12
+    )
     with pytest.raises(st.InputError, match="OwnLaw has none"):
         st.onset(own, tau_p, method=st.Equilibrium())
     polygon = st.PiecewiseWeakening.from_law(own.friction, 32)
@@ -268,7 +274,9 @@ def test_a_law_that_contradicts_itself_is_refused(with_law, law, words):
 
 
 def test_what_is_no_law_is_refused(problem):
-    with pytest.raises(st.InputError, match=r"friction: must be a friction law such as .*got 0.2"):
+    with pytest.raises(
+        st.InputError, match=r"friction: must be a friction law such as .*got 0.2"
+    ):
         dataclasses.replace(problem, friction=0.2)
 
 

@@ -26,7 +26,9 @@ def measured_profile(found):
 def spectrum(found):
     """Both fields have one distribution and one decay length, and still another onset."""
     machined, power_law = (found["onsets"][name] for name in ("machined", "power law"))
-    assert found["alike"].efolding_length == pytest.approx(found["own"].efolding_length, rel=1e-9)
+    assert found["alike"].efolding_length == pytest.approx(
+        found["own"].efolding_length, rel=1e-9
+    )
     difference = abs(float(machined.mean() - power_law.mean()))
     assert difference > 5.0 * float(machined.std()) / np.sqrt(machined.size)
 
@@ -47,7 +49,9 @@ def nonuniform_load(found):
     place = onsets["high at the ends"].critical_position / length
     assert not ((place > 0.25) & (place < 0.75)).any()
     # Strength less initial stress differs by 0.2 MPa at most, and so does the load (monotony).
-    change = onsets["uniform, with initial stress"].critical_load - onsets["uniform"].critical_load
+    change = (
+        onsets["uniform, with initial stress"].critical_load - onsets["uniform"].critical_load
+    )
     assert (abs(change) <= 0.2e6).all()
     assert change.mean() < 0.0
 
@@ -69,7 +73,9 @@ def failure(found):
     """Two methods agree in the tail, and P = 1e-6 lies between 1 and 3 kPa above the bound."""
     one, other = found["found"], found["again"]
     error = np.hypot(one.cv, other.cv)
-    assert abs(np.log(one.probability / other.probability)) < 4.0 * error  # joint standard errors
+    assert (
+        abs(np.log(one.probability / other.probability)) < 4.0 * error
+    )  # joint standard errors
     assert 1e3 < found["design"].stress_above_bound < 3e3
 
 

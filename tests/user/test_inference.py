@@ -148,13 +148,19 @@ BAD = {
         lambda: infer(PEAKS / 1e6, unit="MPa", load_cell_error=5e3),
         ["load_cell_error", "unit of the peaks"],
     ),
-    "unknown parameter": (lambda: infer(prior={"corelation_length": (1.0, 2.0)}), ["corelation"]),
+    "unknown parameter": (
+        lambda: infer(prior={"corelation_length": (1.0, 2.0)}),
+        ["corelation"],
+    ),
     "no parameter": (lambda: infer(prior={}), ["prior", "must map"]),
     "same twice": (
         lambda: infer(prior=LOW | {"random.strength.marginal.low": (0.1e6, 0.2e6)}),
         ["same parameter"],
     ),
-    "range upside down": (lambda: infer(prior={"marginal.low": (0.9e6, 0.4e6)}), ["low < high"]),
+    "range upside down": (
+        lambda: infer(prior={"marginal.low": (0.9e6, 0.4e6)}),
+        ["low < high"],
+    ),
     "log of zero": (
         lambda: infer(prior={"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}),
         ["of a positive range"],
@@ -189,9 +195,9 @@ BAD = {
         ["draws", "shape"],
     ),
     "simulator": (
-        lambda: st.external.simulator(PROBLEM, STRENGTH, ("marginal.lo",), method=LOCAL, samples=3)(
-            [1.0]
-        ),
+        lambda: st.external.simulator(
+            PROBLEM, STRENGTH, ("marginal.lo",), method=LOCAL, samples=3
+        )([1.0]),
         ["'lo'", "'low'"],
     ),
     "theta": (
@@ -234,7 +240,10 @@ BAD_FILES = {
     "no peak": ("a [MPa],b [MPa]\n0.7,1\n0.6,2\n0.7,1\n", ["no column is called peak"]),
     "two peaks": ("peak [MPa],stress [MPa]\n0.7,1\n0.6,2\n0.7,1\n", ["may both be the peak"]),
     "missing peak": ("peak [MPa],n [1]\n0.7,1\n,2\n0.7,1\n", ["number 1 is nan"]),
-    "length without unit": ("peak [MPa],length\n0.7,1\n0.6,2\n0.7,1\n", ["length", "not stated"]),
+    "length without unit": (
+        "peak [MPa],length\n0.7,1\n0.6,2\n0.7,1\n",
+        ["length", "not stated"],
+    ),
     "missing length": (
         "peak [MPa],length [mm]\n0.7,100\n0.6,\n0.7,100\n",
         ["length: missing in row 1", "mixed"],

@@ -43,7 +43,9 @@ def test_dynesty_finds_the_same_posterior(monkeypatch, tmp_path, capsys):
     # Silverman's kernel widens the variance of 1000 peaks by 750^-0.4, which each of the 25 pays.
     # Nested sampling adds sqrt(information / live points), 0.22 here: three of them.
     smoothing = 0.5 * 25 * np.log1p(750.0**-0.4)
-    assert found["evidence"] == pytest.approx(found["posterior"].log_evidence - smoothing, abs=0.66)
+    assert found["evidence"] == pytest.approx(
+        found["posterior"].log_evidence - smoothing, abs=0.66
+    )
 
 
 @pytest.mark.slow

@@ -25,7 +25,8 @@ def study():
 def test_in_small(study, tmp_path, monkeypatch, capsys):
     """Eight nodes in h_n, six samples, and one correlation length."""
     coarse = [
-        dataclasses.replace(case, nodes=16 if "fine" in case.name else 8) for case in study.CASES
+        dataclasses.replace(case, nodes=16 if "fine" in case.name else 8)
+        for case in study.CASES
     ]
     monkeypatch.setattr(study, "CASES", tuple(coarse))
     monkeypatch.setattr(study, "RATIOS", (0.5,))

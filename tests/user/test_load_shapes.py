@@ -35,7 +35,9 @@ def test_a_shape_is_its_array():
     tau_p = st.paper.strength(PLAIN).sample(PLAIN.interface, samples=3, seed=0)
     for method in (st.LocalCriterion(), st.Equilibrium()):
         one = st.onset(loaded(shape), tau_p, method=method, progress=False)
-        other = st.onset(loaded(shape.on(PLAIN.interface)), tau_p, method=method, progress=False)
+        other = st.onset(
+            loaded(shape.on(PLAIN.interface)), tau_p, method=method, progress=False
+        )
         np.testing.assert_array_equal(one["critical_stress"], other["critical_stress"])
 
 

@@ -27,7 +27,9 @@ def record(shift=0.0, scale=1.0, places=(0.03, 0.05), name="slip"):
     times = np.linspace(0.0, 0.2e-3, 150)
     places = np.array(places)
     values = scale * slip_at(places[None, :], times[:, None] + 0.97e-3 + shift)
-    return xr.DataArray(values, coords={"time": times, "x": places}, dims=("time", "x"), name=name)
+    return xr.DataArray(
+        values, coords={"time": times, "x": places}, dims=("time", "x"), name=name
+    )
 
 
 @pytest.mark.parametrize("shift", [-3e-5, 0.0, 4.4e-5])

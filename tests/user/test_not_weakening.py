@@ -66,7 +66,9 @@ def test_said_once(solid, what):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if what == "onset":
-            profile = field.profiles(problem.interface, field.draws(problem.interface, 8, seed=1))
+            profile = field.profiles(
+                problem.interface, field.draws(problem.interface, 8, seed=1)
+            )
             st.onset(problem, profile, method=st.Equilibrium(), progress=False)
         elif what == "monte_carlo":
             st.monte_carlo(

@@ -104,11 +104,15 @@ def test_nodes_of_constant_strength(plane):
     residual[10:14, 20:30] = 2e6
     with pytest.warns(st.AccuracyWarning, match="stays as it is"):
         found = st.onset(
-            plane, {"strength": strength, "residual_strength": residual}, method=st.Equilibrium()
+            plane,
+            {"strength": strength, "residual_strength": residual},
+            method=st.Equilibrium(),
         )
     weaker = st.onset(plane, strength, method=st.Equilibrium())
     # Constant strength is more than what weakens from the same peak.
-    assert found["first_instability"].item() >= weaker["first_instability"].item() * (1.0 - 2e-6)
+    assert found["first_instability"].item() >= weaker["first_instability"].item() * (
+        1.0 - 2e-6
+    )
     assert found["arrested_events"].item() == 0
     assert found["certified"].item()
 
@@ -150,7 +154,9 @@ def test_labelled_strength(plane):
     plain = st.onset(plane, strength, method=st.Equilibrium())
     found = st.onset(plane, labelled, method=st.Equilibrium())
     # A conversion of units rounds.
-    assert found["critical_load"].item() == pytest.approx(plain["critical_load"].item(), rel=1e-12)
+    assert found["critical_load"].item() == pytest.approx(
+        plain["critical_load"].item(), rel=1e-12
+    )
     elsewhere = labelled.assign_coords(x=0.9 * labelled["x"])
     elsewhere["x"].attrs["units"] = "mm"
     with pytest.raises(st.InputError, match="interpolate=True"):

@@ -22,7 +22,9 @@ def text(path, head="x (mm); y (mm); strength (MPa)", without=0):
 
 def test_a_millimetre_taken_for_a_metre_is_refused(tmp_path):
     path = text(tmp_path / "map.csv", "x (m); y (m); strength (MPa)")
-    with pytest.raises(st.InputError, match="x reaches from 0 to 19.375 m.*check the unit of x"):
+    with pytest.raises(
+        st.InputError, match="x reaches from 0 to 19.375 m.*check the unit of x"
+    ):
         st.read_profile(path, interface=PLANE)
 
 
@@ -49,7 +51,9 @@ def test_a_filled_gap_is_harmonic():
     values = plane.astype(float)
     values[8:13, 4:9] = np.nan
     with pytest.warns(st.AccuracyWarning, match="filled"):
-        found = st.read_profile(xr.DataArray(values, dims=("x", "y")), interface=PLANE, gaps="fill")
+        found = st.read_profile(
+            xr.DataArray(values, dims=("x", "y")), interface=PLANE, gaps="fill"
+        )
     np.testing.assert_allclose(found, plane, rtol=1e-12)
 
 
@@ -100,7 +104,9 @@ def test_a_map_is_not_read_as_a_line(tmp_path, heights, interface):
     np.savetxt(tmp_path / "matrix.csv", VALUES, delimiter=",")
     for source in (heights[0], tmp_path / "matrix.csv", MAP):
         for options in ({}, {"quantity": "height", "unit": "um"}):
-            with pytest.raises(st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly\)"):
+            with pytest.raises(
+                st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly\)"
+            ):
                 st.read_profile(source, interface=interface, **options)
 
 
@@ -131,9 +137,13 @@ def test_coordinates_of_a_map_decide_and_not_the_order(tmp_path, order):
 
 def test_what_has_no_meaning_on_a_plane_is_refused(tmp_path):
     np.savetxt(tmp_path / "map.csv", VALUES, delimiter=",")
-    with pytest.raises(st.InputError, match="16 columns without names, as of a matrix.*np.save"):
+    with pytest.raises(
+        st.InputError, match="16 columns without names, as of a matrix.*np.save"
+    ):
         st.read_profile(tmp_path / "map.csv", interface=PLANE)
     with pytest.raises(st.InputError, match="interpolate: are options of profiles of a line"):
         st.read_profile(MAP, interface=PLANE, interpolate=True)
-    with pytest.raises(st.InputError, match="value: 'q' is not the one variable here, 'strength'"):
+    with pytest.raises(
+        st.InputError, match="value: 'q' is not the one variable here, 'strength'"
+    ):
         st.read_profile(MAP, interface=PLANE, value="q")

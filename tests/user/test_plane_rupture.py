@@ -96,7 +96,9 @@ def test_a_run_may_begin_from_an_equilibrium(path):
     slip = along.slip.values.reshape(problem.interface.shape)
     method = st.Rupture(loading_rate=1e6, stop="onset")
     options = {"method": method, "progress": False}
-    later = st.simulate_rupture(problem, strength, initial_slip=slip, initial_load=7.5e5, **options)
+    later = st.simulate_rupture(
+        problem, strength, initial_slip=slip, initial_load=7.5e5, **options
+    )
     whole = st.simulate_rupture(problem, strength, **options)
     assert float(later.critical_stress) == pytest.approx(float(whole.critical_stress), rel=1e-5)
     with pytest.raises(st.InputError, match=r"initial_slip: must be \(40, 36\) numbers"):

@@ -136,7 +136,9 @@ def test_load_of_a_plane_from_a_file(path, tmp_path):
     profile = 1.0 + 0.1 * np.random.default_rng(0).random((72, 60))
     np.save(tmp_path / "load.npy", profile)
     np.save(tmp_path / "turned.npy", profile.T)
-    text = tomli_w.dumps(STUDY | {"problem": STUDY["problem"] | {"load": {"profile": "load.npy"}}})
+    text = tomli_w.dumps(
+        STUDY | {"problem": STUDY["problem"] | {"load": {"profile": "load.npy"}}}
+    )
     path.write_text(text)
     study = st.Study.from_toml(path)
     assert np.array_equal(study.experiments[0].problem.load.profile, profile)

@@ -82,7 +82,9 @@ def test_what_people_study_raises_no_doubt(solid, friction, length, strength):
 
 def test_harmless_forms_are_taken():
     method = st.LocalCriterion()
-    result = st.monte_carlo(problem(), FIELD, method=method, samples=1e1, keep="strength", seed=2.0)
+    result = st.monte_carlo(
+        problem(), FIELD, method=method, samples=1e1, keep="strength", seed=2.0
+    )
     expected = FIELD.sample(problem().interface, samples=np.float64(10.0), seed=2)
     np.testing.assert_array_equal(result["strength"], expected)
     assert st.Interface(length=0.1, nodes=256.0).nodes == 256

@@ -44,7 +44,9 @@ def plane():
 def test_an_onset_is_drawn_where_the_result_says(system):
     """Of the sample asked for, by each method, with coefficients beside the stresses."""
     problem, _, tau_p = system
-    results = [st.onset(problem, tau_p, method=m) for m in (st.LocalCriterion(), st.Equilibrium())]
+    results = [
+        st.onset(problem, tau_p, method=m) for m in (st.LocalCriterion(), st.Equilibrium())
+    ]
     axes = st.plot.onset(results, tau_p, sample=2)
     marked = [line for line in axes.lines if line.get_marker() != "None"]
     marks = {line.get_label(): line.get_xydata() for line in marked}

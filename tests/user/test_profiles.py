@@ -77,10 +77,14 @@ def test_the_names_of_dimensions_decide_where_samples_equal_nodes(system, interf
     # One value a sample, not a profile, although there are as many of them as nodes.
     residual = np.linspace(0.0, 3e5, NODES)
     by_sample = xr.DataArray(residual, dims="sample")
-    rows_of = system.sample({"strength": rows, "residual_strength": by_sample}).residual_strength
+    rows_of = system.sample(
+        {"strength": rows, "residual_strength": by_sample}
+    ).residual_strength
     np.testing.assert_array_equal(rows_of, np.tile(residual[:, np.newaxis], NODES))
     with pytest.raises(st.InputError, match=r"not clear from \(a, b\).*call it 'x'"):
-        st.onset(system, array.rename(sample="a", x="b").drop_vars("b"), method=st.LocalCriterion())
+        st.onset(
+            system, array.rename(sample="a", x="b").drop_vars("b"), method=st.LocalCriterion()
+        )
     with pytest.raises(st.InputError, match="strength: has no dimension along the interface"):
         st.onset(system, xr.DataArray(strength, dims="sample"), method=st.LocalCriterion())
 
@@ -115,7 +119,9 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     plain = system.sample(
         {"strength": strength, "residual_strength": residual, "initial_stress": 1e4}
     )
-    rows = system.sample({"strength": strength, "residual_strength": given, "initial_stress": 1e4})
+    rows = system.sample(
+        {"strength": strength, "residual_strength": given, "initial_stress": 1e4}
+    )
     np.testing.assert_allclose(rows.residual_strength, plain.residual_strength, rtol=1e-14)
     friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=given)
     load = st.Load(profile=labelled(1.0 + x[::-1], x[::-1]))
@@ -123,7 +129,9 @@ def test_everything_beside_the_strength_is_read_alike(system, strength, interfac
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + x)
     with pytest.raises(st.InputError, match="load.profile: x lies elsewhere"):
-        st.Problem(system.solid, interface, friction, st.Load(profile=labelled(1.0 + x, x * 0.99)))
+        st.Problem(
+            system.solid, interface, friction, st.Load(profile=labelled(1.0 + x, x * 0.99))
+        )
     load = st.Load(profile=labelled(1.0 + x, x, units="Pa"))
     with pytest.raises(st.InputError, match="profile: load_profile is in Pa"):
         st.Problem(system.solid, interface, friction, load)
@@ -209,7 +217,9 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(interface, strengt
 def test_heights_are_no_strength(interface, strength, tmp_path, head):
     path = tmp_path / "p.csv"
     path.write_text(text_of([interface.x * 1e3, strength], head=head))
-    with pytest.raises(st.InputError, match="no variable that is plainly the strength.*'height'"):
+    with pytest.raises(
+        st.InputError, match="no variable that is plainly the strength.*'height'"
+    ):
         st.read_profile(path, interface=interface)
     with pytest.raises(st.InputError, match="no unit of stress|no variable that is plainly"):
         st.read_profile(path, value=1, unit="um")
@@ -286,7 +296,9 @@ def test_coordinates_that_do_not_fit(system, strength):
     for words, place in cases.items():
         with pytest.raises(st.InputError, match=words):
             found(system, labelled(strength, place))
-    with pytest.raises(st.InputError, match=r"no values \(NaN\) at x = 0.00078125 m \(1 of 128"):
+    with pytest.raises(
+        st.InputError, match=r"no values \(NaN\) at x = 0.00078125 m \(1 of 128"
+    ):
         found(system, labelled(np.delete(strength, 1), np.delete(x, 1)))
     with pytest.raises(st.InputError, match="64 of 128 nodes.*make interface.length that of"):
         found(system, labelled(strength[: NODES // 2], x[: NODES // 2]))
@@ -315,19 +327,25 @@ def test_interpolation_only_where_it_is_asked_for(interface):
     tent = labelled(1e6 + 1e7 * np.minimum(x, 0.1 - x), x)
     with pytest.raises(st.InputError, match="interpolate=True"):
         st.read_profile(tent, interface=interface)
-    with pytest.warns(st.AccuracyWarning, match="40 points are interpolated linearly to 128 nodes"):
+    with pytest.warns(
+        st.AccuracyWarning, match="40 points are interpolated linearly to 128 nodes"
+    ):
         profile = st.read_profile(tent, interface=interface, interpolate=True)
     inside = (interface.x > 1e-3) & (interface.x < 0.045)
     np.testing.assert_allclose(profile[inside], 1e6 + 1e7 * interface.x[inside], rtol=1e-14)
     with pytest.raises(st.InputError, match="no values .* at x = 0.0265625 to 0.0382813 m"):
-        st.read_profile(tent.drop_isel(x=[11, 12, 13, 14]), interface=interface, interpolate=True)
+        st.read_profile(
+            tent.drop_isel(x=[11, 12, 13, 14]), interface=interface, interpolate=True
+        )
 
 
 def test_gaps_are_named_filled_on_request_and_remembered(system, strength, recwarn):
     x = system.interface.x
     holes = strength.copy()
     holes[:3], holes[-2:], holes[70:86] = np.nan, np.nan, np.nan
-    words = r"no values \(NaN\) at x = 0.0546875 to 0.0664062 m, 0.0984375 to 0.0015625 m \(21 of"
+    words = (
+        r"no values \(NaN\) at x = 0.0546875 to 0.0664062 m, 0.0984375 to 0.0015625 m \(21 of"
+    )
     for given in (holes, labelled(holes, x), labelled(holes[::-1], x[::-1])):
         with pytest.raises(st.InputError, match=f"strength: must be finite: there are {words}"):
             found(system, given)
@@ -356,7 +374,9 @@ def test_an_onset_in_a_gap_is_called_that(system, strength):
     holes = strength.copy()
     holes[78:100] = np.nan  # beside the weak place: a straight line of low strength
     holes[100] = 0.9 * holes[77]
-    with pytest.warns(st.AccuracyWarning, match="the onset at x = .* lies in a gap of the profile"):
+    with pytest.warns(
+        st.AccuracyWarning, match="the onset at x = .* lies in a gap of the profile"
+    ):
         result = st.onset(system, holes, method=st.LocalCriterion(), gaps="fill")
     assert bool(result["in_gap"][0])
     edge = strength.copy()
@@ -390,7 +410,9 @@ class Quantity:
 
 
 def test_quantities_are_converted(system, strength):
-    assert found(system, Quantity(strength * 1e-6, 1e6)) == pytest.approx(found(system, strength))
+    assert found(system, Quantity(strength * 1e-6, 1e6)) == pytest.approx(
+        found(system, strength)
+    )
     loaded = dataclasses.replace(system, load=st.Load(initial_stress=Quantity(0.1, 1e6)))
     assert loaded.load.initial_stress == pytest.approx(1e5)
     number = xr.DataArray(0.1, attrs={"units": "MPa"})
@@ -427,7 +449,9 @@ def test_a_hostile_npy_is_refused(interface, tmp_path, content):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
 @pytest.mark.parametrize("ending", ["csv", "npy", "nc"])
 def test_only_regular_files_of_some_size_are_read(tmp_path, ending):
-    paths = [tmp_path / f"{name}.{ending}" for name in ("pipe", "zero", "folder", "huge", "none")]
+    paths = [
+        tmp_path / f"{name}.{ending}" for name in ("pipe", "zero", "folder", "huge", "none")
+    ]
     os.mkfifo(paths[0])  # opening it in the ordinary way would wait for ever
     paths[1].symlink_to("/dev/zero")
     paths[2].mkdir()
@@ -448,7 +472,9 @@ def test_profiles_in_a_study_file(interface, tmp_path):
     (tmp_path / "tau_r.csv").write_text(
         text_of([x[::-1] * 1e3, 1e-3 * (1e5 + 1e6 * x[::-1])], head="x (mm);tau_r (kPa)")
     )
-    (tmp_path / "pressure.txt").write_text(text_of([5.0 + x], separator=" ", head="# sigma (MPa)"))
+    (tmp_path / "pressure.txt").write_text(
+        text_of([5.0 + x], separator=" ", head="# sigma (MPa)")
+    )
     coarse = text_of([x[::4], 1.0 + x[::4]], head="x (m);profile")
     (tmp_path / "load.csv").write_text(coarse)
     study = small_study(method={"type": "equilibrium"})
@@ -465,7 +491,10 @@ def test_profiles_in_a_study_file(interface, tmp_path):
     assert st.Study.from_dict(loaded.to_dict()) == loaded
     refused = {
         "problem: load.profile: x lies elsewhere": {"file": "load.csv"},
-        "unknown 'interpol'; did you mean 'interpolate'": {"file": "tau_r.csv", "interpol": True},
+        "unknown 'interpol'; did you mean 'interpolate'": {
+            "file": "tau_r.csv",
+            "interpol": True,
+        },
         "gaps: must be 'refuse' or 'fill'": {"file": "load.csv", "gaps": "skip"},
         "profile: .*tau_r.csv: holds no variable": "tau_r.csv",
         "a profile as a table has a file": {"values": [1.0, 2.0]},

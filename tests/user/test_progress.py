@@ -67,7 +67,9 @@ def test_a_notebook_gets_a_line_that_is_rewritten(hasty, monkeypatch, capsys):
         return types.SimpleNamespace(update=write)
 
     shell = type("ZMQInteractiveShell", (), {})()
-    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.setitem(
+        sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell)
+    )
     monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=write))
     work(Meter("in a notebook", 20))
     assert any(line.startswith("in a notebook [#") for line in shown)

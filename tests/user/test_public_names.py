@@ -17,7 +17,9 @@ def test_every_public_name_is_there(name):
 def test_completion_lists_public_names_only():
     assert dir(st) == sorted(st.__all__)
     code = "import stiction as st, numpy; st.Solid; print(' '.join(dir(st)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert done.stdout.split() == sorted(st.__all__)
 
 
@@ -54,7 +56,15 @@ def test_a_type_checker_finds_every_mistake(tmp_path):
         .replace('"fast"', "2e7")
     )
     done = subprocess.run(
-        [sys.executable, "-m", "basedpyright", "--level", "error", "--outputjson", str(tmp_path)],
+        [
+            sys.executable,
+            "-m",
+            "basedpyright",
+            "--level",
+            "error",
+            "--outputjson",
+            str(tmp_path),
+        ],
         capture_output=True,
         text=True,
         check=False,

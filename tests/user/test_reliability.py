@@ -58,7 +58,11 @@ def test_everything_wrong_is_named_at_once(system):
     [
         ("seed", -1),
         ("event", "collapse"),
-        *((name, value) for name in ("target_cv", "confidence") for value in ("much", None, [0.1])),
+        *(
+            (name, value)
+            for name in ("target_cv", "confidence")
+            for value in ("much", None, [0.1])
+        ),
         *(("max_evaluations", value) for value in ("much", True, [0.1])),
         *(("workers", value) for value in (0, "two", 1.5)),
         *(("stress", value) for value in (np.nan, np.inf, True, None, [0.67e6])),
@@ -339,7 +343,9 @@ def test_the_check_sees_samples_that_fail_by_equilibrium_only(joint):
     problem = dataclasses.replace(joint[0], friction=st.LinearWeakening(weakening_rate=0.5e12))
     spectrum = st.PowerLawSpectrum(0.12 * problem.nucleation_length)
     strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, True)
-    with pytest.warns(st.AccuracyWarning, match=r"32 fail by the local criterion and 4\d by equil"):
+    with pytest.warns(
+        st.AccuracyWarning, match=r"32 fail by the local criterion and 4\d by equil"
+    ):
         found = st.failure_probability(
             problem, strength, 0.818e6, method=LOCAL, algorithm="plain", progress=False
         )
@@ -363,7 +369,9 @@ def test_the_check_after_subset_simulation_sees_both_sides(joint, stress):
     spectrum = st.PowerLawSpectrum(0.12 * problem.nucleation_length)
     strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, True)
     with pytest.warns(st.AccuracyWarning, match="by equilibrium the probability"):
-        found = st.failure_probability(problem, strength, stress, method=LOCAL, algorithm="subset")
+        found = st.failure_probability(
+            problem, strength, stress, method=LOCAL, algorithm="subset"
+        )
     counts = re.search(r"(\d+) fail by the local criterion and (\d+) by", found.warnings[-1])
     local, exact = map(int, counts.groups())
     assert 16 <= local <= 48
@@ -386,7 +394,9 @@ def app():
 
 def written(path, system, **more):
     ensemble = st.Ensemble(samples=10, seed=3)
-    study = st.Study(problem=system[0], random=system[1], method=LOCAL, ensemble=ensemble, **more)
+    study = st.Study(
+        problem=system[0], random=system[1], method=LOCAL, ensemble=ensemble, **more
+    )
     study.to_toml(path)
     return str(path)
 

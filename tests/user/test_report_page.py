@@ -35,7 +35,9 @@ def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(tmp_path):
         load = st.Load(normal_pressure=pressure)
         problem = st.Problem(plain.solid, plain.interface, plain.friction, load)
         ensemble = st.Ensemble(samples=40)
-        sweep = [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}] if pressure else []
+        sweep = (
+            [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}] if pressure else []
+        )
         study = st.Study(
             problem=problem,
             random=strength,

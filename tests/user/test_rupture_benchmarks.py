@@ -40,7 +40,9 @@ def line_arrivals(script, spacing):
         save=st.Save([], every=1000),
         progress=False,
     )
-    return np.interp([3e3, 6e3, 9e3, 12e3, 14.9e3], line.x - length / 2, run.arrival_time.values)
+    return np.interp(
+        [3e3, 6e3, 9e3, 12e3, 14.9e3], line.x - length / 2, run.arrival_time.values
+    )
 
 
 def test_line_arrives_with_a_spectral_element_code_and_converges(script):
@@ -75,7 +77,9 @@ def test_community_fault(script, tmp_path):
     assert abs(float(record.station_x) - script.PERIOD[0] / 2 - 7.5e3) <= 100.0
     assert float(record.station_shear_stress.max()) == pytest.approx(script.STRENGTH, rel=0.01)
     # Sliding at the residual strength, to round-off of the sum of stresses.
-    assert record.station_shear_stress.values[slipped] == pytest.approx(script.RESIDUAL, rel=1e-9)
+    assert record.station_shear_stress.values[slipped] == pytest.approx(
+        script.RESIDUAL, rel=1e-9
+    )
     slip = np.trapezoid(record.station_slip_rate, record.step_time)
     # A step slips by the predicted rate, the record holds the corrected one: second order, .1 %.
     assert slip == pytest.approx(float(record.station_slip[-1]), rel=3e-3)

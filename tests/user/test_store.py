@@ -260,7 +260,9 @@ def test_killed_while_chunks_are_joined(tmp_path, reference, monkeypatch, name):
         lambda path: path.write_bytes(path.read_bytes()[:-100]),
         lambda path: path.write_bytes(b""),
         lambda path: path.unlink(),
-        lambda path: path.write_bytes(path.with_name(chunks(path.parents[1])[0].name).read_bytes()),
+        lambda path: path.write_bytes(
+            path.with_name(chunks(path.parents[1])[0].name).read_bytes()
+        ),
     ],
     ids=["truncated", "empty", "gone", "another chunk"],
 )
@@ -287,7 +289,9 @@ def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
 def test_one_bit_anywhere_is_found_and_mended(run, reference, name):
     for seed in range(8):
         chance = np.random.default_rng(seed)
-        victim = chunks(run)[chance.integers(len(chunks(run)))] if name == "chunks" else run / name
+        victim = (
+            chunks(run)[chance.integers(len(chunks(run)))] if name == "chunks" else run / name
+        )
         flip(victim, chance)
         if name == "study.json":
             with pytest.raises(StoreError, match="damaged"):
@@ -472,7 +476,9 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(store, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
         make_study(samples=40).run(out=tmp_path / "run")
-    with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, this is stiction"):
+    with pytest.warns(
+        UserWarning, match=r"begun with stiction 99\.0, numpy .*, this is stiction"
+    ):
         make_study(samples=60).run(out=tmp_path / "run")
     point = make_study(samples=40).experiments[0]
     with pytest.raises(WorkerError, match="install the same versions"):
@@ -525,7 +531,9 @@ def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
     """A sample that takes long does not keep finished ones from being stored."""
     monkeypatch.setattr(store.Store, "_join", lambda self: None)
     with SlowFrom(256, seconds=1.6) as executor:
-        make_study(samples=600, sweep=[]).run(out=tmp_path / "run", executor=executor, workers=2)
+        make_study(samples=600, sweep=[]).run(
+            out=tmp_path / "run", executor=executor, workers=2
+        )
     assert st.open_run(tmp_path / "run").status().chunks >= 2
 
 

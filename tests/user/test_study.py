@@ -64,7 +64,9 @@ def test_python_and_toml_are_the_same_study(tmp_path):
 def test_a_study_is_monte_carlo():
     study = st.Study.from_dict(STUDY)
     result = study.run()
-    direct = st.monte_carlo(study.problem, study.random, method=study.method, samples=40, seed=3)
+    direct = st.monte_carlo(
+        study.problem, study.random, method=study.method, samples=40, seed=3
+    )
     assert result.identical(direct)
 
 
@@ -103,13 +105,21 @@ def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
         ("problem.solid.densty", 1.0, ["problem.solid", "'densty'", "did you mean 'density'"]),
         ("problem.interface.nodes", "many", ["problem.interface.nodes", "'many'"]),
         ("problem.load", {"profile": "missing.npy"}, ["problem.load.profile", "missing.npy"]),
-        ("random.strength.marginal.type", "betta", ["strength", "'betta'", "did you mean 'beta'"]),
+        (
+            "random.strength.marginal.type",
+            "betta",
+            ["strength", "'betta'", "did you mean 'beta'"],
+        ),
         (
             "random.strength.marginal.low",
             2e6,
             ["random.strength.marginal", "low must be below high"],
         ),
-        ("random.strength.spectrum.type", "powerlaw", ["'powerlaw'", "did you mean 'power_law'"]),
+        (
+            "random.strength.spectrum.type",
+            "powerlaw",
+            ["'powerlaw'", "did you mean 'power_law'"],
+        ),
         ("random.strength.spectrum.correlation_length", 10.0, ["strength", "no mode is left"]),
         ("method.type", "local", ["method.type", "'local'", "local_criterion"]),
         ("method.weight", "exact", ["method", "'weight'", "did you mean 'weights'"]),
@@ -133,7 +143,12 @@ def test_all_mistakes_come_at_once():
         st.Study.from_dict(study)
     text = str(caught.value)
     assert len(caught.value.problems) == 4
-    for word in ("problem.solid.density", "ensemble.samples", "'sed'", "random.strength.spectrum"):
+    for word in (
+        "problem.solid.density",
+        "ensemble.samples",
+        "'sed'",
+        "random.strength.spectrum",
+    ):
         assert word in text
 
 
@@ -173,5 +188,7 @@ def test_help_does_not_import_the_numerics():
         "print([m for m in ('numba', 'scipy', 'xarray', 'matplotlib', 'pydantic', 'distributed')"
         " if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert done.stdout.strip() == "[]"

@@ -80,7 +80,10 @@ def test_toml_python_and_result_agree(tmp_path):
         ensemble=base.ensemble,
         sweep=[
             {LENGTH: np.linspace(4e-3, 8e-3, 3)},
-            {"problem.solid.density": [1000.0, 2000.0], "problem.solid.poisson_ratio": [0.2, 0.3]},
+            {
+                "problem.solid.density": [1000.0, 2000.0],
+                "problem.solid.poisson_ratio": [0.2, 0.3],
+            },
         ],
     )
     assert python == study
@@ -92,7 +95,9 @@ def test_toml_python_and_result_agree(tmp_path):
 
 def test_whole_tables_are_values_too():
     other = {"type": "lognorm", "s": 0.2, "scale": 1e6}
-    study = swept({"random.strength.marginal": [STUDY["random"]["strength"]["marginal"], other]})
+    study = swept(
+        {"random.strength.marginal": [STUDY["random"]["strength"]["marginal"], other]}
+    )
     result = study.run()
     np.testing.assert_array_equal(result["marginal"], ["beta", "lognorm"])
     assert study.experiments[1].random.strength.mean == pytest.approx(
@@ -136,7 +141,9 @@ def test_a_swept_key_needs_no_value_of_its_own():
 
 def test_profiles_in_files_can_be_swept(tmp_path):
     for name, scale in (("a", 0.0), ("b", 0.1)):
-        np.save(tmp_path / f"{name}.npy", 1.0 + scale * np.sin(np.arange(128) * 2 * np.pi / 128))
+        np.save(
+            tmp_path / f"{name}.npy", 1.0 + scale * np.sin(np.arange(128) * 2 * np.pi / 128)
+        )
     study = st.Study.from_dict(
         STUDY | {"sweep": [{"problem.load.profile": ["a.npy", "b.npy"]}]}, folder=tmp_path
     )
@@ -208,7 +215,9 @@ def test_kept_profiles():
     study = swept({LENGTH: [4e-3, 6e-3]}, ensemble=KEEPING)
     result = study.run()
     assert result["strength"].dims == ("correlation_length", "sample", "x")
-    direct = study.experiments[1].random.strength.sample(study.problem.interface, samples=2, seed=3)
+    direct = study.experiments[1].random.strength.sample(
+        study.problem.interface, samples=2, seed=3
+    )
     np.testing.assert_array_equal(result["strength"].values[1], direct)
     longer = swept(
         {"problem.interface.length": [0.1, 0.2]}, ensemble={"samples": 3, "keep": ["strength"]}
@@ -219,7 +228,8 @@ def test_kept_profiles():
 def test_what_may_be_kept_is_limited():
     with pytest.raises(st.InputError, match="number of nodes is swept"):
         swept(
-            {"problem.interface.nodes": [128, 256]}, ensemble={"samples": 3, "keep": ["strength"]}
+            {"problem.interface.nodes": [128, 256]},
+            ensemble={"samples": 3, "keep": ["strength"]},
         )
     with pytest.raises(st.InputError, match="did you mean 'strength'"):
         st.Study.from_dict(STUDY | {"ensemble": {"samples": 3, "keep": ["strenght"]}})

@@ -69,7 +69,9 @@ def energy_release_rate(
     period = problem.interface.extent
     whole = np.atleast_1d(_numbers("lengths", lengths))
     if whole.ndim != 1 or not np.all((whole > 0.0) & (whole < period)):
-        raise InputError(f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}")
+        raise InputError(
+            f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
+        )
     resting, profile = _stress_drops(problem)
     drops = (resting + load * profile)[None]
     return _release_rate(problem, _intensity_factors(problem, drops, whole, centre)[0])
@@ -120,7 +122,9 @@ def griffith_length(
     check("arrest", arrest, Flag)
     loads = _numbers("load", load)
     if loads.ndim > 1 or not np.all(np.isfinite(loads)):
-        raise InputError(f"load: must be a finite number or an array of them, got {describe(load)}")
+        raise InputError(
+            f"load: must be a finite number or an array of them, got {describe(load)}"
+        )
     whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
     drops = _stress_drops(problem)
     resting, unit = _intensity_factors(problem, drops, whole, centre)
@@ -140,7 +144,10 @@ def griffith_length(
         middle = 0.5 * (low + high)
         resting, unit = _intensity_factors(problem, drops, middle, centre)
         above = _release_rate(problem, resting + tau * unit).min(axis=1) > fracture_energy
-        low, high = np.where(above == arrest, middle, low), np.where(above == arrest, high, middle)
+        low, high = (
+            np.where(above == arrest, middle, low),
+            np.where(above == arrest, high, middle),
+        )
     found[crosses] = high
     return found if loads.ndim else float(found[0])
 
@@ -175,7 +182,9 @@ def _stress_drops(problem: Problem) -> Array:
     """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
     resting = np.asarray(problem.load.initial_stress - problem.friction.residual_strength)
     shape = problem.interface.shape
-    return np.stack([np.broadcast_to(given, shape) for given in (resting, problem.load_profile)])
+    return np.stack(
+        [np.broadcast_to(given, shape) for given in (resting, problem.load_profile)]
+    )
 
 
 def _intensity_factors(problem: Problem, drops: Array, whole: Array, centre: float) -> Array:

@@ -25,7 +25,9 @@ ENOUGH = 1000
 """Samples that tell how many reach their residual strength."""
 
 OWN_VARIABLES = {
-    "critical_aspect": Variable("1", "extent of the critical ellipse along x over that along y"),
+    "critical_aspect": Variable(
+        "1", "extent of the critical ellipse along x over that along y"
+    ),
     "critical_patch_extent": Variable("m", "extents of the critical ellipse"),
     "critical_patch_area": Variable("m2", "area of the critical ellipse"),
 }
@@ -296,7 +298,9 @@ def nucleation_stress(
     for own, strength in zip(result, excess, strict=True):
         spectrum = grid.transform(strength)
         for window, average in zip(windows, loads, strict=True):
-            np.minimum(own, grid.inverse_transform(spectrum * window.spectrum) / average, out=own)
+            np.minimum(
+                own, grid.inverse_transform(spectrum * window.spectrum) / average, out=own
+            )
     # The weights keep to these bounds; only the rounding of the transforms may not.
     ratio = windows[0].total * (excess / sample.load_profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))

@@ -119,7 +119,9 @@ def _line_weights(half_width: float, nodes: int, weights: Weights) -> tuple[Arra
 
 def _plane_window(problem: Problem, rate: float, aspect: float) -> Window:
     grid, solid = problem.interface, problem.solid
-    found = _kept(grid.shape, grid.lengths, solid.shear_modulus, solid.poisson_ratio, rate, aspect)
+    found = _kept(
+        grid.shape, grid.lengths, solid.shear_modulus, solid.poisson_ratio, rate, aspect
+    )
     if found is None:
         length = problem.nucleation_lengths(rate)[0]
         size = " x ".join(f"{one:.4g}" for one in grid.lengths)
@@ -315,7 +317,9 @@ def transform(w: Array, nodes: int) -> Array:
     return result
 
 
-def squared_radius(shape: tuple[int, int], spacings: tuple[float, float], aspect: float) -> Array:
+def squared_radius(
+    shape: tuple[int, int], spacings: tuple[float, float], aspect: float
+) -> Array:
     """Return x^2 + (aspect y)^2 of every node from the nearest image of node (0, 0), m^2."""
     x, y = (np.fft.fftfreq(n) * n * spacing for n, spacing in zip(shape, spacings, strict=True))
     result: Array = (x[:, None]) ** 2 + (aspect * y[None, :]) ** 2
@@ -331,7 +335,9 @@ def _boxes(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
     yield shape
 
 
-def _nodes_of(box: tuple[int, int], shape: tuple[int, int]) -> tuple[NDArray[Any], NDArray[Any]]:
+def _nodes_of(
+    box: tuple[int, int], shape: tuple[int, int]
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the nodes of a box around node (0, 0), in the order of transforms."""
     along, across = (
         np.rint(np.fft.fftfreq(n) * n).astype(np.int64) % whole
@@ -341,7 +347,11 @@ def _nodes_of(box: tuple[int, int], shape: tuple[int, int]) -> tuple[NDArray[Any
 
 
 def ellipse_window(
-    symbol: Array, shape: tuple[int, int], lengths: tuple[float, float], rate: float, aspect: float
+    symbol: Array,
+    shape: tuple[int, int],
+    lengths: tuple[float, float],
+    rate: float,
+    aspect: float,
 ) -> Window | None:
     """Return the smallest unstable ellipse of one aspect; None if it meets its images.
 
@@ -357,7 +367,9 @@ def ellipse_window(
     for box in _boxes(shape):
         longest = [
             n * spacing * (0.5 if n == whole else 0.25) * stretch
-            for n, whole, spacing, stretch in zip(box, shape, spacings, (1.0, aspect), strict=True)
+            for n, whole, spacing, stretch in zip(
+                box, shape, spacings, (1.0, aspect), strict=True
+            )
         ]
         nodes = _nodes_of(box, shape)
         found = _smallest_unstable(column[nodes], spacings, rate, aspect, least, min(longest))

@@ -73,7 +73,9 @@ def check_start(run: Run, time: float) -> None:
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
     times, values = run.history
     lowest, nodes = float(values[times <= time].min()), run.setting.nodes
-    _warn_of_reverse(run, lowest * nodes.profile + nodes.initial < -nodes.strength, time, lowest)
+    _warn_of_reverse(
+        run, lowest * nodes.profile + nodes.initial < -nodes.strength, time, lowest
+    )
 
 
 def resolves_steps(run: Run, time: float) -> bool:

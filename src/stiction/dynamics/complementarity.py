@@ -21,7 +21,12 @@ from stiction.jit import jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
     """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
     u, slipping, driving = tables.increment, tables.slipping, tables.driving
-    falling, product, residual, z = tables.falling, tables.product, tables.residual, tables.other
+    falling, product, residual, z = (
+        tables.falling,
+        tables.product,
+        tables.residual,
+        tables.other,
+    )
     direction, work = tables.direction, tables.work
     n = u.size
     convolve(transform, tables.symbol, u, work, product)

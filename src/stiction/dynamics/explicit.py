@@ -66,7 +66,9 @@ def _predict(
     for i in range(slip.size):
         ahead = slip[i] + step * rate[i]
         limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
-        predicted[i] = max(transfer[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
+        predicted[i] = (
+            max(transfer[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
+        )
 
 
 @jit_inside
@@ -98,7 +100,9 @@ def _correct(
 
 
 @jit_inside
-def _arrive(state: State, critical: Array, half: float, tables: ExplicitTables, time: float) -> Any:
+def _arrive(
+    state: State, critical: Array, half: float, tables: ExplicitTables, time: float
+) -> Any:
     """Take over the new rate; return (largest rate, its node, sum of the slip)."""
     slip, rate, arrival = state.slip, state.rate, state.arrival
     predicted, step = tables.predicted, tables.step
@@ -122,7 +126,9 @@ def _calm(now: Any, thresholds: Thresholds, step: Step, impedance: float, rise: 
     Waves make slip rates come and go; creep is slow, or as fast as it was.
     """
     scale = now.scale
-    quiet = step.top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step.size
+    quiet = (
+        step.top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step.size
+    )
     before = now.calm_rate
     steady = 0.5 * before <= step.top <= 2.0 * before
     if quiet or (steady and step.top < STEADY_STRESS * scale / impedance):

@@ -128,7 +128,9 @@ def _assemble(
 
 
 @jit_inside
-def _effect(state: State, setting: Setting, u: Array, impedance: float, attempt: _Attempt) -> Any:
+def _effect(
+    state: State, setting: Setting, u: Array, impedance: float, attempt: _Attempt
+) -> Any:
     """Return (largest loss of strength of a node, total slip, Z <V>) of slip increments u."""
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
@@ -158,7 +160,9 @@ def _accelerates(
     noticed = _NOTICED * now.scale
     growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
-    shorter = 0.5 * attempt.size >= thresholds.smallest_step or largest > 0.1 * thresholds.slip_step
+    shorter = (
+        0.5 * attempt.size >= thresholds.smallest_step or largest > 0.1 * thresholds.slip_step
+    )
     return growing and matters and shorter and attempt.ratio > 0.0
 
 
@@ -207,7 +211,9 @@ def _accept(
         if np.isnan(state.arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
             state.arrival[i] = arrived(slip[i], half * critical[i], u[i], attempt.time, size)
     mean_slip = slip_sum / u.size
-    return Step(attempt.time, size, load, work * grid.cell, radiated, mean_slip, slid, top, node)
+    return Step(
+        attempt.time, size, load, work * grid.cell, radiated, mean_slip, slid, top, node
+    )
 
 
 @jit_inside
@@ -259,7 +265,9 @@ def implicit_steps(
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
         accuracy = _assemble(state, grid, setting, tables, attempt)
         near = accuracy if thresholds.curved else 0.0
-        failed = not solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
+        failed = not solve_increment(
+            grid.transform, setting, state.slip, tables, accuracy, near
+        )
         largest, total, radiated = 0.0, 0.0, 0.0
         if not failed:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)

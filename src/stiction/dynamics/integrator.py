@@ -40,7 +40,9 @@ from stiction.dynamics.state import (
 from stiction.friction.kernels import strengths
 from stiction.friction.laws import FrictionLaw
 
-_OVERSTRESSED = 1e-6  # of the stress scale: above the strength by so much, slip begins with waves
+_OVERSTRESSED = (
+    1e-6  # of the stress scale: above the strength by so much, slip begins with waves
+)
 _NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
 _MARGIN = 1.5  # on the length from which on nothing stops a rupture: the same as equilibrium's
 _RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
@@ -157,7 +159,9 @@ class Run:
 
     def ended(self, state: State) -> bool:
         """Return whether the end time is reached, up to the rounding of a sum of many steps."""
-        return bool(self.setting.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step)
+        return bool(
+            self.setting.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step
+        )
 
     def ending(self, state: State, reason: int) -> str | None:
         """Return why a run ends here, in a word; None if it goes on."""
@@ -204,7 +208,9 @@ class Run:
             return False
         length = 4.0 * medium.effective_modulus * self._largest_fracture_energy
         needed = _MARGIN * (length / (np.pi * drop**2)) / medium.grid.cell
-        return bool(now["slid"] >= needed and longest_row(state.slip >= nodes.critical) >= needed)
+        return bool(
+            now["slid"] >= needed and longest_row(state.slip >= nodes.critical) >= needed
+        )
 
     def follow(self, state: State, most: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
@@ -253,7 +259,13 @@ class Run:
             self.tables = None  # let go of the others before these are made
             self.tables = implicit_tables(self.medium.grid)
         taken, size, reason = implicit_steps(
-            count, float(state.phase[1]), state, self.medium.grid, self.setting, self.tables, record
+            count,
+            float(state.phase[1]),
+            state,
+            self.medium.grid,
+            self.setting,
+            self.tables,
+            record,
         )
         state.phase[1] = size
         return int(taken), int(reason)

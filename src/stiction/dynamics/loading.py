@@ -43,7 +43,9 @@ def load_history(load: Any) -> History:
         raise InputError("must be two arrays of numbers, (times, values)") from None
     if times.ndim != 1 or times.shape != values.shape or times.size < 2:
         shapes = f"{times.shape} and {values.shape}"
-        raise InputError(f"needs two 1-d arrays, equally long, of two or more; got shapes {shapes}")
+        raise InputError(
+            f"needs two 1-d arrays, equally long, of two or more; got shapes {shapes}"
+        )
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
         raise InputError("times and values must be finite")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):

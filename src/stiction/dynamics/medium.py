@@ -212,7 +212,9 @@ def _largest(kernel: ExponentialSum, stiffness: float) -> float:
     return low
 
 
-def _mixed(in_plane: ExponentialSum, anti_plane: ExponentialSum, share: float) -> ExponentialSum:
+def _mixed(
+    in_plane: ExponentialSum, anti_plane: ExponentialSum, share: float
+) -> ExponentialSum:
     """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
     return ExponentialSum(
         np.concatenate([in_plane.poles, anti_plane.poles]),

@@ -92,7 +92,9 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
     table = zeros(count * pairs * 4 * LANES).reshape(count, pairs, 4, LANES)
     response = np.empty(grid.frequency.size)
     in_plane = (np.arange(pairs) < grid.split)[:, None]
-    for block in range(count):  # one by one: their exponentials together would take more than it
+    for block in range(
+        count
+    ):  # one by one: their exponentials together would take more than it
         some = slice(block * LANES, (block + 1) * LANES)
         z = np.multiply.outer(grid.poles, grid.frequency[some] * step)
         share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
@@ -167,7 +169,9 @@ def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) ->
         for copy in range(grid.multiplicity):
             own = y[block, copy]
             terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
-            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(axis=0)
+            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(
+                axis=0
+            )
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
@@ -249,7 +253,10 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
             else:
                 per_z = inverse * (1.0 / (j + 1)) if grid.multiplicity == 1 else 1.0 / z
                 ratio = (decay - 1.0) * per_z
-                gain, ramp_gain = step * ratio, step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
+                gain, ramp_gain = (
+                    step * ratio,
+                    step * step * ((ratio - 1.0) * per_z - 0.5 * ratio),
+                )
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
@@ -302,7 +309,14 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
             own = block // multiplicity * pairs + p
             e, s = tables.table[own * 256 :][:256], tables.ramp[own * 128 :][:128]
             for j in range(64):
-                er, ei, gr, gi, lr, li = e[j], e[64 + j], e[128 + j], e[192 + j], s[j], s[64 + j]
+                er, ei, gr, gi, lr, li = (
+                    e[j],
+                    e[64 + j],
+                    e[128 + j],
+                    e[192 + j],
+                    s[j],
+                    s[64 + j],
+                )
                 yr, yi = y[j], y[64 + j]
                 y[j] = er * yr - ei * yi + gr * v[j] + lr * a[j]
                 y[64 + j] = er * yi + ei * yr + gi * v[j] + li * a[j]

@@ -183,7 +183,9 @@ class Rupture:
         """Reasons why it cannot take a problem; none if it can."""
         refused = refused_laws(problem)
         if self.stop == "runaway" and problem.interface.is_plane:
-            refused.append("stop: 'runaway' is known of lines only; stop at 'sliding' or 'onset'")
+            refused.append(
+                "stop: 'runaway' is known of lines only; stop at 'sliding' or 'onset'"
+            )
         return refused
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
@@ -285,7 +287,9 @@ def make_run(
     return Run(medium, friction, setting, method.stop, steepest, least)
 
 
-def _thresholds(method: Rupture, friction: FrictionLaw, medium: Medium, nodes: Nodes) -> Thresholds:
+def _thresholds(
+    method: Rupture, friction: FrictionLaw, medium: Medium, nodes: Nodes
+) -> Thresholds:
     """When steps change or end.
 
     Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack

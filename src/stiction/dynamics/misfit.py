@@ -142,7 +142,9 @@ def _checked(record: xr.DataArray) -> tuple[Array, Array, Array]:
     if not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise InputError("measured: its times must be finite and rising")
     if np.isinf(values).any() or not np.isfinite(values).any(axis=0).all():
-        raise InputError("measured: every gauge needs finite values; nan where none was recorded")
+        raise InputError(
+            "measured: every gauge needs finite values; nan where none was recorded"
+        )
     return times, values, si(record["x"], "m")
 
 

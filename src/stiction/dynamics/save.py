@@ -138,7 +138,9 @@ class Save:
         for name, place in self.stations.items():
             if len(place) != len(interface.shape):
                 problems.append(f"stations[{name!r}]: must be {wanted} in m, got {place}")
-            elif not all(0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)):
+            elif not all(
+                0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)
+            ):
                 problems.append(
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m; places "
                     "are in m, from the first node"
@@ -357,7 +359,9 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     parts = []
     for path in sorted(folder.glob(_CHUNKS)):
         with xr.open_dataset(path, engine="netcdf4") as data:
-            unwanted = [f for f in FIELDS if f in data and fields is not None and f not in fields]
+            unwanted = [
+                f for f in FIELDS if f in data and fields is not None and f not in fields
+            ]
             parts.append(data.drop_vars(unwanted).load())
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")

@@ -67,7 +67,12 @@ def slow_start(
 
 
 def _at(
-    setting: LineProgram, run: Run, static: StaticSample, onset: float, distance: float, rate: float
+    setting: LineProgram,
+    run: Run,
+    static: StaticSample,
+    onset: float,
+    distance: float,
+    rate: float,
 ) -> State | None:
     """The state at a distance (Pa) below the onset; None where it is not known well enough.
 

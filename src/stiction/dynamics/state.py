@@ -70,13 +70,17 @@ class Thresholds(NamedTuple):
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
     breakable: int  # nodes that can break at all
-    calm_slip: float  # slip (m/Pa) of calm steps, times the rise of the load; see `explicit._calm`
+    calm_slip: (
+        float  # slip (m/Pa) of calm steps, times the rise of the load; see `explicit._calm`
+    )
     calm_count: int  # calm steps in a row after which implicit steps take over
     slip_step: float  # loss of strength of a node in one implicit step, in tau_p - tau_r
     load_step: float  # largest rise of the load in one implicit step, in stress scales
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
     unstable_rate: float  # slip rate, m/s, that only an instability reaches
-    arrival: float  # slip at which a front has arrived, in units of that at the residual strength
+    arrival: (
+        float  # slip at which a front has arrived, in units of that at the residual strength
+    )
     curved: bool  # whether the law is other than linear, whose pieces are met to the bit
     explicit_only: bool
 
@@ -90,10 +94,14 @@ class Grid(NamedTuple):
     stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
     entry: Ints  # (modes,): which entry of the tables a mode uses
     offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
-    multiplicity: int  # modes that share one entry of the tables: 2 on a plane, kx and -kx, else 1
+    multiplicity: (
+        int  # modes that share one entry of the tables: 2 on a plane, kx and -kx, else 1
+    )
     frequency: Array  # |k| c_s of each entry, rad/s
     mode_two: Array  # how much of it is mode II, (kx/k)²; 1 on a line, whatever its mode
-    poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`, then,
+    poles: (
+        Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`, then,
+    )
     weights: Spectrum  # on a plane, those of mode III, which weigh with 1 - mode_two
     split: int  # how many of the pairs weigh with `mode_two`
 

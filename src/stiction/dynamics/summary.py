@@ -24,7 +24,9 @@ _SCALARS: dict[str, Variable] = {
     "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
     "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
-    "arrested_events": Variable("1", "instabilities that stopped before the whole interface slid"),
+    "arrested_events": Variable(
+        "1", "instabilities that stopped before the whole interface slid"
+    ),
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
     "start_load": Variable("Pa", "load factor at which the simulation began"),
@@ -41,7 +43,9 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
-    return replace(variable, units=units, long_name=variable.long_name.replace(" per length", ""))
+    return replace(
+        variable, units=units, long_name=variable.long_name.replace(" per length", "")
+    )
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
@@ -134,7 +138,9 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
         "fracture_energy": float(dissipated.sum()) * cell,
         "arrested_events": int(now["arrested"]),
         "rupture_speed": _per_direction([_of_finite(np.max, speeds) for speeds in far]),
-        "median_rupture_speed": _per_direction([_of_finite(np.median, speeds) for speeds in near]),
+        "median_rupture_speed": _per_direction(
+            [_of_finite(np.median, speeds) for speeds in near]
+        ),
         "start_load": float(now["start_load"]),
         "start_error": float(now["start_error"]),
         "implicit_steps": int(now["implicit_steps"]),
@@ -142,7 +148,9 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
     }
 
 
-def rupture_speed(arrival: Floats, spacings: Sequence[float], windows: Sequence[float]) -> Floats:
+def rupture_speed(
+    arrival: Floats, spacings: Sequence[float], windows: Sequence[float]
+) -> Floats:
     """Return the apparent speed of the front at each node, m/s; nan where no front passed.
 
     `arrival` is when the front arrived, s, periodic and nan where it never did; `spacings` of the

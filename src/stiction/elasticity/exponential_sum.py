@@ -97,7 +97,9 @@ class _Polish:
         real, imaginary = np.split(parameters, 2)
         return -np.exp(real) - self.floor + 1j * imaginary
 
-    def project(self, poles: Complex, emphasis: Floats) -> tuple[Complex, Floats, Complex, Floats]:
+    def project(
+        self, poles: Complex, emphasis: Floats
+    ) -> tuple[Complex, Floats, Complex, Floats]:
         modes = np.exp(np.multiply.outer(self.times, poles))
         basis = np.hstack([modes.real, -modes.imag]) * emphasis[:, None]
         q, r = np.linalg.qr(basis)
@@ -191,7 +193,10 @@ def fit_exponentials(
     InputError
         If the options are out of range or no sum of up to 60 pairs reaches the tolerance.
     """
-    for name, value, low, high in (("tolerance", tolerance, 1e-9, 1e-2), ("t_max", t_max, 10, 1e8)):
+    for name, value, low, high in (
+        ("tolerance", tolerance, 1e-9, 1e-2),
+        ("t_max", t_max, 10, 1e8),
+    ):
         if not low <= value <= high:
             raise InputError(f"kernel {name}: must lie in [{low:g}, {high:g}], got {value!r}")
     arcs = arc_quadrature(mode, eta)

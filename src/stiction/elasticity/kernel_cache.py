@@ -26,7 +26,9 @@ def kernel_sum(
     Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel
     at once both succeed: each writes aside and renames.
     """
-    return stored_kernel(mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max))
+    return stored_kernel(
+        mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max)
+    )
 
 
 @cache

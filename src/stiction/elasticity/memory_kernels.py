@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
-_RANGE = 4.4  # the outermost node lies 1e-55 from the branch point, its weight underflows any sum
+_RANGE = (
+    4.4  # the outermost node lies 1e-55 from the branch point, its weight underflows any sum
+)
 _CHUNK = 2048
 
 
@@ -52,7 +54,9 @@ def _half_arc() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return angle, weight
 
 
-def arc_quadrature(mode: str, eta: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def arc_quadrature(
+    mode: str, eta: float
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Nodes s, Re s < 0, and weights w, some 140 an arc, with C(T) = Re sum w exp(s T), T >= 0.
 
     The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across the arc
@@ -70,7 +74,10 @@ def arc_quadrature(mode: str, eta: float) -> tuple[NDArray[np.complex128], NDArr
         fast = eta * s
         nodes = np.concatenate([s, fast])
         weights = np.concatenate(
-            [-((2.0 + s * s) ** 2) / (s**3 * root) * factor, 4.0 * root / fast**3 * eta * factor]
+            [
+                -((2.0 + s * s) ** 2) / (s**3 * root) * factor,
+                4.0 * root / fast**3 * eta * factor,
+            ]
         )
     kept = np.abs(weights) > 1e-18
     return nodes[kept], weights[kept]

@@ -129,7 +129,9 @@ class Gathered:
         found = [self._failures[key] for key in sorted(self._failures)]
         return [f for f in found if not self.done[f.point, f.sample - self.first]]
 
-    def dataset(self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()) -> xr.Dataset:
+    def dataset(
+        self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()
+    ) -> xr.Dataset:
         """Return everything as a dataset, in the order in which the method names it.
 
         Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are

@@ -213,7 +213,9 @@ class Experiment:
         # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
         return size if size < SLOW else max(size, block)
 
-    def batches(self, first: int, count: int, size: int | None = None) -> Iterator[tuple[int, int]]:
+    def batches(
+        self, first: int, count: int, size: int | None = None
+    ) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
 
         The default of `size` is `batch`.

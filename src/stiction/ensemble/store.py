@@ -96,7 +96,9 @@ class Store:
             before = read_study(path)
         except (FileNotFoundError, Damaged):
             if sum(1 for _ in store.chunks()) or STUDY in others:
-                store._warn(f"{STUDY} is damaged or gone; it is made of the study that is given")
+                store._warn(
+                    f"{STUDY} is damaged or gone; it is made of the study that is given"
+                )
         if before:
             refuse_another(path, study, before)
         if before != study:
@@ -201,7 +203,9 @@ class Store:
             group: dict[str, Chunk] = {}
             while names and sum(chunk.bytes for chunk in group.values()) < LARGE:
                 name = names.pop()
-                with suppress(FileNotFoundError, Damaged):  # damage is reported where it is read
+                with suppress(
+                    FileNotFoundError, Damaged
+                ):  # damage is reported where it is read
                     group[name] = read_chunk(self.path / CHUNKS / name)[0]
             if len(group) < 2:
                 self._small += group

@@ -126,7 +126,9 @@ class Bracket:
     @property
     def magnitude(self) -> float:
         """Load that relative gaps are measured by: the onset, unless that is next to nothing."""
-        return max(abs(self.upper), 1e-2 * float(np.abs(self.excess).mean() / self.profile.mean()))
+        return max(
+            abs(self.upper), 1e-2 * float(np.abs(self.excess).mean() / self.profile.mean())
+        )
 
     def closed(self, gap: float) -> bool:
         """Return whether the bounds are within a relative gap."""

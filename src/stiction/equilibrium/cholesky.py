@@ -166,7 +166,9 @@ def append(
 
 
 @jit
-def raise_diagonal(factor: Array, size: int, position: int, amount: float, turns: Array) -> None:
+def raise_diagonal(
+    factor: Array, size: int, position: int, amount: float, turns: Array
+) -> None:
     """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
 
     Their cosines and sines are kept in `turns`, work space.
@@ -292,7 +294,9 @@ def substitute_members(
 @jit_inside
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
     """K times a field given on the members, at all nodes."""
-    apply_stiffness(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
+    apply_stiffness(
+        workspace.stiffness, workspace.members, size, values, workspace.halves, result
+    )
 
 
 @jit_inside

@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.line import Stiffness, apply_stiffness, make_stiffness, stiffness_column
+from stiction.elasticity.line import (
+    Stiffness,
+    apply_stiffness,
+    make_stiffness,
+    stiffness_column,
+)
 from stiction.elasticity.linear import dot
 from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
@@ -168,7 +173,9 @@ def solve_batch(
         bound = window_bound(sample, windows, work[0], multiplier)
         # If it does not succeed, the certificate says so.
         slip[:] = 0.0
-        load, _ = solve_program(sample, start, bound, np.inf, multiplier, slip, stiff, workspace)
+        load, _ = solve_program(
+            sample, start, bound, np.inf, multiplier, slip, stiff, workspace
+        )
         first.table[row, LOAD] = load
         judge(sample, line, first, row, slip, stiff, all_slips, workspace, work)
 
@@ -375,7 +382,9 @@ class LineProgram:
             outcome = jump(sample, found.load, slip, stiff, griffith, *spaces)
         before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
         if outcome == ARRESTED and not np.any(after > before):
-            outcome = UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
+            outcome = (
+                UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
+            )
         state = State(found.load, slip, stiff, found.direction, stuck=found.stuck)
         return Jump(outcome == ARRESTED, outcome != UNDECIDED, state)
 
@@ -424,7 +433,9 @@ class LineProgram:
         members = np.flatnonzero(field)
         result = np.empty(self.nodes)
         halves = np.empty((2, self.nodes // 2))
-        apply_stiffness(self.line.stiffness, members, members.size, field[members], halves, result)
+        apply_stiffness(
+            self.line.stiffness, members, members.size, field[members], halves, result
+        )
         return result
 
 

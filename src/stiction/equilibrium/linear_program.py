@@ -92,7 +92,9 @@ def stress_tolerance(sample: Sample, load: float) -> float:
 
 
 @jit_inside
-def _back_off(sample: Sample, load: float, workspace: Workspace, size: int, stiff: Array) -> None:
+def _back_off(
+    sample: Sample, load: float, workspace: Workspace, size: int, stiff: Array
+) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave

@@ -81,7 +81,9 @@ def _padded(values: Array, fill: float) -> Array:
     return np.concatenate((values, np.full(values.shape[0], fill)))
 
 
-def _window_of(sample: Sample, nodes: NDArray[np.int64], outside: Array | float = 0.0) -> Sample:
+def _window_of(
+    sample: Sample, nodes: NDArray[np.int64], outside: Array | float = 0.0
+) -> Sample:
     """The sample on the nodes of a window; what the slip outside takes off counts as strength."""
     beyond = OUT_OF_REACH * float(np.abs(sample.excess).max())
     return Sample(
@@ -306,7 +308,9 @@ class LongLine:
             product = float(dot(residual, z, n))
             direction = z + (product / previous) * direction if previous > 0.0 else z.copy()
             previous = product
-            image = np.where(inside, self.stiffness(direction) - self.sample.rate * direction, 0.0)
+            image = np.where(
+                inside, self.stiffness(direction) - self.sample.rate * direction, 0.0
+            )
             curvature = float(dot(direction, image, n))
             if curvature <= 0.0:
                 return x, int(np.argmax(np.abs(direction)))

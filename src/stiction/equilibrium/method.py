@@ -23,8 +23,12 @@ VARIABLES = {
     "certificate_gap": Variable("Pa", "distance between the bounds of the first instability"),
     "slip_patches": Variable("1", "number of slipping patches at the first instability"),
     "arrested_events": Variable("1", "number of instabilities that came to rest"),
-    "residual_reached": Variable("1", "whether a node was at its residual strength before sliding"),
-    "sliding_position": Variable("m", "position of the patch that runs along the whole interface"),
+    "residual_reached": Variable(
+        "1", "whether a node was at its residual strength before sliding"
+    ),
+    "sliding_position": Variable(
+        "m", "position of the patch that runs along the whole interface"
+    ),
 }
 OF_LINES = {
     "critical_patch_length": Variable("m", "length of the patch that becomes unstable first"),
@@ -127,7 +131,9 @@ class Equilibrium:
         if interface.is_plane:
             return 1e-5 * interface.size
         corners = (
-            1.0 if problem.friction.linear else 9.0 * pieces_of(problem.friction).ends.size ** 0.5
+            1.0
+            if problem.friction.linear
+            else 9.0 * pieces_of(problem.friction).ends.size ** 0.5
         )
         return 3e-4 * corners * (interface.size / 1024) ** 1.5
 

@@ -123,7 +123,9 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     return Patch((centre[0], centre[1]), (extents[0], extents[1]), area)
 
 
-def largest_patch(weight: Array, spacings: tuple[float, ...], share: float) -> tuple[Mask, Patch]:
+def largest_patch(
+    weight: Array, spacings: tuple[float, ...], share: float
+) -> tuple[Mask, Patch]:
     """Return the patch around the largest weight: which nodes belong to it, and its measures.
 
     The weight is not negative and not all zero; nodes belong to a patch where it is above a share

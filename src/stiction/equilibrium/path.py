@@ -45,7 +45,9 @@ def _check_loads(loads: Any) -> Array:
         )
     if np.any(np.diff(given, prepend=-1e-300) <= 0.0):
         worst = int(np.argmin(np.diff(given, prepend=0.0)))
-        raise InputError(f"loads: must rise, none negative; entry {worst} is {given[worst]:g} Pa")
+        raise InputError(
+            f"loads: must rise, none negative; entry {worst} is {given[worst]:g} Pa"
+        )
     return given
 
 

@@ -89,7 +89,9 @@ def _weakening_step(
     free = no_spring(slip.size)
     residual_of(operator, free, drive, slip, rest)
     inside = (slip > 0.0) | (rest > 0.0)
-    status, _ = solve_inside(operator, free, inside, new, rest, workspace, tolerance, ITERATIONS)
+    status, _ = solve_inside(
+        operator, free, inside, new, rest, workspace, tolerance, ITERATIONS
+    )
     direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
     longest = 1.0
     if status == NEGATIVE:
@@ -127,7 +129,9 @@ def least_equilibrium(
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
     `accuracy`; that of planes has small ones.
     """
-    tolerance = accuracy * float(np.abs(sample.excess).mean() + abs(load) * sample.profile.mean())
+    tolerance = accuracy * float(
+        np.abs(sample.excess).mean() + abs(load) * sample.profile.mean()
+    )
     # K alone is singular where everything slips; a drag on the growth keeps it a lower bound.
     drag = DRAG * float(sample.rate.max())
     frozen = np.full_like(sample.rate, -drag)

@@ -198,7 +198,9 @@ def present_pieces(sample: Sample, slip: Array, at_corner: float = AT_CORNER) ->
     return Present(piece, strength, pieces.slopes[piece] * sample.rate)
 
 
-def residual_nodes(sample: Sample, slip: Array, at_corner: float = AT_CORNER) -> NDArray[np.bool_]:
+def residual_nodes(
+    sample: Sample, slip: Array, at_corner: float = AT_CORNER
+) -> NDArray[np.bool_]:
     """Return which weakening nodes have reached their residual strength."""
     reached: NDArray[np.bool_] = (slip >= at_corner * sample.critical) & (sample.critical > 0.0)
     return reached

@@ -76,7 +76,9 @@ class Event(NamedTuple):
     after: State
 
 
-def event_table(problem: Problem, rows: Samples, row: int, events: list[Event]) -> dict[str, Array]:
+def event_table(
+    problem: Problem, rows: Samples, row: int, events: list[Event]
+) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
     interface, plane = problem.interface, problem.interface.is_plane
     initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
@@ -189,7 +191,9 @@ class Solver:
             try:
                 path = follow(self.program, sample, state)
             except Exception as error:
-                error.add_note(f"in sample {row} of the {rows.samples} that were solved together")
+                error.add_note(
+                    f"in sample {row} of the {rows.samples} that were solved together"
+                )
                 raise
             if state is None:
                 self._describe(first, row, sample, path.first)
@@ -274,7 +278,9 @@ class Solver:
             nodes: Any = (..., *(slice(first, None, 2) for first in offset))
             part = Samples(*(given[nodes] for given in rows))
             others.append(part.mean_stress(first_instabilities(self.coarse, part)))
-        error: Array = np.sqrt(np.mean([(other - onset) ** 2 for other in others], axis=0)) / 3.0
+        error: Array = (
+            np.sqrt(np.mean([(other - onset) ** 2 for other in others], axis=0)) / 3.0
+        )
         percent = 100.0 * error / np.abs(onset)
         if np.any(percent > SHARE):
             warn_accuracy(
@@ -320,7 +326,9 @@ def first_instabilities(program: Program, rows: Samples) -> Array:
         if state is None:
             sample = program.sample_of(rows, row)
             found = program.next(sample, program.at_rest(sample))
-            load[row] = (found if found.certified else follow(program, sample, found).first).load
+            load[row] = (
+                found if found.certified else follow(program, sample, found).first
+            ).load
     return load
 
 

@@ -90,7 +90,9 @@ def _next_event(
 
 
 @jit_inside
-def _change_slope(workspace: Workspace, size: int, member: int, before: float, after: float) -> int:
+def _change_slope(
+    workspace: Workspace, size: int, member: int, before: float, after: float
+) -> int:
     """Change the weakening rate of a member in the factor; returns the members still in it."""
     node = workspace.members[member]
     workspace.diagonal[node] = workspace.stiffness.column[0] - after
@@ -119,7 +121,11 @@ def advance(
     CROWDED: more members than the workspace holds.
     """
     n = slip.shape[0]
-    solution, stiff_rate, rate = workspace.vectors[1], workspace.vectors[2], workspace.vectors[3]
+    solution, stiff_rate, rate = (
+        workspace.vectors[1],
+        workspace.vectors[2],
+        workspace.vectors[3],
+    )
     pieces = sample.pieces
     piece = np.zeros(n, np.int64)
     strength = np.empty(n)
@@ -143,7 +149,9 @@ def advance(
             multiply_members(workspace, size, solution, stiff)
             for t in range(size):
                 slip[members[t]] = max(solution[t], 0.0)
-        step, starts, ends = _next_event(sample, load, target, slip, stiff, piece, workspace, size)
+        step, starts, ends = _next_event(
+            sample, load, target, slip, stiff, piece, workspace, size
+        )
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
             slip[members[t]] += step * rate[t]

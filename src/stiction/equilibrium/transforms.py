@@ -87,7 +87,9 @@ def doubled(coarse: Array) -> Array:
     for axis in (0, 1):
         between = 0.5 * (coarse + np.roll(coarse, -1, axis))
         both = np.stack((coarse, between), axis + 1)
-        coarse = both.reshape(tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape)))
+        coarse = both.reshape(
+            tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape))
+        )
     return coarse
 
 
@@ -140,7 +142,11 @@ def plane_onset(
         shape = levels[-1][0].shape
         largest = float(plane.symbol(shape).max())
         odd = shape[0] % 2 or shape[1] % 2
-        if odd or min(shape) < 2 * FEWEST or 0.5 * largest < COARSEST * float(levels[-1][2].max()):
+        if (
+            odd
+            or min(shape) < 2 * FEWEST
+            or 0.5 * largest < COARSEST * float(levels[-1][2].max())
+        ):
             break
         levels.append(tuple(map(halved, levels[-1])))
     coarse: Bracket | None = None
@@ -257,7 +263,9 @@ class PlaneProgram:
         beyond = load + step
         ahead = least_equilibrium(operator, sample, beyond, slip, 0.1 * gap)
         direction = _direction(operator, sample, slip, ahead.slip)
-        return State(load, slip, state.stiff, direction, upper=beyond, certified=False, ahead=ahead)
+        return State(
+            load, slip, state.stiff, direction, upper=beyond, certified=False, ahead=ahead
+        )
 
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""

@@ -161,7 +161,9 @@ def close(
     """
     if bracket.closed(gap):
         return True, bend
-    if not slip.any() and not (bracket.excess < load * bracket.profile).any():  # nothing to hold
+    if (
+        not slip.any() and not (bracket.excess < load * bracket.profile).any()
+    ):  # nothing to hold
         load = 0.5 * (bracket.lower + bracket.upper)
     accuracy = 0.05 * gap
     first: Held | None = None

@@ -38,7 +38,9 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector."""
     first = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= DENSE:
-        values, vectors = scipy.linalg.eigh(scipy.linalg.toeplitz(first), subset_by_index=[0, 0])
+        values, vectors = scipy.linalg.eigh(
+            scipy.linalg.toeplitz(first), subset_by_index=[0, 0]
+        )
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
     else:

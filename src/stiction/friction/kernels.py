@@ -68,12 +68,16 @@ def line_at(
     What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law it is
     the piece itself. For the parameters see `strength_at`.
     """
-    result: tuple[float, float] = FUNCTIONS[type(law)][2](law, peak, residual, rate, slip, ahead)
+    result: tuple[float, float] = FUNCTIONS[type(law)][2](
+        law, peak, residual, rate, slip, ahead
+    )
     return result
 
 
 def _registered(law: Any) -> tuple[Callable[..., Any], ...] | None:
-    return FUNCTIONS.get(getattr(law, "instance_class", type))  # of numba's types of NamedTuples
+    return FUNCTIONS.get(
+        getattr(law, "instance_class", type)
+    )  # of numba's types of NamedTuples
 
 
 # numba compares the names of arguments with their annotations, so these have none.
@@ -105,7 +109,9 @@ def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) 
 
 
 @jit
-def _linear_strength(law: Linear, peak: float, residual: float, rate: float, slip: float) -> float:
+def _linear_strength(
+    law: Linear, peak: float, residual: float, rate: float, slip: float
+) -> float:
     return max(peak - rate * slip, residual)
 
 
@@ -173,7 +179,9 @@ def _polygon_strength(
 
 
 @jit
-def _polygon_slope(law: Polygon, peak: float, residual: float, rate: float, slip: float) -> float:
+def _polygon_slope(
+    law: Polygon, peak: float, residual: float, rate: float, slip: float
+) -> float:
     drop = peak - residual
     if drop <= 0.0:
         return 0.0

@@ -9,7 +9,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, Union
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    Union,
+)
 
 import numpy as np
 from pydantic import (
@@ -60,7 +69,9 @@ class FrictionLaw(ABC):
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
         residual, ratio = self.residual_strength, self.residual_ratio
-        problems = _outside("residual_strength", residual, lambda r: r >= 0.0, "not be negative")
+        problems = _outside(
+            "residual_strength", residual, lambda r: r >= 0.0, "not be negative"
+        )
         problems += _outside(
             "residual_ratio", ratio, lambda r: (r >= 0.0) & (r < 1.0), "lie in [0, 1)"
         )
@@ -455,7 +466,9 @@ def _law(value: Any, handler: Any) -> Any:
     if isinstance(value, FrictionLaw):
         return value
     if not isinstance(value, dict):
-        raise ValueError("must be a friction law such as st.LinearWeakening(weakening_rate=...)")
+        raise ValueError(
+            "must be a friction law such as st.LinearWeakening(weakening_rate=...)"
+        )
     return handler(value)
 
 

@@ -78,7 +78,11 @@ def scatter_between(
     def where(level: float) -> float:
         if q(0.0) <= level:
             return 0.0
-        return LARGEST if q(LARGEST) >= level else float(brentq(lambda s: q(s) - level, 0, LARGEST))
+        return (
+            LARGEST
+            if q(LARGEST) >= level
+            else float(brentq(lambda s: q(s) - level, 0, LARGEST))
+        )
 
     tail = 0.5 * (1.0 - confidence)
     levels = (freedom, chi2.ppf(1.0 - tail, freedom), chi2.ppf(tail, freedom))

@@ -193,7 +193,10 @@ def log_likelihoods(
     bounded, table = np.isfinite(densities.bound[0]), densities.table
     for i in range(index.shape[0]):
         near, share = index[i], weight[i]
-        mean, spread = _blend(densities.mean, near, share), _blend(densities.spread, near, share)
+        mean, spread = (
+            _blend(densities.mean, near, share),
+            _blend(densities.spread, near, share),
+        )
         bound = _blend(densities.bound, near, share) if bounded else 0.0
         own = error / stretch[i]
         typical = spread * math.exp(mean) if bounded else spread

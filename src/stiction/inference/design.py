@@ -108,7 +108,9 @@ def design_of_tests(
     """
     parameters = make_prior(problem, random, prior)
     found = _designs(designs, parameters.names)
-    lengths = list(dict.fromkeys(length for design in found.values() for length in design.tests))
+    lengths = list(
+        dict.fromkeys(length for design in found.values() for length in design.tests)
+    )
     with Meter("design of tests", show=progress) as meter:
         simulated = make_model(
             parameters, method=method, lengths=lengths, error=load_cell_error, samples=samples,
@@ -136,10 +138,14 @@ def _designs(given: dict[str, Any], names: tuple[str, ...]) -> dict[str, Design]
     found = {}
     for name, one in given.items():
         table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
-        tests = table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
+        tests = (
+            table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
+        )
         known = check("known", table.get("known", ()), Names)
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
-            problems.append(f"designs: {name}: tests: must be whole numbers >= 1, by length (m)")
+            problems.append(
+                f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
+            )
         problems += [unknown_name(f"designs: {name}", str(key), ["tests", "known"])
                      for key in table if key not in ("tests", "known")]  # fmt: skip
         problems += [unknown_name(f"designs: {name}: known", k, names) for k in known

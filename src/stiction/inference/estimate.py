@@ -104,7 +104,9 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
     return [make_observed(window, np.stack(own)) for window, own in powers.items()]
 
 
-def estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None = None) -> Estimate:
+def estimate(
+    rows: Sequence[Array], setting: Setting, start: Estimate | None = None
+) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
     The marginal of noisy values is too wide. So the noise is found first, with the marginal of the
@@ -171,6 +173,8 @@ def simulate(found: Estimate, setting: Setting, rng: np.random.Generator) -> lis
         if window not in power:
             power[window] = found.model.power(grid)
         z = grid.sample(power[window], rng)[window.measured]
-        values = from_normal(found.marginal, z) + found.model.noise * rng.standard_normal(z.size)
+        values = from_normal(found.marginal, z) + found.model.noise * rng.standard_normal(
+            z.size
+        )
         rows.append(window.without_trend(values))
     return rows

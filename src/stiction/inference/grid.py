@@ -118,10 +118,14 @@ def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
 
 def on_grid(likelihood: Likelihood, meter: Meter, points: int = POINTS) -> Grid | None:
     """The posterior of all parameters by sums over a grid; None if it is zero everywhere."""
-    return grid_of(likelihood.__call__, likelihood.model.low, likelihood.model.high, meter, points)
+    return grid_of(
+        likelihood.__call__, likelihood.model.low, likelihood.model.high, meter, points
+    )
 
 
-def grid_of(function: Function, low: Array, high: Array, meter: Meter, points: int) -> Grid | None:
+def grid_of(
+    function: Function, low: Array, high: Array, meter: Meter, points: int
+) -> Grid | None:
     """A density, given by its logarithm and a floor, between two corners; None if it is zero.
 
     The first grid covers all of it; each next one the box that holds all but a millionth of the

@@ -220,7 +220,9 @@ def _outside(likelihood: Likelihood) -> list[Any]:
 def _check_reach(likelihood: Likelihood) -> None:
     """Refuse peaks that nothing in the prior can produce."""
     problems = []
-    for number, (peaks, far) in enumerate(zip(likelihood.peaks, _outside(likelihood), strict=True)):
+    for number, (peaks, far) in enumerate(
+        zip(likelihood.peaks, _outside(likelihood), strict=True)
+    ):
         low, high, places = likelihood.model.reach(number)
         for value in peaks[far][:1]:
             side = "below" if value < low else "above"
@@ -252,7 +254,9 @@ def _posterior(
     prior = model.prior
     u = grid.draws(DRAWS, seed)
     meter.stage("Monte Carlo error")
-    errors = dict(zip(prior.names, monte_carlo_errors(likelihood, u[::2]).tolist(), strict=True))
+    errors = dict(
+        zip(prior.names, monte_carlo_errors(likelihood, u[::2]).tolist(), strict=True)
+    )
     theta = prior.theta(u)
     posterior = Posterior(
         names=prior.names,
@@ -306,7 +310,9 @@ def _piled_up(model: Model, u: Array) -> str:
             ("lower", "upper"), (own < EDGE, own > 1.0 - EDGE), ends, strict=True
         ):
             if near.mean() > PILED * EDGE:
-                texts.append(f"the {side} end of {name}, {end:g}, holds {near.mean():.0%} of it")
+                texts.append(
+                    f"the {side} end of {name}, {end:g}, holds {near.mean():.0%} of it"
+                )
     if not texts:
         return ""
     return (

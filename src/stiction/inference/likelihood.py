@@ -118,7 +118,15 @@ class Model(NamedTuple):
         shift, stretch = map(np.ascontiguousarray, self.scaling.of(theta))
         out = np.empty((theta.shape[0], peaks.size))
         log_likelihoods(
-            index, weight, shift, stretch, self.error, used, np.ascontiguousarray(peaks), floor, out
+            index,
+            weight,
+            shift,
+            stretch,
+            self.error,
+            used,
+            np.ascontiguousarray(peaks),
+            floor,
+            out,
         )
         return out
 
@@ -129,7 +137,9 @@ class Model(NamedTuple):
         lowest = np.maximum(own.peaks.min(axis=1) - spread, own.densities.bound)
         highest = own.peaks.max(axis=1) + spread
         theta, least, most = [], [], []
-        for corner in itertools.product(*self.prior.theta(np.stack([self.low, self.high])).T[keys]):
+        for corner in itertools.product(
+            *self.prior.theta(np.stack([self.low, self.high])).T[keys]
+        ):
             theta.append(nodes_of(self.axes, self.scaling.reference))
             theta[-1][:, keys] = corner
             shift, stretch = self.scaling.of(theta[-1])
@@ -137,7 +147,9 @@ class Model(NamedTuple):
             most.append(shift + stretch * highest + ERRORS * self.error)
         at = np.concatenate(theta)[[np.argmin(least), np.argmax(most)]]
         ends = [
-            ", ".join(f"{name} = {v:.6g}" for name, v in zip(self.prior.names, own, strict=True))
+            ", ".join(
+                f"{name} = {v:.6g}" for name, v in zip(self.prior.names, own, strict=True)
+            )
             for own in at
         ]
         text = f"the lowest come from {ends[0]}, the highest come from {ends[1]}"
@@ -179,7 +191,9 @@ def make_model(
     axes = make_axes(prior, scaling, low, high)
     thetas = nodes_of(axes, scaling.reference)
     count = SAMPLES.get(method.type, FEW) if samples is None else samples
-    helped = method.type != "local_criterion" and no_single_length(*prior.at(prior.middle)) is None
+    helped = (
+        method.type != "local_criterion" and no_single_length(*prior.at(prior.middle)) is None
+    )
     more = max(count, SAMPLES["local_criterion"]) if helped else 0
     meter.stage("simulated onsets", len(thetas) * len(lengths) * (count + more))
     specimens = []

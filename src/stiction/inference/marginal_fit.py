@@ -152,7 +152,9 @@ class Family:
 
         def derivatives(v: Array, found: Array) -> tuple[Array, Array]:
             sides = np.where(v + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
-            slopes = np.stack([(terms(v + step) - found) / step.sum() for step in np.diag(sides)])
+            slopes = np.stack(
+                [(terms(v + step) - found) / step.sum() for step in np.diag(sides)]
+            )
             return slopes @ counts, (slopes * counts) @ slopes.T
 
         best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
@@ -194,7 +196,9 @@ class Family:
 
     def _by_scipy(self, values: Array) -> Any:
         family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
-        fixed = {f"f{key}" if key in ("loc", "scale") else f"fix_{key}": v for key, v in self.fixed}
+        fixed = {
+            f"f{key}" if key in ("loc", "scale") else f"fix_{key}": v for key, v in self.fixed
+        }
         try:
             return marginal_of(family(*family.fit(values, **fixed)))
         except Exception as error:  # every family of scipy has its own
@@ -215,7 +219,9 @@ class Family:
         if isinstance(marginal, ScipyMarginal):
             found = dict(marginal.parameters)
         else:
-            names = [field.name for field in dataclasses.fields(marginal) if field.name != "type"]
+            names = [
+                field.name for field in dataclasses.fields(marginal) if field.name != "type"
+            ]
             found = {name: getattr(marginal, name) for name in names}
         known = dict(self.fixed).keys() | (set() if self.name == "beta" else {"low"})
         return {n: float(v) for n, v in found.items() if v is not None and n not in known}
@@ -265,7 +271,9 @@ def family_of(given: Any) -> Family:
         if not isinstance(family, scipy.stats.rv_continuous):
             raise InputError(unknown_name("marginal", name, [*KINDS, *SCIPYS, "uniform"]))
         known = (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
-    problems = [unknown_name(f"marginal.{name}", key, known) for key in fixed if key not in known]
+    problems = [
+        unknown_name(f"marginal.{name}", key, known) for key in fixed if key not in known
+    ]
     if problems:
         raise InputError(problems)
     return Family(name, tuple(fixed.items()))
@@ -281,7 +289,9 @@ def _truncated_normal(quiet: Array, low: float, high: float) -> Search:
     return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
 
 
-def _beta(values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any) -> Search:
+def _beta(
+    values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any
+) -> Search:
     """Shapes, and the distances of free bounds from the mean, as logarithms."""
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
@@ -350,4 +360,6 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
 
 def distance(marginal: Any, values: Array) -> float:
     """Largest difference between the distribution function and that of the values (Kolmogorov)."""
-    return float(scipy.stats.ks_1samp(values, marginal.distribution.cdf, method="asymp").statistic)
+    return float(
+        scipy.stats.ks_1samp(values, marginal.distribution.cdf, method="asymp").statistic
+    )

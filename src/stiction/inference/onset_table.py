@@ -94,7 +94,9 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
     index, weight = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
     for axis in axes:
         cell, share = axis.place(theta[:, axis.parameter])
-        index = np.concatenate([index * axis.values.size + (cell + k)[:, None] for k in (0, 1)], 1)
+        index = np.concatenate(
+            [index * axis.values.size + (cell + k)[:, None] for k in (0, 1)], 1
+        )
         weight = np.concatenate([weight * (1.0 - share)[:, None], weight * share[:, None]], 1)
     return index, weight
 

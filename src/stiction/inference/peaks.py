@@ -116,7 +116,9 @@ def _unit(unit: Any) -> tuple[float, bool]:
 def _values(name: str, given: Any, unit: str) -> Array:
     """Peaks of one kind of specimen, in `unit`."""
     ragged = isinstance(given, list | tuple) and any(np.ndim(one) for one in given)
-    values = np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
+    values = (
+        np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
+    )
     if values.ndim != 1:
         raise InputError(
             f"{name}: must be one list of numbers for one kind of specimen, got {describe(given)};"
@@ -181,7 +183,9 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
     if peak is None and len(names) == 1:
         peak = names[0]
     if peak is None:
-        raise InputError(f"no column is called peak [MPa] or the like; found {', '.join(names)}")
+        raise InputError(
+            f"no column is called peak [MPa] or the like; found {', '.join(names)}"
+        )
     stated = table[peak].attrs.get("units", unit)
     if stated is None:
         raise InputError(
@@ -198,7 +202,9 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
     lengths = table[length].values * factor_to("m", table[length].attrs["units"])
     if not np.isfinite(lengths).all():
         line = int(np.argmin(np.isfinite(lengths)))
-        raise InputError(f"length: missing in row {line}; specimens of unknown length are mixed in")
+        raise InputError(
+            f"length: missing in row {line}; specimens of unknown length are mixed in"
+        )
     return make_peaks({one: values[lengths == one] for one in np.unique(lengths)}, stated)
 
 

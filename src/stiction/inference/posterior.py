@@ -79,7 +79,9 @@ class Posterior:
             Between 0 and 1.
         """
         if not 0.0 < confidence < 1.0:
-            raise InputError(f"confidence: must lie between 0 and 1, got {describe(confidence)}")
+            raise InputError(
+                f"confidence: must lie between 0 and 1, got {describe(confidence)}"
+            )
         tail = 0.5 - 0.5 * confidence
         low, high = np.quantile(self.draws[name], [tail, 1.0 - tail])
         return float(low), float(high)
@@ -131,7 +133,9 @@ class Posterior:
     def predicted(self) -> tuple[Array, ...]:
         """Peaks of further tests, one for each draw, for every kind of specimen."""
         model = self.likelihood.model
-        return tuple(predicted(model, i, self.u, self.seed) for i in range(len(model.specimens)))
+        return tuple(
+            predicted(model, i, self.u, self.seed) for i in range(len(model.specimens))
+        )
 
     def to_arviz(self) -> Any:
         """Return an `arviz.InferenceData`: posterior, prior, log-likelihood, prediction, data.

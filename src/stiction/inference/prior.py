@@ -140,7 +140,9 @@ def distribution_of(key: str, value: Any) -> Any:
     elif isinstance(value, list | tuple) and len(value) == 2:
         table |= {"low": value[0], "high": value[1]}
     low, high, spacing = (table.get(name, np.nan) for name in ("low", "high", "spacing"))
-    known = len(table) == 3 and spacing in ("linear", "log") and is_finite(low) and is_finite(high)
+    known = (
+        len(table) == 3 and spacing in ("linear", "log") and is_finite(low) and is_finite(high)
+    )
     if not known or not low < high or (spacing == "log" and low <= 0.0):
         raise InputError(
             f"prior: {key}: must be a frozen continuous scipy.stats distribution such as"

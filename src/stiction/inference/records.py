@@ -129,7 +129,11 @@ def _evenly(x: Array, name: str) -> tuple[int, float]:
     spacing = float((x[-1] - x[0]) / last)
     place = (x - x[0]) / spacing
     off = np.abs(place - np.round(place))
-    if off.max() > 10.0 * UNEVEN or np.median(off) > UNEVEN or np.diff(np.round(place)).min() < 1:
+    if (
+        off.max() > 10.0 * UNEVEN
+        or np.median(off) > UNEVEN
+        or np.diff(np.round(place)).min() < 1
+    ):
         raise InputError(
             f"{name} is not equally spaced: the mean spacing is {spacing:.6g} m, but the point at"
             f" {x[off.argmax()]:.6g} m is off by {off.max():.2g} of it; first put the profile on"

@@ -83,7 +83,9 @@ def simulator(
         peaks: Array = np.concatenate(
             [
                 experiment.results(seed, start, count)["critical_stress"]
-                for start, count in experiment.batches(first, samples, max(256, experiment.batch))
+                for start, count in experiment.batches(
+                    first, samples, max(256, experiment.batch)
+                )
             ]
         )
         errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)

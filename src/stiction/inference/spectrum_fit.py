@@ -95,7 +95,9 @@ class SpectrumFamily:
         end_given = not {"truncation", "power_kept"}.isdisjoint(options)
         if not end_given:
             options["power_kept"] = POWER_KEPT[self.name]
-        return Model(CLASSES[self.name](**options), anisotropy, noise, variance, shares, end_given)
+        return Model(
+            CLASSES[self.name](**options), anisotropy, noise, variance, shares, end_given
+        )
 
     def vector(self, model: Model) -> Array:
         """The parameters of a model."""
@@ -126,7 +128,9 @@ def spectrum_family(
     if name not in CLASSES:
         raise InputError(unknown_name("spectrum", name, CLASSES))
     known = [field.name for field in dataclasses.fields(CLASSES[name]) if field.name != "type"]
-    problems = [unknown_name(f"spectrum.{name}", key, known) for key in fixed if key not in known]
+    problems = [
+        unknown_name(f"spectrum.{name}", key, known) for key in fixed if key not in known
+    ]
     if problems:
         raise InputError(problems)
     try:

@@ -48,7 +48,10 @@ def hermite_shares(marginal: Any) -> Array:
     shares = np.zeros(ORDERS + 1)
     previous, current = np.zeros_like(z), np.ones_like(z)
     for order in range(1, ORDERS):
-        previous, current = current, (z * current - np.sqrt(order - 1) * previous) / np.sqrt(order)
+        previous, current = (
+            current,
+            (z * current - np.sqrt(order - 1) * previous) / np.sqrt(order),
+        )
         shares[order] = float(weight @ (value * current)) ** 2 / total
     shares[ORDERS] = max(1.0 - shares.sum(), 0.0)
     result: Array = shares / shares.sum()

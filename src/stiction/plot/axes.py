@@ -45,7 +45,9 @@ def with_unit(name: str, unit: str) -> str:
 
 
 @contextmanager
-def on_axes(ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8) -> Iterator[Axes]:
+def on_axes(
+    ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8
+) -> Iterator[Axes]:
     """Yield the caller's axes as they are, or new ones in the style of a printed page."""
     if ax is not None:
         if not isinstance(ax, Axes):

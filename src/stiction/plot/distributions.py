@@ -150,7 +150,8 @@ def quantiles(
     if within is not None:
         steps = _chosen(variable.sizes[within])
         curves = [
-            (_step_text(variable[within], step), variable.isel({within: step})) for step in steps
+            (_step_text(variable[within], step), variable.isel({within: step}))
+            for step in steps
         ]
     place, ticks = _places(variable[along])
     with on_axes(ax, height=3.2) as axes:
@@ -162,7 +163,12 @@ def quantiles(
             axes.fill_between(place, table[1], table[3], alpha=0.12 if label else 0.25, **style)
             errors = np.abs(table[5:] - table[2])
             axes.errorbar(
-                place, table[2], yerr=errors, capsize=2, label=label, **series(number, marker=True)
+                place,
+                table[2],
+                yerr=errors,
+                capsize=2,
+                label=label,
+                **series(number, marker=True),
             )
         axes.set_xlabel(scaled(variable[along])[2])
         axes.set_ylabel(scaled(variable)[2])

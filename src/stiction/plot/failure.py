@@ -21,7 +21,9 @@ NEAR = 4.0
 NEAR_ON_A_PLANE = 2.0
 
 
-def failure_curve(curve: xr.Dataset, *, above_bound: bool = False, ax: Axes | None = None) -> Axes:
+def failure_curve(
+    curve: xr.Dataset, *, above_bound: bool = False, ax: Axes | None = None
+) -> Axes:
     """Draw P(onset < s) over decades, with its interval.
 
     Parameters
@@ -118,7 +120,10 @@ def weak_spots(
         [
             np.roll(
                 strength,
-                [m - round(float(a) / h) for m, a, h in zip(middle, place, spacings, strict=True)],
+                [
+                    m - round(float(a) / h)
+                    for m, a, h in zip(middle, place, spacings, strict=True)
+                ],
                 range(len(dims)),
             )
             for strength, place in zip(

@@ -25,7 +25,11 @@ _SYMBOLS = {
 
 
 def field(
-    where: Problem | Interface, profile: Any, *, quantity: str = "strength", ax: Axes | None = None
+    where: Problem | Interface,
+    profile: Any,
+    *,
+    quantity: str = "strength",
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw a profile, or a field of which a part was measured: lines along x, on a plane a map.
 
@@ -60,7 +64,9 @@ def field(
     """
     interface = where.interface if isinstance(where, Problem) else where
     if not isinstance(interface, Interface):
-        raise InputError(f"where: must be a Problem or an Interface, got {type(where).__name__}")
+        raise InputError(
+            f"where: must be a Problem or an Interface, got {type(where).__name__}"
+        )
     if quantity not in PROFILES:
         raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
     of_field = isinstance(profile, RandomField)

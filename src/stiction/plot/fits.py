@@ -58,7 +58,9 @@ def fit(found: FieldFit) -> Figure:
     setting = replace(details.setting, windows=(one.window,) * one.records)
     rng = np.random.default_rng(0)
     simulated = [
-        np.mean([one.window.periodogram(r) for r in simulate(details.estimate, setting, rng)], 0)
+        np.mean(
+            [one.window.periodogram(r) for r in simulate(details.estimate, setting, rng)], 0
+        )
         for _ in range(SHOWN)
     ]
     with paper_style():
@@ -77,7 +79,9 @@ def _histogram(axes: Axes, found: FieldFit) -> None:
     details = found._details
     values = details.values
     factor, unit = unit_for(UNITS[found.quantity], values)
-    counts, _, _ = axes.hist(values * factor, bins=40, density=True, color=PALE, label="measured")
+    counts, _, _ = axes.hist(
+        values * factor, bins=40, density=True, color=PALE, label="measured"
+    )
     at = np.linspace(values.min(), values.max(), 400)
     spread = [one.marginal.distribution.pdf(at) for one in details.repeated[:SHOWN]]
     _band(axes, at * factor, np.array(spread) / factor)
@@ -98,7 +102,9 @@ def _quantiles(axes: Axes, found: FieldFit) -> None:
     factor, unit = unit_for(UNITS[found.quantity], values)
     share = (np.arange(200) + 0.5) / 200
     expected = found.field.marginal.distribution.ppf(share) * factor
-    spread = np.array([one.marginal.distribution.ppf(share) for one in details.repeated[:SHOWN]])
+    spread = np.array(
+        [one.marginal.distribution.ppf(share) for one in details.repeated[:SHOWN]]
+    )
     _band(axes, expected, spread * factor)
     ends = [expected[0], expected[-1]]
     axes.plot(ends, ends, color=color(1), linewidth=1.0)
@@ -142,7 +148,11 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
 
     k, expected = averaged(model.expectation(one))
     measured = averaged(one.average)[1]
-    _band(axes, k, factor * np.array([averaged(power)[1] for power in simulated], dtype=np.float64))
+    _band(
+        axes,
+        k,
+        factor * np.array([averaged(power)[1] for power in simulated], dtype=np.float64),
+    )
     axes.plot(k, factor * expected, color=color(1), label="fitted, through the window")
     axes.plot(k, factor * measured, ".", color=INK, markersize=4, label="measured, averaged")
     if model.noise**2 > 1e-6 * expected.max():

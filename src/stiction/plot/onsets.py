@@ -212,7 +212,9 @@ def _shade(axes: Axes, interface: Interface, begin: float, end: float) -> None:
     """Shade a gap from the last measured node to the next one."""
     factor, _ = unit_for("m", interface.lengths)
     left, right = (begin - interface.spacing) * factor, (end + interface.spacing) * factor
-    pieces = [(left, right)] if begin <= end else [(left, interface.extent * factor), (0.0, right)]
+    pieces = (
+        [(left, right)] if begin <= end else [(left, interface.extent * factor), (0.0, right)]
+    )
     for piece in pieces:
         axes.axvspan(*piece, **_GAP)
 

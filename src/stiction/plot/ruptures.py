@@ -156,7 +156,9 @@ def rate_scale(rate: Array, decades: float) -> LogNorm:
     return LogNorm(top * 10.0**-decades, top)
 
 
-def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem, whole: bool) -> tuple[Any, str]:
+def _draw_space_time(
+    axes: Axes, run: xr.Dataset, problem: Problem, whole: bool
+) -> tuple[Any, str]:
     """Draw slip rate and the onset; return the mesh and the label of the time."""
     since, name = since_onset(run)
     rate = run["slip_rate"].values
@@ -207,7 +209,9 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     if later.size and np.ptp(later) > 0.0:
         x, y = (length * place for place in interface.coordinates.values())
         levels = np.linspace(0.0, scale * float(later.max()), 10)[1:-1]
-        lines = axes.contour(x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9)
+        lines = axes.contour(
+            x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9
+        )
         bar = ScalarMappable(lines.norm, lines.cmap)
         text = f"front ({time_unit} since the onset)"
         axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)

@@ -62,7 +62,9 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
         rows = [np.ravel(value[name]) for name in ("x", "y", "values") if name in value]
     else:
         dims = getattr(value, "dims", None)
-        if dims not in (("x",), ("x", "y"), ("y", "x")) or any(d not in value.coords for d in dims):
+        if dims not in (("x",), ("x", "y"), ("y", "x")) or any(
+            d not in value.coords for d in dims
+        ):
             raise ValueError(
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
@@ -141,7 +143,9 @@ class Conditions:
         # Where the likelihood and z from all else overlap.
         edges = value + REACH * noise * np.array([[-1.0], [1.0]])
         below = law.cdf(edges)
-        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges))).clip(-FURTHEST, FURTHEST)
+        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges))).clip(
+            -FURTHEST, FURTHEST
+        )
         width = REACH * np.sqrt(variance)
         low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
         low, high = np.where(low < high, (low, high), (mean - width, mean + width))
@@ -177,7 +181,8 @@ class Conditions:
         if factor is None and away.max() > IMPOSSIBLE * self.noise:
             worst, names = int(away.argmax()), "xy"[: len(self.places)]
             at = ", ".join(
-                f"{name} = {row[worst]:g} m" for name, row in zip(names, self.places, strict=True)
+                f"{name} = {row[worst]:g} m"
+                for name, row in zip(names, self.places, strict=True)
             )
             problems.append(
                 f"given.profile: {self.values[worst]:g} at {at} lies outside the marginal, which"

@@ -33,7 +33,9 @@ class OneOf(NamedTuple):
         if self.also:
             own = {"type": {"type": "string", "description": self.also}}
             found.append({"type": "object", "properties": own})
-        return {"anyOf": [one | {"required": [*one.get("required", ()), "type"]} for one in found]}
+        return {
+            "anyOf": [one | {"required": [*one.get("required", ()), "type"]} for one in found]
+        }
 
 
 def _plain(value: Any) -> Any:

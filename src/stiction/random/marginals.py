@@ -78,7 +78,9 @@ class Beta(Marginal):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if not self.low < self.high:
-            raise InputError(f"low must be below high, got low={self.low:g}, high={self.high:g}")
+            raise InputError(
+                f"low must be below high, got low={self.low:g}, high={self.high:g}"
+            )
         return self
 
     @cached_property
@@ -105,7 +107,9 @@ class _ByMoments(Marginal):
     @model_validator(mode="after")
     def _mean_above_low(self) -> Self:
         if not self.mean > self.low:
-            raise InputError(f"mean must be above low, got mean={self.mean:g}, low={self.low:g}")
+            raise InputError(
+                f"mean must be above low, got mean={self.mean:g}, low={self.low:g}"
+            )
         if not max(self.mean, self.mean * self.cv, self._ratio) < 1e150:
             raise InputError(
                 f"mean and cv: must have finite squares, got mean={self.mean:g}, cv={self.cv:g}"
@@ -254,7 +258,9 @@ class TruncatedNormal(_ByMoments):
                 mean, variance = scipy.stats.truncnorm.stats(*parameters(guess))
             except (FloatingPointError, ValueError):
                 return np.array([1e3, 1e3])
-            return np.array([(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0])
+            return np.array(
+                [(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0]
+            )
 
         # An exponential distribution, and between two bounds a uniform one, are the widest.
         room = min(self._excess**2, self._excess * max(high - self.mean, 0.0) / 2.0)
@@ -307,7 +313,9 @@ class ScipyMarginal(Marginal):
     def plain(self) -> dict[str, Any]:
         """Return what a study file holds."""
         if self.frozen is not None:
-            raise ValueError(f"marginal is the Python distribution {self.type!r}, not a named one")
+            raise ValueError(
+                f"marginal is the Python distribution {self.type!r}, not a named one"
+            )
         return {"type": self.type, **dict(self.parameters)}
 
 

@@ -57,7 +57,9 @@ class Modes:
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
 
-def make_modes(spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface) -> Modes:
+def make_modes(
+    spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
+) -> Modes:
     """Find the modes of a spectrum: wave vectors on a line, or in an ellipse; of k and -k one.
 
     Raises

@@ -53,7 +53,9 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
         if unknown:
             raise InputError(unknown)
         if not is_finite(rho) or not -1.0 <= rho <= 1.0:
-            raise InputError(f"{', '.join(pair)}: must be a number in [-1, 1], got {describe(rho)}")
+            raise InputError(
+                f"{', '.join(pair)}: must be a number in [-1, 1], got {describe(rho)}"
+            )
         first, second = sorted(pair, key=NAMES.index)
         if second in found.setdefault(first, {}):
             raise InputError(f"{first}, {second}: given twice")
@@ -177,7 +179,9 @@ class RandomInterface:
         ]
         scales = [name for name in SCALES if name in self.properties]
         if len(scales) > 1:
-            problems.append(f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+            problems.append(
+                f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}"
+            )
         for one, others in (self.correlation or {}).items():
             problems += [
                 f"correlation: {name!r} is correlated but not random here"

@@ -443,7 +443,8 @@ def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array
 
 
 SPECTRA: dict[str, Any] = {
-    kind.type: kind for kind in (PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum)
+    kind.type: kind
+    for kind in (PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum)
 }
 """By their names in study files."""
 

@@ -62,7 +62,9 @@ def _pressures(problem: Problem, fields: Mapping[str, RandomField]) -> Array:
     return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
 
-def support_in_stress(problem: Problem, random: RandomInterface, name: str) -> tuple[float, float]:
+def support_in_stress(
+    problem: Problem, random: RandomInterface, name: str
+) -> tuple[float, float]:
     """Return the values between which a property lies, Pa."""
     low, high = random.support(name)
     if random.properties[name].of is None:
@@ -99,7 +101,9 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
         residual = np.ravel(residual)[:, None] / _pressures(problem, fields)
     factor = (random.between or {}).get("strength")
     if factor is not None:
-        residual = np.ravel(residual)[:, None] / factor.distribution.ppf(_equally_likely(PRESSURES))
+        residual = np.ravel(residual)[:, None] / factor.distribution.ppf(
+            _equally_likely(PRESSURES)
+        )
     return float(np.mean(strength.marginal.distribution.cdf(residual)))
 
 

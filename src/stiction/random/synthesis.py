@@ -63,7 +63,9 @@ def standard_normal(
         place = (stream, number) if block == BLOCK else (stream, number, block)
         key = np.random.SeedSequence(entropy=seed, spawn_key=place)
         generator = np.random.Generator(np.random.PCG64DXSM(key))
-        rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of modes 0, 1, ...
+        rows = generator.standard_normal(
+            (2 * (modes + 1), block)
+        )  # A_j, B_j of modes 0, 1, ...
         draws[done : done + count] = rows[kept, offset : offset + count].T
         done += count
     return draws
@@ -106,7 +108,11 @@ def _synthesise(
 
 
 def gaussian(
-    draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, shape: tuple[int, ...]
+    draws: Array,
+    sigma: Array,
+    numbers: NDArray[np.int64],
+    has_mean: bool,
+    shape: tuple[int, ...],
 ) -> Array:
     """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
 
@@ -122,7 +128,9 @@ def gaussian(
 
 
 @jit
-def condition(right: Array, transposed: Array, offsets: Array, factors: Array, out: Array) -> None:
+def condition(
+    right: Array, transposed: Array, offsets: Array, factors: Array, out: Array
+) -> None:
     """Replace each row a of `out` by a + V (offset + factors V^T a), the draws given measured z."""
     dimension, count = right.shape
     weights = np.empty(count)

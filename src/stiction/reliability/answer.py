@@ -143,7 +143,9 @@ def prepare(
     state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
-        problems.append("friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)")
+        problems.append(
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)"
+        )
     if algorithm in ("subset", "two_level") and (slow := too_slow(state, max_evaluations)):
         problems.append(f"method: {slow}")
     elif algorithm == "two_level" and (reason := two_levels_refused(state)):

@@ -76,7 +76,9 @@ def tally(values: Array, stress: float, first: int = 0) -> Count:
     some = failed[: SHOWN // 2]
     seen = values[: some[-1] + 1] if some.size else values[:0]
     near = np.argsort(seen, kind="stable")[: 2 * some.size]
-    return Count(failed.size, values.size, first + failed[:SHOWN], False, first + near, seen[near])
+    return Count(
+        failed.size, values.size, first + failed[:SHOWN], False, first + near, seen[near]
+    )
 
 
 def count_failures(

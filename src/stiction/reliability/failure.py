@@ -148,7 +148,9 @@ def failure_probability(
         experiment, event, workers, meter, max_evaluations, algorithm=algorithm,
         per_pressure=stress is None,
     )  # fmt: skip
-    limit = float((friction_coefficient or 0.0) * experiment.pressure if stress is None else stress)
+    limit = float(
+        (friction_coefficient or 0.0) * experiment.pressure if stress is None else stress
+    )
     with meter:
         values, doubts = _without_sampling(state, limit) or _sampled(
             state, limit, algorithm, target_cv, seed, max_evaluations, confidence
@@ -175,7 +177,9 @@ def _without_sampling(state: LimitState, stress: float) -> Found | None:
             UnitWarning,
         )
         load, field = experiment.problem.load, experiment.random.strength
-        simple = np.ptp(experiment.problem.load_profile) == 0.0 and not np.any(load.initial_stress)
+        simple = np.ptp(experiment.problem.load_profile) == 0.0 and not np.any(
+            load.initial_stress
+        )
         if simple and field.of is None and "initial_stress" not in experiment.random.names:
             # A node must be weaker than the stress.
             weaker = float(field.marginal.distribution.cdf(stress))
@@ -207,7 +211,9 @@ def _sampled(
         draws = state.draws(seed, 0, least)
         pilot = draws, state(draws)
         count = tally(pilot[1], stress)
-        reason = f"{count.failures} failure{'s' * (count.failures != 1)} of {least} plain samples"
+        reason = (
+            f"{count.failures} failure{'s' * (count.failures != 1)} of {least} plain samples"
+        )
         if count.probability >= FREQUENT:
             algorithm, reason = "plain", f"{reason}: frequent enough to count"
         else:
@@ -267,13 +273,17 @@ def _of_tail(
             )
     else:
         lowest = last.populations[-1]
-        failing, values = (each[lowest.values < stress] for each in (lowest.draws, lowest.values))
+        failing, values = (
+            each[lowest.values < stress] for each in (lowest.draws, lowest.values)
+        )
         if count:
             interval = count.interval(confidence)
         elif not tail.complete:
             rarest, its_cv = tail.probability(tail.reached), tail.cv(tail.reached)
             interval = 0.0, lognormal_interval(rarest, its_cv, confidence)[1]
-            doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval tells no more than that"]
+            doubts = [
+                f"{tail.short_of(f'{stress:.7g} Pa')}; the interval tells no more than that"
+            ]
         if tail.complete:
             doubts += exact_doubts(state, last.around(stress), stress, probability)
     chosen = distinct(values, SHOWN, generator(seed, 2))

@@ -37,7 +37,9 @@ def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[f
     """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
     tail = 0.5 * (1.0 - confidence)
     low = betaincinv(failures, samples - failures + 1, tail) if failures else 0.0
-    high = betaincinv(failures + 1, samples - failures, 1.0 - tail) if failures < samples else 1.0
+    high = (
+        betaincinv(failures + 1, samples - failures, 1.0 - tail) if failures < samples else 1.0
+    )
     return float(low), float(high)
 
 

@@ -91,7 +91,9 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
         )
     value, variance = _telescoped(first, chain)
     plain = math.sqrt(float(first.var(ddof=1)) / first.size)
-    return Combined(Estimate(value, math.sqrt(variance)), plain, first.size - (2 if chain else 1))
+    return Combined(
+        Estimate(value, math.sqrt(variance)), plain, first.size - (2 if chain else 1)
+    )
 
 
 def _telescoped(results: Array, chain: Sequence[Array]) -> tuple[float, float]:

@@ -120,7 +120,9 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     nucleation stress is not stationary.
     """
     check_law(problem)
-    sampled = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
+    sampled = (
+        "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
+    )
     problems = [
         f"load.{name}: varies along the interface, {sampled}"
         for name, value in (
@@ -132,12 +134,16 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     if strength.conditions is not None:
         problems.append(f"strength: was measured in places, {sampled}")
     if problem.uniform_rate is None:
-        problems.append(f"friction.weakening_rate: varies or follows from the strength, {sampled}")
+        problems.append(
+            f"friction.weakening_rate: varies or follows from the strength, {sampled}"
+        )
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
     if pressure is None:
         problems.append("load.normal_pressure: is missing, and strength is in coefficients")
     elif np.ptp(pressure) > 0.0:
-        problems.append(f"load.normal_pressure: varies and strength is in coefficients, {sampled}")
+        problems.append(
+            f"load.normal_pressure: varies and strength is in coefficients, {sampled}"
+        )
     if problems:
         raise InputError(problems)
     load, initial = problem.load_profile, problem.load.initial_stress

@@ -68,7 +68,9 @@ def write_result(result: xr.Dataset, path: Path) -> None:
         for name, variable in result.variables.items()
         if variable.ndim and variable.size and variable.dtype.kind in "fiub"
     }
-    write_whole(path, lambda aside: result.to_netcdf(aside, engine="netcdf4", encoding=encoding))
+    write_whole(
+        path, lambda aside: result.to_netcdf(aside, engine="netcdf4", encoding=encoding)
+    )
 
 
 def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
@@ -97,7 +99,9 @@ def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
             narrow |= {f"{name}_{c.item()}": v.sel({DIRECTION: c}) for c in v[DIRECTION]}
     dims = tuple(dict.fromkeys(dim for v in narrow.values() for dim in v.dims))
     sizes = {dim: result.sizes[dim] for dim in dims}
-    along = {str(name): v.variable for name, v in result.coords.items() if set(v.dims) <= set(dims)}
+    along = {
+        str(name): v.variable for name, v in result.coords.items() if set(v.dims) <= set(dims)
+    }
     table = {}
     for name, variable in (*along.items(), *((n, v.variable) for n, v in narrow.items())):
         full = variable.set_dims(sizes).transpose(*dims)

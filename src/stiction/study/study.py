@@ -299,7 +299,9 @@ class Study:
         """The study that made a result."""
         check("result", result, xr.Dataset)
         if "study" not in result.attrs:
-            raise InputError("result: has no attribute 'study'; it is not the result of a study")
+            raise InputError(
+                "result: has no attribute 'study'; it is not the result of a study"
+            )
         try:
             given = json.loads(result.attrs["study"])
         except (TypeError, ValueError, RecursionError) as error:

@@ -92,7 +92,9 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
         raise InputError(f"{key}.count: must be at most {MOST_POINTS}, got {found.count}")
     ends = found.start, found.stop
     if found.spacing == "log" and min(ends) <= 0.0:
-        raise InputError(f"{key}: a log range needs positive ends, got {ends[0]!r} and {ends[1]!r}")
+        raise InputError(
+            f"{key}: a log range needs positive ends, got {ends[0]!r} and {ends[1]!r}"
+        )
     values = (np.geomspace if found.spacing == "log" else np.linspace)(*ends, found.count)
     whole = all(isinstance(given[name], numbers.Integral) for name in ("start", "stop"))
     if whole and np.all(values == np.round(values)):
