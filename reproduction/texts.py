@@ -182,7 +182,7 @@ def _arrested_again(d: Data) -> str:
 
 def _rates(d: Data) -> str:
     parts = ", ".join(f"{case} the usual rate {rounded(n)} %" for case, n in rate_offsets(d))
-    return f"At {parts}: what separates a rupture from equilibrium is the loading rate, not inertia."
+    return f"At {parts}: ruptures differ from equilibrium by the loading rate, not by inertia."
 
 
 OURS = {
