@@ -18,6 +18,7 @@ from stiction.dynamics.method import Rupture
 from stiction.dynamics.save import open_rupture
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.elasticity.kernel_cache import kernel_sum, stored_kernel
+from stiction.errors import StoreError
 from stiction.files import UNREADABLE, read_arrays
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -266,12 +267,12 @@ def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
         return original(self, path, **options)
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", to_netcdf)
-    with pytest.raises(OSError, match="the files before it are complete"):
+    with pytest.raises(StoreError, match="the files before it are complete"):
         simulate(st.Save(to=folder))
     assert open_rupture(folder).sizes["time"] >= 24
     assert not list(folder.glob("*.part"))
     (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match="file"):
+    with pytest.raises(StoreError, match="file"):
         simulate(st.Save(to=tmp_path / "file" / "run"))
 
 

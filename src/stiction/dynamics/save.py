@@ -278,7 +278,7 @@ class Recorder:
             if not interrupted:
                 write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
         except StoreError as error:
-            raise OSError(
+            raise StoreError(
                 f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
                 "are complete and can be opened"
             ) from error

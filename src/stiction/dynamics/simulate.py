@@ -21,7 +21,7 @@ from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import Recorder, Save, open_rupture
 from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import InputError, StoreError, warn_accuracy
 from stiction.model import Progress, checked, describe, real_array, to_plain
 from stiction.placing import with_gaps
 from stiction.problem import Problem, named_profiles, refusals
@@ -85,7 +85,7 @@ def simulate_rupture(
     ------
     InputError
         Naming all that does not fit.
-    OSError
+    StoreError
         If `save.to` cannot be written; what was written stays readable.
 
     Examples
@@ -132,7 +132,7 @@ def simulate_rupture(
             stopped = _follow(run, state, recorder, method.max_steps, meter)
     except BaseException:
         # Interrupted or out of disk: what was computed is worth keeping.
-        with suppress(OSError):  # the first error is already on its way
+        with suppress(StoreError, OSError):  # the first error is already on its way
             recorder.flush(state, force=True, interrupted=True)
         raise
     recorder.attributes["stopped"] = stopped
