@@ -88,7 +88,7 @@ def _synthesise(
     start = 1 if has_mean else 0
     spectrum = np.empty((rows, half + 1), dtype=np.complex128)
     for i in range(samples):
-        spectrum[:] = 0.0
+        spectrum.fill(0.0)
         if has_mean:
             spectrum[0, 0] = 2.0 * scale * (sigma[0] * draws[i, 0])
         for m in range(1, sigma.size):
@@ -102,9 +102,14 @@ def _synthesise(
             if q == 0 or q >= half:
                 spectrum[-p % rows, -q % columns] += complex(a, b)
         if rows == 1:
-            out[i, 0] = np.fft.irfft(spectrum[0], columns)
+            row = np.fft.irfft(spectrum[0], columns)
+            for q in range(columns):  # a loop: slices of arrays take seconds to compile
+                out[i, 0, q] = row[q]
         else:
-            out[i] = np.fft.irfft2(spectrum, (rows, columns))
+            field = np.fft.irfft2(spectrum, (rows, columns))
+            for p in range(rows):
+                for q in range(columns):
+                    out[i, p, q] = field[p, q]
 
 
 def gaussian(
