@@ -159,7 +159,7 @@ def test_labelled_strength(plane):
     )
     elsewhere = labelled.assign_coords(x=0.9 * labelled["x"])
     elsewhere["x"].attrs["units"] = "mm"
-    with pytest.raises(st.InputError, match="interpolate=True"):
+    with pytest.raises(st.InputError, match="x lies elsewhere than the 72 nodes"):
         st.onset(plane, elsewhere, method=st.Equilibrium())
 
 
