@@ -12,7 +12,8 @@ import xarray as xr
 
 import stiction as st
 
-truth = st.RandomField(st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3, exponent=2.0))
+spectrum = st.PowerLawSpectrum(3e-3, exponent=2.0, power_kept=0.9999)
+truth = st.RandomField(st.Weibull(mean=1e6, cv=0.2), spectrum, mean_mode=True)
 line = st.Interface(length=0.2, nodes=1024)
 record = xr.DataArray(
     truth.sample(line, seed=4)[0][:800], dims="x", coords={"x": line.x[:800]}
