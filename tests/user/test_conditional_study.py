@@ -82,6 +82,11 @@ def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(st
     for ask in (st.theory.nucleation_statistics, st.theory.rice_distribution):
         with pytest.raises(st.InputError, match="was measured in places"):
             ask(own.problem, field.given(known, noise=20e3))
+    with pytest.raises(st.InputError, match="strength was measured in places of one specimen"):
+        st.infer(
+            own.problem, field.given(known, noise=20e3), [7e5, 7.1e5, 7.3e5], method=own.method,
+            prior={"marginal.low": (0.5e6, 0.65e6)},
+        )  # fmt: skip
 
 
 def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):

@@ -173,7 +173,14 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
             problems += error.problems
     if problems:
         raise InputError(problems)
-    prior = Prior(problem, as_random_interface(random), found)
+    random = as_random_interface(random)
+    for name, field in random.properties.items():
+        if field.conditions is not None:
+            raise InputError(
+                f"random: {name} was measured in places of one specimen, and parameters are of all;"
+                " give the field without `given`"
+            )
+    prior = Prior(problem, random, found)
     for corner in itertools.product(*prior.ends.T):
         prior.at(np.array(corner))
     return prior
