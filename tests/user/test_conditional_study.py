@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from small_study import small_study
 
 import stiction as st
@@ -101,3 +102,18 @@ def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
     )
     error = np.hypot(0.07, found.cv)  # of 200 failures, and of the answer
     assert abs(np.log(found.probability / 0.01)) < 3.5 * error
+
+
+def test_a_factor_may_carry_measured_values_beyond_the_marginal():
+    own = st.Study.from_dict(small_study())
+    field, line = own.random.strength, own.problem.interface
+    high = 1.5 * field.sample(line, seed=9)[0]
+    assert high.max() > 1.66e6 + 4.0 * 20e3
+    known = xr.DataArray(high, {"x": line.x}, "x")
+    random = st.RandomInterface(
+        strength=field.given(known, noise=20e3),
+        between={"strength": st.Lognormal(mean=1.0, cv=0.3)},
+    )
+    found = st.monte_carlo(own.problem, random, method=own.method, samples=50, seed=0)
+    exact = st.onset(own.problem, high, method=own.method).critical_stress.item()
+    assert found.critical_stress.mean() == pytest.approx(exact, rel=0.03)  # the scan's error

@@ -313,7 +313,9 @@ class Conditioning:
         """Find the posterior of u; return its mean, and how values of z move along the grid."""
         middle, spread = 0.0, 1.0
         for _ in range(3):
-            grid = np.clip(middle + spread * np.linspace(-REACH, REACH, NODES), -37.0, 37.0)
+            grid = np.clip(
+                middle + spread * np.linspace(-REACH, REACH, NODES), -FURTHEST, FURTHEST
+            )
             z, precision, _ = self._gaussian(middle, alone)
             self._regress(z, precision)
             values = [self._gaussian(u, alone) for u in grid]

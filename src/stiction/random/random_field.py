@@ -276,12 +276,12 @@ class RandomField:
         """
         draws = self.draws(interface, samples, seed, first, stream=stream)
         self.warn_if_inaccurate(interface)
+        if self.conditions is not None:
+            conditioning(self, interface).warn()
         return self.profiles(interface, draws)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
-        if self.conditions is not None:
-            conditioning(self, interface).warn()
         modes = self.modes(interface)
         lost = modes.unresolved(interface)
         if lost > LOST:

@@ -81,6 +81,12 @@ def lower_factor(matrix: Array) -> Array:
     return factor
 
 
+def range_of_product(one: tuple[Any, Any], other: tuple[Any, Any]) -> tuple[float, float]:
+    """Return the bounds of a product of two numbers in these ranges, which may be infinite."""
+    ends = [0.0 if a == 0.0 or b == 0.0 else float(a * b) for a in one for b in other]
+    return min(ends), max(ends)
+
+
 class Stream(NamedTuple):
     """The draws of one property, and where they stand in the vector of all draws of a sample.
 
@@ -296,13 +302,14 @@ class RandomInterface:
         low, high = self.properties[name].marginal.distribution.support()
         factor = (self.between or {}).get(name)
         ends = (1.0, 1.0) if factor is None else factor.distribution.support()
-        products = [0.0 if a == 0.0 or b == 0.0 else a * b for a in (low, high) for b in ends]
-        return min(products), max(products)
+        return range_of_product((low, high), ends)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of fields that the grid or the interface cannot do justice to."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
+        for _, _, known in _conditioned(self, interface):
+            known.warn()
 
 
 @lru_cache(maxsize=256)

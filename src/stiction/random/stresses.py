@@ -10,7 +10,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface
+from stiction.random.random_interface import RandomInterface, range_of_product
 
 WORTH_SAYING = 1e-6
 MOST = 0.5
@@ -72,9 +72,7 @@ def support_in_stress(
     ends = problem.load.normal_pressure
     if "normal_pressure" in random.names:
         ends = random.support("normal_pressure")
-    pair = float(np.min(ends)), float(np.max(ends))
-    corners = [0.0 if a == 0.0 or b == 0.0 else a * b for a in (low, high) for b in pair]
-    return min(corners), max(corners)
+    return range_of_product((low, high), (float(np.min(ends)), float(np.max(ends))))
 
 
 def mean_in_stress(problem: Problem, fields: Mapping[str, RandomField], name: str) -> float:
