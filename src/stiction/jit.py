@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numba
 import numpy as np
-from numba.core import event
+from numba.core import caching, event
 
 from stiction.files import cache_folder, private_folder
 
@@ -94,39 +95,65 @@ _KEPT = numba.config.CACHE_DIR
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
-    """Compile on first call, cached on disk where that is possible."""
-    before = numba.config.CACHE_DIR
-    # Read by numba when it decorates, and only then.
-    numba.config.CACHE_DIR = str(_folder(function.__module__))
-    try:
-        compiled: Any = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # numba finds no folder in which it may write
-        compiled = numba.njit(**options)(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    if hasattr(compiled, "_cache") and hasattr(compiled._cache, "flush"):
-        _keep_own(compiled._cache)
-    result: Kernel = compiled
-    return result
+class _Locator(caching._CacheLocator):
+    """The folder of a function's compiled forms.
+
+    What tells it from others is the text of its file, not where the file lies or when it was
+    written: another environment with the same package compiles nothing again.
+    """
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._path = _folder(function.__module__) / function.__module__
+        self._stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Locator | None:
+        try:
+            found = cls(function, file)
+            found.ensure_cache_path()
+        except (OSError, TypeError):  # a folder that is read-only; a function of no module
+            return None
+        return found
+
+    def get_cache_path(self) -> str:
+        return str(self._path)
+
+    def get_source_stamp(self) -> str:
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
 
 
-def _keep_own(cache: Any) -> None:
-    """Keep on disk only what is compiled for types of this package.
+class _Format(caching.CompileResultCacheImpl):
+    _locator_classes: ClassVar = [_Locator]
+
+
+class _Cache(caching.FunctionCache):
+    """Keeps on disk only what is compiled for types of this package.
 
     A friction law from elsewhere is part of the kernels that are compiled for it. numba would not
     notice that the law was edited, and could not read its index where the law's module is missing.
     """
-    load, save = cache.load_overload, cache.save_overload
 
-    def load_overload(signature: Any, target: Any) -> Any:
-        return load(signature, target) if _is_own(signature) else None
+    _impl_class = _Format
 
-    def save_overload(signature: Any, data: Any) -> None:
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        return super().load_overload(signature, target) if _is_own(signature) else None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
         if _is_own(signature):
-            save(signature, data)
+            super().save_overload(signature, data)
 
-    cache.load_overload, cache.save_overload = load_overload, save_overload
+
+def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
+    """Compile on first call, cached on disk where that is possible."""
+    compiled: Any = numba.njit(**options)(function)
+    with contextlib.suppress(RuntimeError):  # numba finds no folder in which it may write
+        compiled._cache = _Cache(function)
+    result: Kernel = compiled
+    return result
 
 
 def _is_own(kind: Any) -> bool:
