@@ -1,7 +1,5 @@
 """The statistics of static friction: at which load, and where, does this interface let go?"""
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 from pathlib import Path

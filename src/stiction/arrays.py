@@ -1,7 +1,5 @@
 """Arrays: their type, and BLAS with one thread."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

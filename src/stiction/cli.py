@@ -1,7 +1,5 @@
 """The command line: parse, call, print. Numerics are imported inside commands: help is quick."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import json

@@ -1,7 +1,5 @@
 """Functions for the samplers and reliability codes of others: OpenTURNS, UQpy, dynesty, sbi."""
 
-from __future__ import annotations
-
 from stiction.inference.simulator import simulator
 from stiction.reliability.limit_state import limit_state
 

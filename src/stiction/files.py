@@ -1,7 +1,5 @@
 """Files that are whole or not there, archives of arrays, and the folders of the cache."""
 
-from __future__ import annotations
-
 import os
 import struct
 import uuid

@@ -6,8 +6,6 @@ differs in its last bits from the same kernel loaded from disk. Here the lanes a
 lane l sums the terms l, l + 4, l + 8, ..., whatever the width of the machine's registers.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir

@@ -3,8 +3,6 @@
 One definition serves Python, TOML and JSON. All mistakes come at once, as one `InputError`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import inspect

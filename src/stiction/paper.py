@@ -1,7 +1,5 @@
 """The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from stiction.friction import LinearWeakening

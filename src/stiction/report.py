@@ -1,7 +1,5 @@
 """A result as one self-contained HTML page: text, figures and tables."""
 
-from __future__ import annotations
-
 import base64
 import io
 import itertools

@@ -1,7 +1,5 @@
 """Theory of the local criterion and of cracks: what can be said without an ensemble."""
 
-from __future__ import annotations
-
 from stiction.criterion.griffith import energy_release_rate, griffith_length
 from stiction.criterion.local import nucleation_stress
 from stiction.statistics.moments import nucleation_statistics

@@ -1,7 +1,5 @@
 """Units that measured data state, and what they are in SI: nothing is converted by guessing."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

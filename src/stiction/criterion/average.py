@@ -1,7 +1,5 @@
 """The least moving average over places and windows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

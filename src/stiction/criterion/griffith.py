@@ -1,7 +1,5 @@
 """Griffith's criterion under any load: where the release of energy no longer pays for a crack."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The local criterion: the weakest patch, each by itself."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, Literal

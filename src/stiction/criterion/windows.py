@@ -9,8 +9,6 @@ residual strength (strictly for a Z-matrix). For nu = 0 the critical disc has ra
 2.0061 G/(2W).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

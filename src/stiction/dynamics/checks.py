@@ -1,7 +1,5 @@
 """What a run is warned of or refused for: grids, rates of loading, loads that reverse."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -6,8 +6,6 @@ iteration finds the slipping set and the straight line that the strength of each
 conjugate gradients, preconditioned with the inverse circulant, solve each linear problem.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from stiction.arrays import Array

@@ -1,7 +1,5 @@
 """What both kinds of step do once the new slip is known: peaks, events, arrival, the record."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Energies of a rupture: spent on breaking, stored in the solids, carried away by waves."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Explicit predictor-corrector steps: second order, one fixed step, all in one compiled loop."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Implicit steps of adaptive size while the interface creeps, in one compiled loop."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

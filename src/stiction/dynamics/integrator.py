@@ -1,7 +1,5 @@
 """One run: explicit steps and implicit steps, the switch between them, and when it ends."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -1,7 +1,5 @@
 """Load histories: tau_0(t) as straight pieces."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

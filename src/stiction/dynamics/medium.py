@@ -1,7 +1,5 @@
 """What all runs of one problem share: stiffness, memory kernel, explicit time step."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -9,8 +9,6 @@ rows real and imaginary part of the memory of the real signal, then of the imagi
 constant row length lets the compiler vectorise without run-time checks of overlap.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

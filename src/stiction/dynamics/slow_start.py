@@ -11,8 +11,6 @@ by which such a state misses the strength where it slips is an estimate of the e
 what is wrong with the state and, as a stress, by how much the onset can be misplaced.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction.dynamics.energies import radiated_energy

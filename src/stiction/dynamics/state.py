@@ -4,8 +4,6 @@ Fields of the interface and their transforms are flat, whatever its shape; `Grid
 the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the mean.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scalars of a run: loads, moment, energies, rupture speeds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -8,8 +8,6 @@ Pereyra 1973), and reweighting in the way of Lawson (1961) levels the error. A f
 only if its error on another, denser set of times is below the tolerance.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 

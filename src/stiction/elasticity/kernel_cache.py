@@ -1,7 +1,5 @@
 """Fitted kernels on disk: built once a machine, safe if several processes build at once."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 from functools import cache

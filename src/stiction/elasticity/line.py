@@ -7,8 +7,6 @@ K is the circulant matrix of the symbol (G*/2)|k|. For an even number n of nodes
 0 for even j > 0: nodes of one parity act on those of the other only, which halves products.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ negative curvature, so that states on and beyond the turning point of the load c
 for. The preconditioner is 1/(K(k) + W/2), cut too.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -12,8 +12,6 @@ one set of nodes is accurate for every T. The closed forms by Bessel functions c
 beyond T of 7.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

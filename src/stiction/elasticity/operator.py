@@ -9,8 +9,6 @@ mode II along x and mode III along y (Geubelle and Rice 1995); a line has the mo
 mode. Kernels take flat arrays, so that the same code serves lines and planes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Samples computed in batches, by threads or any executor: the same numbers whoever computes."""
 
-from __future__ import annotations
-
 import os
 import socket
 import time

@@ -1,7 +1,5 @@
 """Tables of samples, in any order, gathered to one labelled dataset over sweep, sample and x."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

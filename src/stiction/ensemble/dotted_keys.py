@@ -1,7 +1,5 @@
 """Dotted keys: a copy of an object with some of its parameters, however deep, replaced."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple

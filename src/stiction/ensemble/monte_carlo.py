@@ -1,7 +1,5 @@
 """An ensemble of random interfaces: the public function, and the loop over its samples."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing

@@ -1,7 +1,5 @@
 """A pilot: some samples of an inexpensive method solved by its exact counterpart too."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context

@@ -1,7 +1,5 @@
 """Samples as rows of a table, and a table as the bytes of a file."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -9,8 +9,6 @@ be a Z-matrix. Bisection is the plain algorithm, robust and linear in the digits
 starts `turning_point`, which closes the bracket, and takes over where that fails.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -4,8 +4,6 @@ The rows of the factor lie one after the other in a flat array, each padded to a
 numbers: half the memory of a square, and no two rows compete for the same cache sets.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The programme of lines: one dense factor, or conjugate gradients where the line is long."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple

@@ -7,8 +7,6 @@ join, and the result is the least equilibrium at this load. With the spring, equ
 both sides of the turning point, and mu tells which load they belong to.
 """
 
-from __future__ import annotations
-
 from stiction.arrays import Array
 from stiction.elasticity.linear import (
     EXHAUSTED,

@@ -7,8 +7,6 @@ or move along a field z >= 0 with A z <= 0, or towards the solution of the linea
 present states, as far as the first node that reaches the next corner of its friction law.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from stiction.arrays import Array

@@ -7,8 +7,6 @@ bound (a cut). The same slipping nodes, less the few that do not slip at the low
 there. A load that is an upper bound and has an equilibrium is the critical one.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

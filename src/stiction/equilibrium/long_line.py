@@ -13,8 +13,6 @@ window with everything outside held fixed: slip outside only helps, so that a pa
 there does so in truth, and if it comes to rest, the jump of the whole starts from there.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Equilibrium as a method: exact quasi-static onset with every interaction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias

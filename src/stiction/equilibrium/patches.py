@@ -4,8 +4,6 @@ Nodes of a plane are connected where their cells share an edge (four neighbours)
 borders.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

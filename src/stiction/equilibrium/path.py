@@ -1,7 +1,5 @@
 """The path of one sample: slip and stress at given loads, and what came to rest on the way."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -7,8 +7,6 @@ one, with the strength frozen at its present value; and one with the true states
 to where the first node reaches the next corner: if none does, it is the equilibrium.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

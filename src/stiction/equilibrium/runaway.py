@@ -6,8 +6,6 @@ problem of the run with frozen strengths; the blocks of K being Toeplitz, one Ch
 the runs of every sample.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ residual strength. Between corners everything is linear, and a corner is an even
 has one piece: its start is tau_p, to the bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias

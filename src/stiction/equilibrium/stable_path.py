@@ -7,8 +7,6 @@ that reaches the next corner (a diagonal entry that rises as the strength falls 
 node whose slipping, or weakening more steeply, makes A singular: there the path ends.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

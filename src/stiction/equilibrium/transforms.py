@@ -5,8 +5,6 @@ law, as long as no node reaches a corner before it. Where one does, the path is 
 the load by relaxation at fixed load.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ with mu' < 0, for which A y = 0 where both slip, is a multiplier; nodes that sli
 have A y <= 0 and hardly slip at the turning point, so the error of its bound is of second order.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

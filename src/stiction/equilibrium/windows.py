@@ -5,8 +5,6 @@ weakening rate in it. The eigenvector y is positive, A y <= 0, so <s, y>/<p, y> 
 load from above: the criterion of Uenishi and Rice (2003) in the form that is strict on the grid.
 """
 
-from __future__ import annotations
-
 import bisect
 import functools
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ type with `register`. ``strength_at`` and ``line_at`` are resolved by the type w
 compiled, so a law costs nothing that it does not use, and another law changes no kernel.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

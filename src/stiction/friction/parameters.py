@@ -1,7 +1,5 @@
 """What kernels are given of a friction law, and the table of the functions that evaluate it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

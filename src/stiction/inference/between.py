@@ -1,7 +1,5 @@
 """Scatter from specimen to specimen: what the means of several records tell of it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

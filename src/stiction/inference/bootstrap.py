@@ -1,7 +1,5 @@
 """Intervals by a parametric bootstrap: how fits to simulated records of a fitted field scatter."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

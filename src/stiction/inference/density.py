@@ -10,8 +10,6 @@ node to node. The error of the load cell is integrated over v by the midpoint ru
 faster than any power of the step once that is below the narrower of error and density.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Designs of tests: how much each is expected to tell, before any is made."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

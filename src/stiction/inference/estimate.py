@@ -1,7 +1,5 @@
 """One fit: records to a marginal, a spectrum and a share of noise; and records from those."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

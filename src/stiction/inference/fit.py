@@ -1,7 +1,5 @@
 """A random field from measured profiles: the public function and its checks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

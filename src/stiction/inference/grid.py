@@ -1,7 +1,5 @@
 """The posterior on a grid that closes in on where it is, and draws from it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

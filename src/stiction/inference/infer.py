@@ -1,7 +1,5 @@
 """Parameters of a random interface from the peaks of repeated tests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Likelihood of measured peaks as a function of the parameters."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self

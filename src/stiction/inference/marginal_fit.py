@@ -7,8 +7,6 @@ correlated; the likelihood takes them for independent, which leaves the estimate
 composite likelihood) and its error to the bootstrap.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

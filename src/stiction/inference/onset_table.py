@@ -1,7 +1,5 @@
 """Simulated onsets on a grid of those parameters that need simulation, with the same draws."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Measured peaks: validated, in SI units, one array for each kind of specimen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

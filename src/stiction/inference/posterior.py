@@ -1,7 +1,5 @@
 """The posterior: draws, intervals, information gained, and how accurate they are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

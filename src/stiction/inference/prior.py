@@ -1,7 +1,5 @@
 """The prior: which parameters are not known, and what is thought of each before the tests."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """Records: measured values at equal distances, on a line or a plane, with their gaps."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

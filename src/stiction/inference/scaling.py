@@ -19,8 +19,6 @@ Friction coefficients mu = a + b s are a strength sigma_n (a + b s). The shift s
 everywhere only if the normal pressure is; where it varies, a must be zero.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

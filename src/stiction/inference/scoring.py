@@ -1,7 +1,5 @@
 """Greatest likelihoods by Fisher scoring within limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

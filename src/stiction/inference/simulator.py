@@ -1,7 +1,5 @@
 """Peaks of tests as a function of parameters, for other inference codes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

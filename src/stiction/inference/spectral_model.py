@@ -1,7 +1,5 @@
 """Correlation at the points of a record from a spectrum: truncation and aliasing included."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Parameters of a spectrum by Fisher scoring on the Whittle likelihood."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

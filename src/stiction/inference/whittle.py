@@ -11,8 +11,6 @@ data. A floor of a thousandth of the highest power is therefore added to periodo
 alike. The score stays unbiased; what lies below the floor ceases to count.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

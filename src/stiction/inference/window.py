@@ -11,8 +11,6 @@ all in it (the debiased Whittle likelihood of Sykulski, Olhede, Guillaumin, Lill
 and of Guillaumin, Sykulski, Olhede and Simons, 2022, here with the trend as well).
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

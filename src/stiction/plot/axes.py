@@ -1,7 +1,5 @@
 """Axes of the caller's or new ones, units of their scales, and the problem behind a result."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Many onsets: their density, and their quantiles along a sweep."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

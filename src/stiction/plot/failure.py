@@ -1,7 +1,5 @@
 """Failure probability: the curve over decades, and what weak interfaces have in common."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Profiles along an interface."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

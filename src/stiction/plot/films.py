@@ -1,7 +1,5 @@
 """Films of ruptures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a fit is judged by: a random field fitted to profiles, a posterior from peaks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fields of a plane as maps: x to the right, y upwards, a node at the centre of its cell."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

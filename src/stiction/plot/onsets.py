@@ -1,7 +1,5 @@
 """Where each method sees sliding begin on a profile, and how slip grows before that."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """One rupture: slip rate in space and time, and the speed of its front."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One look for every figure: sizes of a journal's columns, and lines that can be told in grey."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager

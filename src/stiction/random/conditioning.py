@@ -16,8 +16,6 @@ is replaced by the Gaussian that gives the same mean and variance, in turns with
 are not small against the bend of the map.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 

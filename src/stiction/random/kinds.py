@@ -1,7 +1,5 @@
 """Fields of a model that hold one of several classes, told apart by `type` in a study file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

@@ -8,8 +8,6 @@ outside are left to scipy. So the result is accurate everywhere: to 1e-9 of the 
 a millionth of the standard deviation where the value is smaller than that.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

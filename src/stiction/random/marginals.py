@@ -6,8 +6,6 @@ own parameters (shapes, loc, scale) follow from them. To add a family, write one
 a `distribution` and add it to `MARGINALS`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

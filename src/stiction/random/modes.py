@@ -1,7 +1,5 @@
 """The discrete spectrum of a field: which waves an interface holds, and how strong each is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

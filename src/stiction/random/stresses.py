@@ -1,7 +1,5 @@
 """What is random on a problem, as stresses: friction coefficients times the normal pressure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -6,8 +6,6 @@ that a spectrum with more modes extends the same field. A sample of a plane has 
 modes that it has a generator, a block of its own.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a failure probability and a design stress are reported with, and their common options."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeAlias, TypeVar

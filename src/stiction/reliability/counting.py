@@ -1,7 +1,5 @@
 """Plain Monte Carlo: count the failures among the samples of the ensemble."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """The failure curve: P(onset < s) over decades."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import numpy as np

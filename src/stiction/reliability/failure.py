@@ -1,7 +1,5 @@
 """Failure probability and design stress: the choice of the algorithm, and the answer."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

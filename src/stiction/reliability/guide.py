@@ -1,7 +1,5 @@
 """What samples cost, and whether a less expensive method leads to the samples that fail."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

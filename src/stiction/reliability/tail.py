@@ -1,7 +1,5 @@
 """The lower tail of the stress at onset: independent repetitions, pooled until precise enough."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How far an estimated probability may be off: intervals, and the variance of correlated chains."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Statistics of samples: densities, quantiles, combined means, and the misfit of two ruptures."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

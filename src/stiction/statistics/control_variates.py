@@ -7,8 +7,6 @@ over all of its own samples, what it gets wrong over those of the latter only (P
 Willcox and Gunzburger, 2016).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

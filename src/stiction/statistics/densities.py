@@ -1,7 +1,5 @@
 """Probability densities that keep to their bounds: the diffusion estimator."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

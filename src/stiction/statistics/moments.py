@@ -1,7 +1,5 @@
 """Exact mean and variance of the nucleation stress."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Quantiles with confidence bands from order statistics: no assumption on the distribution."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

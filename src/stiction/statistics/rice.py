@@ -5,8 +5,6 @@ below a level is the expected number of its parts less that of their holes, whic
 there are none of (Adler, 1981). Low dips come as a Poisson process.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Results as files for other programs: the suffix says which kind, and units go along."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Runs on disk: parts of a study for several jobs, and what is stored read back."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

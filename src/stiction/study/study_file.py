@@ -1,7 +1,5 @@
 """Study files as plain dictionaries, before they are made a study."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Sweeps: any key of a study takes several values; axes are crossed, keys of one axis zipped."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json
