@@ -68,7 +68,8 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     field = st.RandomField(marginal, st.paper.strength(problem, 0.5).spectrum)
     profiles = field.sample(problem.interface, samples=200)
     found = st.onset(problem, profiles, method=st.LocalCriterion())
-    assert float(found["critical_stress"].min()) >= 0.66e6
+    # A mean over the interface of equal values is rounded; on some machines to below them.
+    assert float(found["critical_stress"].min()) >= 0.66e6 * (1.0 - 1e-15)
     state = st.external.limit_state(problem, field, st.LocalCriterion())
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
