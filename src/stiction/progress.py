@@ -1,8 +1,8 @@
-"""Progress of long work, and its time limit: one mechanism for all that takes long.
+"""Progress of long work, and its time limit: one mechanism for everything that takes long.
 
 A terminal shows a bar, a notebook a line that is rewritten, a pipe a line now and then; all of it
-on standard error, and only after two seconds. Code that works only reports what is done
-(`advance`), and asks whether its time is `over`.
+on standard error, and only after two seconds. The code that works reports what is done (`advance`)
+and tests whether its time is `over`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import TypeAlias
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
 """True shows progress once work takes long; a callable gets (done, total); False is silent."""
@@ -20,7 +21,7 @@ Show: TypeAlias = bool | Callable[[int, int], None]
 AFTER = 2.0
 """Seconds of silence: who waits no longer than this needs no bar."""
 LONG = 10.0
-"""Seconds of work from which a pipe hears of it, at once if it can be foreseen."""
+"""Seconds between lines in a pipe, at least."""
 TICK = 0.25
 PORTION = 0.25
 """Seconds of work between two looks at the clock."""
@@ -42,13 +43,13 @@ class Meter:
     what : str
         Label.
     total : int, optional
-        All that there is to do, if it is known.
+        Number of units to do, if it is known.
     show : bool or callable
         See `Show`.
     unit : str
         What is counted, plural.
     time_limit : float, optional
-        Seconds from now.
+        Seconds from the start.
     """
 
     def __init__(
@@ -61,19 +62,19 @@ class Meter:
         time_limit: float | None = None,
     ) -> None:
         self.unit, self.time_limit, self._show = unit, time_limit, show
+        self._watcher: threading.Thread | None = None
         self.stage(what, total)
-        self._begun = self._stage
+        self._begun = time.monotonic()
 
     def stage(self, what: str, total: int | None = None) -> None:
         """Begin another part of the work; the clock goes on."""
         self.what, self.total, self.done, self.note = what, total, 0, ""
         self._first: tuple[float, int] | None = None
-        self._stage = time.monotonic()
 
     def advance(self, count: int = 1) -> None:
         """Report that `count` more are done."""
         self.done += count
-        if self._first is None:  # the rate is that of what follows: first come preparations
+        if self._first is None:  # the rate is that of what follows: preparations come first
             self._first = time.monotonic(), self.done
         if callable(self._show):
             self._show(self.done, self.total or 0)
@@ -85,174 +86,121 @@ class Meter:
 
     @property
     def elapsed(self) -> float:
-        """Seconds since it was made."""
+        """Seconds since the start."""
         return time.monotonic() - self._begun
 
     @property
-    def left(self) -> float | None:
-        """Estimated seconds that are left; None if unknown."""
-        if not self.total or self._first is None:
-            return None
-        begin, before = self._first
-        now = time.monotonic()
-        if self.done > before:
-            pace = (now - begin) / (self.done - before)
-        else:
-            pace = (begin - self._stage) / self.done if self.done else 0.0
-        left = pace * max(0, self.total - self.done)
-        return left if self.time_limit is None else min(left, self.time_limit - self.elapsed)
-
-    @property
     def text(self) -> str:
-        """How far it is, as text."""
+        """How much is done, and how long it took and will take."""
         of = f" of {self.total:,}" if self.total else ""
         parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
         parts.append(duration(math.floor(self.elapsed)))
-        left = self.left
-        if left is not None and left >= 1.0:
-            parts.append(f"about {duration(round(left))} left")
+        begin, before = self._first or (0.0, self.done)
+        if self.total and self.done > before:
+            pace = (time.monotonic() - begin) / (self.done - before)
+            left = pace * (self.total - self.done)
+            if self.time_limit is not None:
+                left = min(left, self.time_limit - self.elapsed)
+            if left >= 1.0:
+                parts.append(f"about {duration(round(left))} left")
         return ", ".join(part for part in parts if part)
 
     def __enter__(self) -> Meter:
-        return self.start()
-
-    def __exit__(self, *error: object) -> None:
-        self.stop()
-
-    def start(self) -> Meter:
-        """Start the clock; `stop` must follow, whatever happens."""
-        self._begun = self._stage = time.monotonic()
+        self._begun = time.monotonic()
         if self._show is True:
-            _watch(self)
+            _live.append(self)
+            if _live[0] is self:
+                self._ended = threading.Event()
+                self._watcher = threading.Thread(
+                    target=_watch, args=(self._ended,), daemon=True
+                )
+                self._watcher.start()
         return self
 
-    def stop(self) -> None:
-        """Show nothing from here on."""
-        _unwatch(self)
+    def __exit__(self, *error: object) -> None:
+        if self in _live:
+            _live.remove(self)
+        if self._watcher is not None:
+            self._ended.set()
+            self._watcher.join()
 
 
 SILENT = Meter("", show=False)
 """For work that nobody watches and nothing limits."""
 
-_lock = threading.Lock()
 _live: list[Meter] = []
-_watcher: _Watcher | None = None
+"""Meters that run and are shown, the outermost first."""
 
 
-def _watch(meter: Meter) -> None:
-    global _watcher
-    with _lock:
-        _live.append(meter)
-        if _watcher is None:
-            _watcher = _Watcher(daemon=True)
-            _watcher.start()
+def _watch(ended: threading.Event) -> None:
+    """Show one of the meters that run until the outermost has ended."""
+    show, shown = None, SILENT
+    with ExitStack() as stack:
+        while not ended.wait(TICK):
+            old = [meter for meter in tuple(_live) if meter.elapsed >= AFTER]
+            if old:  # the outermost whose total is known, else the innermost
+                shown = next((meter for meter in old if meter.total), old[-1])
+                show = show or stack.enter_context(_display())
+                show(shown, False)
+        if show is not None:
+            show(shown, True)
 
 
-def _unwatch(meter: Meter) -> None:
-    global _watcher
-    last = None
-    with _lock:
-        if meter in _live:
-            _live.remove(meter)
-            if not _live:
-                last, _watcher = _watcher, None
-    if last is not None:
-        last.ended.set()
-        last.join()
-
-
-class _Watcher(threading.Thread):
-    """Shows one of the meters that run; ends with the last of them."""
-
-    def __init__(self, *, daemon: bool) -> None:
-        super().__init__(daemon=daemon)
-        self.ended = threading.Event()
-
-    def run(self) -> None:
-        display: _Pipe | _Terminal | _Notebook | None = None
-        while not self.ended.wait(TICK):
-            with _lock:
-                old = [meter for meter in _live if meter.elapsed >= AFTER]
-            if old:  # the outermost that knows its end, else the innermost
-                display = display or _display()
-                display.show(next((meter for meter in old if meter.total), old[-1]))
-        if display is not None:
-            display.close()
-
-
-def _display() -> _Pipe | _Terminal | _Notebook:
+def _display() -> AbstractContextManager[Callable[[Meter, bool], object]]:
+    """A function that shows a meter, and is told which time is the last."""
     shell = sys.modules.get("IPython")
     active = shell.get_ipython() if shell is not None else None
     if type(active).__name__ == "ZMQInteractiveShell":
-        return _Notebook()
-    return _Terminal() if sys.stderr is not None and sys.stderr.isatty() else _Pipe()
+        return _notebook()
+    return _terminal() if sys.stderr is not None and sys.stderr.isatty() else _pipe()
 
 
-class _Pipe:
-    """A line after ten seconds more and a tenth more time: few, however long it takes."""
+@contextmanager
+def _pipe() -> Iterator[Callable[[Meter, bool], object]]:
+    """A line every ten seconds and every tenth of the time: few, however long it takes."""
+    soon = LONG
 
-    def __init__(self) -> None:
-        self._next, self._line = 0.0, ""
+    def show(meter: Meter, last: bool) -> None:
+        nonlocal soon
+        if meter.elapsed >= soon or (last and soon > LONG):
+            soon = max(meter.elapsed + LONG, 1.1 * meter.elapsed)
+            print(f"{meter.what}: {meter.text}", file=sys.stderr, flush=True)
 
-    def show(self, meter: Meter) -> None:
-        elapsed = meter.elapsed
-        self._line = f"{meter.what}: {meter.text}"
-        foreseen = elapsed + (meter.left or 0.0)
-        if elapsed >= self._next and (self._next or foreseen >= LONG):
-            self._next = max(elapsed + LONG, 1.1 * elapsed)
-            print(self._line, file=sys.stderr, flush=True)
-
-    def close(self) -> None:
-        if self._next:
-            print(self._line, file=sys.stderr, flush=True)
+    yield show
 
 
-class _Terminal:
-    """A bar that goes away when the work is done."""
+@contextmanager
+def _terminal() -> Iterator[Callable[[Meter, bool], object]]:
+    """A line with a bar that goes away when the work is done; warnings appear above it."""
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
 
-    def __init__(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+    def show(meter: Meter, last: bool) -> None:
+        line = Text(_with_bar(meter), no_wrap=True, overflow="ellipsis")
+        live.update(line, refresh=True)
 
-        self._bar = Progress(
-            SpinnerColumn("line"),
-            TextColumn("{task.description}", markup=False),
-            BarColumn(30),
-            TextColumn("{task.fields[text]}", markup=False),
-            console=Console(stderr=True),
-            transient=True,
-            redirect_stdout=False,
-        )
-        self._task = self._bar.add_task("", total=None, text="")
-        self._bar.start()
-
-    def show(self, meter: Meter) -> None:
-        done, total = meter.done, meter.total
-        self._bar.update(
-            self._task, description=meter.what, completed=done, total=total, text=meter.text
-        )
-
-    def close(self) -> None:
-        self._bar.stop()
+    console = Console(stderr=True)
+    with Live(
+        console=console, auto_refresh=False, transient=True, redirect_stdout=False
+    ) as live:
+        yield show
 
 
-class _Notebook:
+@contextmanager
+def _notebook() -> Iterator[Callable[[Meter, bool], object]]:
     """A line below the cell, rewritten; rich would need ipywidgets."""
+    from IPython.display import display
 
-    def __init__(self) -> None:
-        from IPython.display import display
+    line: Any = display({"text/plain": ""}, raw=True, display_id=True)
+    yield lambda meter, last: line.update({"text/plain": _with_bar(meter)}, raw=True)
 
-        self._line = display({"text/plain": ""}, raw=True, display_id=True)
 
-    def show(self, meter: Meter, bar: str = "") -> None:
-        self._meter = meter
-        if meter.total:
-            full = round(30 * min(1.0, meter.done / meter.total))
-            bar = f" [{'#' * full:.<30}]"
-        self._line.update({"text/plain": f"{meter.what}{bar} {meter.text}"}, raw=True)
-
-    def close(self) -> None:
-        self.show(self._meter)
+def _with_bar(meter: Meter) -> str:
+    if not meter.total:
+        return f"{meter.what} {meter.text}"
+    full = round(30 * min(1.0, meter.done / meter.total))
+    return f"{meter.what} [{'#' * full:.<30}] {meter.text}"
 
 
 class Portions:

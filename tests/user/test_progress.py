@@ -88,7 +88,7 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
         work(Meter("inner", 100), 0.4)
     assert "inner: " in capsys.readouterr().err
     assert threading.active_count() == before
-    code = "from stiction.progress import Meter; Meter('left open').start()"
+    code = "from stiction.progress import Meter; Meter('left open').__enter__()"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
