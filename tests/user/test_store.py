@@ -227,6 +227,17 @@ def test_small_chunks_are_joined(tmp_path, reference, monkeypatch):
     assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
 
 
+@pytest.mark.parametrize("size", [7, 1000])
+def test_chunks_of_unequal_variables_stay(tmp_path, monkeypatch, size):
+    """A method's chunk that is the only one of its variables is written again as it was."""
+    monkeypatch.setattr(batches, "piece_size", pieces_of(size))
+    study = make_study(
+        sweep=[{"method": [{"type": "local_criterion"}, {"type": "equilibrium"}]}]
+    )
+    result = study.run(out=tmp_path / "run", workers=1, pilot=False)
+    assert st.open_run(tmp_path / "run").dataset().identical(result)
+
+
 @pytest.mark.parametrize("name", ["_write", "unlink"])
 def test_killed_while_chunks_are_joined(tmp_path, reference, monkeypatch, name):
     """Before the joined chunk is written, and before the small ones are removed."""

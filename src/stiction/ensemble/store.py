@@ -189,12 +189,14 @@ class Store:
         if len(self._small) >= MANY:
             self._join()
 
-    def _write(self, table: Table) -> None:
+    def _write(self, table: Table) -> str:
+        """Write a chunk, and return its name."""
         data = encode(table, {"study": self._mark, "versions": versions()})
         name = f"{digest(data)[:32]}.npz"
         write_whole(self.path / CHUNKS / name, data)
         if len(data) < LARGE:
             self._small.append(name)
+        return name
 
     def _join(self) -> None:
         """Replace small chunks by larger ones; they go when the larger ones are whole."""
@@ -211,11 +213,12 @@ class Store:
                 self._small += group
                 continue
             try:
-                for table in joined(chunk.table for chunk in group.values()):
-                    self._write(table)
+                tables = joined(chunk.table for chunk in group.values())
+                written = {self._write(table) for table in tables}
             except StoreError:  # the disk is full: the small ones stay, and nothing is lost
                 return
-            for name in group:
+            # Tables of other variables than all others come back under the name that they had.
+            for name in group.keys() - written:
                 with suppress(OSError):
                     (self.path / CHUNKS / name).unlink()
 
