@@ -412,13 +412,3 @@ def test_command_writes_table_data_and_figure(app, system, tmp_path):
         again = st.failure_curve(*system, method=LOCAL, smallest=1e-4, seed=3)
         np.testing.assert_array_equal(curve["probability"], again["probability"])
     assert "probability" in done.output
-
-
-def test_command_names_mistakes(app, system, tmp_path):
-    out = ("--out", str(tmp_path / "out"))
-    sweep = [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}]
-    with pytest.raises(st.InputError, match="takes one interface"):
-        app(written(tmp_path / "study.toml", system, sweep=sweep), *out)
-    with pytest.raises(st.InputError, match="cannot be read"):
-        app(str(tmp_path / "none.toml"))
-    assert not (tmp_path / "out").exists()
