@@ -5,8 +5,6 @@ import errno
 import json
 import os
 import re
-import subprocess
-import sys
 import threading
 import warnings
 from concurrent.futures import Future
