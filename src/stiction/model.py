@@ -8,10 +8,11 @@ import functools
 import inspect
 import math
 import numbers
+import operator
 import os
 import types
 import typing
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
@@ -33,13 +34,21 @@ from stiction.errors import InputError, unknown_name
 from stiction.progress import Show
 
 T = TypeVar("T")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+# -- kinds of values -----------------------------------------------------------------------------
+
+
+def _is_real(value: Any) -> bool:
+    """Numbers of any library, but no text and no truth values, which pydantic would convert."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def _number(value: Any) -> float:
-    """Numbers of any library, but no strings and no booleans, which pydantic would convert."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+    if not _is_real(value):
         raise ValueError("must be a number")
     try:
         return float(value)
@@ -49,11 +58,9 @@ def _number(value: Any) -> float:
 
 def _count(value: Any) -> int:
     """Whole numbers of any library, 1e4 too."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
-        raise ValueError("must be a whole number")
-    if isinstance(value, numbers.Integral):
+    if isinstance(value, numbers.Integral) and _is_real(value):
         return int(value)
-    if not float(value).is_integer():
+    if not _is_real(value) or not float(value).is_integer():
         raise ValueError("must be a whole number")
     return int(float(value))
 
@@ -75,7 +82,7 @@ def is_finite(value: Any) -> bool:
 
 
 def real_array(value: Any) -> Array:
-    """`value` as a float64 array, or a TypeError that says what it is instead."""
+    """`value` as a float64 array, or a TypeError that names what it is instead."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise TypeError("got a masked array")
     try:
@@ -92,31 +99,6 @@ def is_unplaced(value: Any) -> bool:
     """Whether a profile has coordinates or units of its own, which its problem resolves."""
     own = ("dims", "to_xarray", "magnitude", "to_value")
     return isinstance(value, dict) or any(hasattr(value, name) for name in own)
-
-
-def _must(
-    be: str, valid: Callable[[Any], bool], made: Callable[[Any], Any] = lambda value: value
-) -> BeforeValidator:
-    """Return the validator of an annotation that refuses what is not `valid`."""
-
-    def read(value: Any) -> Any:
-        if not valid(value):
-            raise ValueError(f"must be {be}")
-        return made(value)
-
-    return BeforeValidator(read)
-
-
-@functools.cache
-def at_least(least: int) -> Any:
-    """Return the annotation of a whole number not below `least`."""
-    valid = functools.partial(is_whole, least=least)
-    return Annotated[int, _must(f"a whole number >= {least}", valid, int)]
-
-
-Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
-Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
-"""Whole numbers from 1 and from 0; 1e4 counts as one."""
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
@@ -154,30 +136,19 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
-Positive: TypeAlias = Annotated[Real, Field(gt=0)]
-PROFILE_SCHEMA = [
-    {"type": "number"},
-    {"type": "array", "items": {"type": "number"}},
-    {"type": "string", "description": "path to a .npy, text or NetCDF file"},
-    {"type": "object", "description": "file, and options of read_profile: unit, x_unit, ..."},
-]
-Profile: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_profile),
-    PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
-]
-"""A number, or a read-only array of shape (nodes,)."""
+def _numbers(value: Any) -> Array:
+    try:
+        return real_array(value)
+    except (TypeError, OverflowError) as error:
+        raise InputError(f"must be numbers; {error}") from None
 
 
-OptionalProfile: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(lambda value, info: None if value is None else _profile(value, info)),
-    PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, {"type": "null"}]}),
-]
-"""The same, or None for 'not given'."""
+def _is_flag(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_)
+
+
+def _is_show(value: Any) -> bool:
+    return _is_flag(value) or (callable(value) and not isinstance(value, type))
 
 
 def _is_text(value: Any) -> bool:
@@ -200,35 +171,69 @@ def _are_names(value: Any) -> bool:
     return all(isinstance(name, str) for name in _listed(value))
 
 
-def _is_flag(value: Any) -> bool:
-    return isinstance(value, bool | np.bool_)
+def _must(
+    be: str, valid: Callable[[Any], bool], made: Callable[[Any], Any] = lambda value: value
+) -> BeforeValidator:
+    """Return the validator of an annotation that refuses what is not `valid`."""
+
+    def read(value: Any) -> Any:
+        if not valid(value):
+            raise ValueError(f"must be {be}")
+        return made(value)
+
+    return BeforeValidator(read)
 
 
-def _is_show(value: Any) -> bool:
-    return _is_flag(value) or (callable(value) and not isinstance(value, type))
+@functools.cache
+def at_least(least: int) -> Any:
+    """Return the annotation of a whole number not below `least`."""
+    valid = functools.partial(is_whole, least=least)
+    return Annotated[int, _must(f"a whole number >= {least}", valid, int)]
 
 
-def _numbers(value: Any) -> Array:
-    try:
-        return real_array(value)
-    except (TypeError, OverflowError) as error:
-        raise InputError(f"must be numbers; {error}") from None
-
-
+Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
+Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
+"""Whole numbers from 1 and from 0; 1e4 counts as one."""
+Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Positive: TypeAlias = Annotated[Real, Field(gt=0)]
+Seconds: TypeAlias = Positive
+Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
+"""Real numbers of any shape, as a float64 array."""
+PROFILE_SCHEMA = [
+    {"type": "number"},
+    {"type": "array", "items": {"type": "number"}},
+    {"type": "string", "description": "path to a .npy, text or NetCDF file"},
+    {"type": "object", "description": "file, and options of read_profile: unit, x_unit, ..."},
+]
+Profile: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_profile),
+    PlainSerializer(_plain),
+    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
+]
+"""A number, or a read-only array of shape (nodes,)."""
+OptionalProfile: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(lambda value, info: None if value is None else _profile(value, info)),
+    PlainSerializer(_plain),
+    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, {"type": "null"}]}),
+]
+"""The same, or None for 'not given'."""
 Flag: TypeAlias = Annotated[bool, _must("True or False", _is_flag, bool)]
 Progress: TypeAlias = Annotated[Show, _must("True, False or a function", _is_show)]
 """True, False, or a function of (done, total)."""
+Text: TypeAlias = Annotated[str, _must("text in UTF-8", _is_text)]
 Names: TypeAlias = Annotated[
     tuple[str, ...], _must("a name or a list of names", _are_names, _listed)
 ]
 """One name or several, as a tuple."""
-Text: TypeAlias = Annotated[str, _must("text in UTF-8", _is_text)]
 FilePath: TypeAlias = Annotated[
-    Path, _must("a path in UTF-8, each name at most 255 bytes", _is_path)
+    Path, _must("a path in UTF-8, each name at most 255 bytes", _is_path, Path)
 ]
-Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
-"""Real numbers of any shape, as a float64 array."""
-Seconds: TypeAlias = Positive
+Mode: TypeAlias = Literal["II", "III"]
+
+
+# -- mistakes ------------------------------------------------------------------------------------
 
 
 def describe(value: Any) -> str:
@@ -237,10 +242,6 @@ def describe(value: Any) -> str:
         return f"an array of shape {value.shape}"
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _one_of(names: Iterable[str]) -> str:
-    return " or ".join(f"{'an' if name[0] in 'AEIO' else 'a'} {name}" for name in names)
 
 
 def _models_in(annotation: Any) -> list[type]:
@@ -257,105 +258,84 @@ def keys_of(cls: Any) -> dict[str, str]:
     return {(name in known and known[name].alias) or name: name for name in names}
 
 
-def _parameters(owner: Any) -> dict[str, Any]:
-    """Names and annotations of the fields of a model, or of the arguments of a function."""
-    if dataclasses.is_dataclass(owner):
-        hints = typing.get_type_hints(owner, include_extras=True)
-        return {key: hints[name] for key, name in keys_of(owner).items()}
-    return dict.fromkeys(inspect.signature(owner).parameters) if owner else {}
+def _hints(cls: type) -> dict[str, Any]:
+    hints = typing.get_type_hints(cls, include_extras=True)
+    return {key: hints[name] for key, name in keys_of(cls).items()}
 
 
-def _walk(
-    owner: Any, location: tuple[int | str, ...]
-) -> tuple[list[str], list[str], list[Any]]:
-    """Path as the user wrote it, the keys valid in its last-but-one step, models valid in the last.
+def _place(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
+    """The path as the user wrote it, and the keys that are valid in its last step.
 
-    Pydantic numbers positional arguments and puts the chosen member of a union into the path.
+    Pydantic numbers positional arguments, and puts the chosen member of a union into the path.
     """
+    if not isinstance(owner, type):
+        names = list(inspect.signature(owner).parameters) if owner else []
+        steps = [names[i] if isinstance(i, int) and i < len(names) else i for i in location[:1]]
+        steps += [step for step in location[1:] if isinstance(step, int)]
+        return [str(step) for step in steps], names
     path: list[str] = []
-    owners, inside = [owner], []
-    for number, step in enumerate(location, 1):
-        chosen = [one for one in owners if getattr(one, "type", None) == step]
-        if chosen and len(owners) > 1:
-            owners = chosen
+    hints: dict[str, Any] = {}
+    inside = [owner]
+    for step in location:
+        if path and (chosen := [one for one in inside if getattr(one, "type", None) == step]):
+            inside = chosen
             continue
-        found = {name: hint for one in owners for name, hint in _parameters(one).items()}
-        if isinstance(step, int) and not path and step < len(found):
-            step = list(found)[step]
+        hints = {key: hint for one in inside for key, hint in _hints(one).items()} or hints
+        if isinstance(step, int) and not path and step < len(hints):
+            step = list(hints)[step]
         path.append(str(step))
-        inside = _models_in(found.get(str(step)))
-        if inside and number < len(location):
-            owners = inside
-    return (
-        path,
-        list(dict.fromkeys(name for one in owners for name in _parameters(one))),
-        inside,
-    )
+        inside = _models_in(hints.get(str(step)))
+    return path, list(hints)
 
 
-def explain(
-    error: pydantic.ValidationError, owner: Any, root: str = "", prefix: tuple[str, ...] = ()
-) -> list[str]:
+def explain(error: pydantic.ValidationError, owner: Any, root: str = "") -> list[str]:
     """List the mistakes that pydantic found, one text each, with the path to the key.
 
-    `owner` is the model that was validated, or `prefix` of it, or the function that was called.
-    Paths begin with `root`.
+    `owner` is the model that was validated, or the function that was called, or None. Paths begin
+    with `root`.
     """
-    texts = []
+    texts: list[tuple[str, str, str]] = []
     for item in error.errors():
-        steps, valid, inside = _walk(owner, (*prefix, *item["loc"]))
+        steps, valid = _place(owner, item["loc"])
         path = ".".join([root, *steps] if root else steps)
         kind, given = item["type"], describe(item.get("input"))
         context = item.get("ctx") or {}
         wrong = context.get("error")
+        text, member, end = "", "", ""
         if kind == "unexpected_positional_argument":
-            names = ", ".join(_parameters(owner))
-            return [f"{owner.__name__}: give its arguments by name (valid: {names})"]
-        if kind in ("missing", "missing_argument"):
-            texts.append(f"{path}: missing")
+            return [f"{owner.__name__}: give its arguments by name (valid: {', '.join(valid)})"]
+        if kind.startswith("missing"):
+            text = f"{path}: missing"
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
             table, _, key = path.rpartition(".")
-            texts.append(unknown_name(table or owner.__name__, key, valid))
+            text = unknown_name(table or owner.__name__, key, valid)
         elif kind == "union_tag_invalid":
             tags = [tag.strip("' ") for tag in context["expected_tags"].split(",")]
-            texts.append(unknown_name(f"{path}.type", str(context["tag"]), tags))
+            text = unknown_name(f"{path}.type", str(context["tag"]), tags)
         elif kind == "union_tag_not_found":
-            texts.append(f"{path}.type: missing, got {given}")
+            text = f"{path}.type: missing, got {given}"
         elif isinstance(wrong, InputError):
-            texts.extend(f"{path}: {text}" if path else text for text in wrong.problems)
+            prefix = f"{path}: " if path else ""
+            texts += [(f"{prefix}{problem}", "", "") for problem in wrong.problems]
+            continue
         elif wrong is not None:
-            texts.append(f"{path}: {wrong}, got {given}")
+            text = f"{path}: {wrong}, got {given}"
         else:
-            message = item["msg"].removeprefix("Input should be ")
-            if kind == "is_instance_of":
-                message = _one_of([context["class"]])
-            elif inside and kind in ("dataclass_type", "model_attributes_type"):
-                message = _one_of(one.__name__ for one in inside)
-            texts.append(f"{path}: must be {message}, got {given}")
-    return texts
+            text, end = f"{path}: must be ", f", got {given}"
+            member = item["msg"].removeprefix("Input should be ")
+            if name := context.get("class_name", context.get("class")):
+                member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
+        texts.append((text, member, end))
+    whole: dict[tuple[str, str], list[str]] = {}  # members of a union have an item each
+    for text, member, end in texts:
+        whole.setdefault((text, end), []).append(member)
+    return [
+        text + " or ".join(dict.fromkeys(members)) + end
+        for (text, end), members in whole.items()
+    ]
 
 
-def _comparable(value: Any) -> Any:
-    """What stands for a value where objects are compared and hashed."""
-    if isinstance(value, np.ndarray):
-        return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
-    if hasattr(value, "identical"):  # labelled arrays
-        return str(value.to_dict())
-    if isinstance(value, dict):
-        return tuple((key, _comparable(value[key])) for key in sorted(value))
-    return tuple(map(_comparable, value)) if isinstance(value, list) else value
-
-
-def _fields(self: Any) -> tuple[Any, ...]:
-    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
-
-
-def _equal(self: Any, other: Any) -> bool:
-    return _fields(self) == _fields(other) if type(self) is type(other) else NotImplemented
-
-
-def _hash(self: Any) -> int:
-    return hash(_fields(self))
+# -- objects and functions -----------------------------------------------------------------------
 
 
 @typing.overload
@@ -392,82 +372,27 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     return wrapped
 
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+def _comparable(value: Any) -> Any:
+    """What stands for a value where objects are compared and hashed."""
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
+    if hasattr(value, "identical"):  # labelled arrays
+        return str(value.to_dict())
+    if isinstance(value, dict):
+        return tuple((key, _comparable(value[key])) for key in sorted(value))
+    return tuple(map(_comparable, value)) if isinstance(value, list) else value
 
 
-def checked(function: Function) -> Function:
-    """Decorator of a public function: check its arguments by their annotations.
-
-    A class in an annotation takes its own instances only, not the tables of a study file. All that
-    is wrong comes as one `InputError`.
-    """
-    plain = types.FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__,
-        function.__closure__,
-    )  # fmt: skip
-    plain.__kwdefaults__ = function.__kwdefaults__
-    plain.__annotations__ = dict(function.__annotations__)
-    plain.__annotations__.pop("return", None)  # it may name what is not loaded
-    hints = typing.get_type_hints(plain, include_extras=True)
-    plain.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
-    validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(plain)
-
-    @functools.wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return validated(*args, **kwargs)
-        except pydantic.ValidationError as error:
-            raise InputError(explain(error, function)) from None
-
-    return typing.cast(Function, call)
+def _fields(self: Any) -> list[Any]:
+    return [_comparable(getattr(self, field.name)) for field in dataclasses.fields(self)]
 
 
-def check(name: str, value: Any, annotation: Any) -> Any:
-    """Return a value as an annotation has it, or raise an `InputError` that begins with `name`.
-
-    For what `checked` does not see, such as entries of a mapping or options of a command.
-    """
-    try:
-        return _adapter(annotation).validate_python(value)
-    except pydantic.ValidationError as error:
-        raise InputError(explain(error, None, name)) from None
+def _equal(self: Any, other: Any) -> bool:
+    return _fields(self) == _fields(other) if type(self) is type(other) else NotImplemented
 
 
-@functools.lru_cache(maxsize=64)
-def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
-    of_class = isinstance(annotation, type)
-    return pydantic.TypeAdapter(InstanceOf[annotation] if of_class else _instances(annotation))
-
-
-def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:
-    """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
-    try:
-        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):  # systems that do not say
-        return
-    if needed > there:
-        raise InputError(
-            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
-            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
-        )
-
-
-def _instances(annotation: Any) -> Any:
-    """The annotation with model classes that take instances only."""
-    union = (
-        isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union
-    )
-    members = typing.get_args(annotation) if union else (annotation,)
-    classes = tuple(
-        cls for cls in members if isinstance(cls, type) and dataclasses.is_dataclass(cls)
-    )
-    if not classes:
-        return annotation
-    own = _must(
-        _one_of(cls.__name__ for cls in classes), lambda value: isinstance(value, classes)
-    )
-    rest = (one for one in members if one not in classes)
-    return typing.Union[(Annotated[Any, own], *rest)]
+def _hash(self: Any) -> int:
+    return hash(tuple(_fields(self)))
 
 
 def brief(self: Any) -> str:
@@ -511,4 +436,64 @@ def to_plain(value: Any) -> Any:
         raise InputError(f"{type(value).__name__}: exists in Python only") from None
 
 
-Mode: TypeAlias = Literal["II", "III"]
+def checked(function: Function) -> Function:
+    """Decorator of a public function: check its arguments by their annotations.
+
+    A class in an annotation takes its own instances only, not the tables of a study file. All that
+    is wrong comes as one `InputError`.
+    """
+    written = function.__annotations__
+    function.__annotations__ = {name: one for name, one in written.items() if name != "return"}
+    hints = typing.get_type_hints(function, include_extras=True)
+    function.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
+    validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(
+        function
+    )
+    function.__annotations__ = written
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return validated(*args, **kwargs)
+        except pydantic.ValidationError as error:
+            raise InputError(explain(error, function)) from None
+
+    return typing.cast(Function, call)
+
+
+def _instances(hint: Any) -> Any:
+    """The annotation, with model classes that take instances only."""
+    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
+        return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
+    own = dataclasses.is_dataclass(hint)
+    return Annotated[hint, InstanceOf()] if own else hint  # type: ignore[type-arg]
+
+
+def check(name: str, value: Any, annotation: Any) -> Any:
+    """Return a value as an annotation has it, or raise an `InputError` that begins with `name`.
+
+    For what `checked` does not see, such as entries of a mapping or options of a command.
+    """
+    try:
+        return _adapter(annotation).validate_python(value)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(error, None, name)) from None
+
+
+@functools.lru_cache(maxsize=64)
+def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
+    own = isinstance(annotation, type)  # no table of a study file
+    return pydantic.TypeAdapter(Annotated[annotation, InstanceOf()] if own else annotation)
+
+
+def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:
+    """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
+    try:
+        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # unknown on this system
+        return
+    if needed > there:
+        raise InputError(
+            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
+            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
+        )
