@@ -9,7 +9,7 @@ from scipy.stats import binom, nbinom
 
 import stiction as st
 from stiction.progress import SILENT
-from stiction.reliability.counting import Count, count_failures, tally
+from stiction.reliability.counting import Count, count_failures
 from stiction.reliability.tail import Tail
 from stiction.reliability.uncertainty import (
     ancestral_variance,
@@ -108,12 +108,6 @@ def test_ancestral_variance_of_independent_families_is_binomial():
     assert ancestral_variance(np.zeros(9, dtype=np.int64), 10**20) == math.inf
 
 
-def test_tally_numbers_the_failures_from_the_first_sample_on():
-    count = tally(np.array([3.0, 1.0, 2.0, 1.0, 2.0, 0.5]), 1.5, 1000)
-    assert (count.failures, count.samples) == (3, 6)
-    np.testing.assert_array_equal(count.numbers, [1001, 1003, 1005])
-
-
 class Uniform:
     """A limit state whose stress is uniform between 0 and 1: P(stress < p) = p."""
 
@@ -159,7 +153,7 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     ]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
-    assert all(count.samples <= evaluations <= most for count, evaluations in counts)
+    assert all(count.samples <= values.size <= most for count, values in counts)
 
 
 def test_counting_until_a_failure_has_the_interval_of_the_negative_binomial_law():

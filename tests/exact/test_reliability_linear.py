@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from stiction.reliability.guide import agreement
 from stiction.reliability.subset import descend
-from stiction.reliability.tail import Tail, repeat_until_precise
+from stiction.reliability.tail import Tail, agreement, repeat_until_precise
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 

@@ -1,33 +1,43 @@
-"""What a failure probability and a design stress are reported with, and their common options."""
+"""What the three questions share: options and their checks, answers, and doubts about them."""
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 import xarray as xr
-from pydantic import BeforeValidator, Field
+from numpy.typing import NDArray
+from pydantic import Field
 
+from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import InputError, warn_accuracy
-from stiction.model import _count, _number
+from stiction.ensemble.pilot import exact_counterpart
+from stiction.errors import InputError, collect_warnings, warn_accuracy
+from stiction.model import Real, at_least
 from stiction.progress import Meter
-from stiction.reliability.guide import too_slow, two_levels_refused
 from stiction.reliability.limit_state import Event, LimitState
+from stiction.reliability.tail import two_levels_refused
 
-TargetCv: TypeAlias = Annotated[
-    float, BeforeValidator(_number), Field(ge=1e-6, allow_inf_nan=False)
-]
+TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6)]
 """A smaller coefficient of variation would take more than 1e12 failures."""
-Confidence: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
-Probability: TypeAlias = Annotated[float, BeforeValidator(_number), Field(ge=1e-30, lt=1)]
-Budget: TypeAlias = Annotated[int, BeforeValidator(_count), Field(ge=100)]
+Confidence: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
+Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
+Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
+
+SECONDS, FEWEST, MOST = 100.0, 1_000, 2_000_000
+"""Computing time, and fewest and most evaluations, that an answer takes by default."""
+CHAIN, PATIENCE = 20_000, 900.0
+"""Evaluations of subset simulation for about P = 1e-4 with a coefficient of variation of 0.1, and
+seconds on one core beyond which they are begun only if `max_evaluations` allows them."""
+CHECKED = (8, 64)
+"""Fewest and most samples that are solved exactly to check those of the local criterion."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Answer:
-    """What both answers hold.
+    """A stress, and the probability that an interface slides below it.
 
     Attributes
     ----------
@@ -52,10 +62,8 @@ class Answer:
         Of `interval`.
     warnings : tuple of str
         Why the answer is not to be trusted; empty if it is.
-    normal_pressure : float
-        Mean over the interface, Pa; NaN if the problem has none.
-    friction_coefficient : float
-        `stress` over `normal_pressure`; NaN without one.
+    normal_pressure, friction_coefficient : float
+        Mean over the interface, Pa, and `stress` over it; NaN if the problem has none.
     """
 
     stress: float
@@ -63,13 +71,13 @@ class Answer:
     interval: tuple[float, float]
     cv: float
     evaluations: int
+    first_stage_evaluations: int = 0
     lower_bound: float
     algorithm: str
     reason: str
     confidence: float
-    normal_pressure: float
     warnings: tuple[str, ...]
-    first_stage_evaluations: int = 0
+    normal_pressure: float
 
     @property
     def friction_coefficient(self) -> float:
@@ -116,7 +124,7 @@ class FailureProbability(Answer):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DesignStress(Answer):
-    """A stress and the probability that the interface slides below it; see `Answer`."""
+    """The stress below which an interface slides with a given probability; see `Answer`."""
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -127,38 +135,11 @@ class DesignStress(Answer):
         )
 
 
-def prepare(
-    experiment: Experiment,
-    event: Event,
-    workers: int | None,
-    meter: Meter,
-    max_evaluations: int | None,
-    *,
-    algorithm: str = "subset",
-    per_pressure: bool = False,
-) -> LimitState:
-    """Return the limit state, or an `InputError` if the algorithm cannot be used."""
-    state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
-    problems = []
-    if per_pressure and not experiment.pressure > 0.0:
-        problems.append(
-            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)"
-        )
-    if algorithm in ("subset", "two_level") and (slow := too_slow(state, max_evaluations)):
-        problems.append(f"method: {slow}")
-    elif algorithm == "two_level" and (reason := two_levels_refused(state)):
-        problems.append(f"algorithm: 'two_level' is not possible: {reason}")
-    if problems:
-        raise InputError(problems)
-    experiment.check_fields()
-    return state
-
-
 AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
 
 
 def answered(
-    kind: type[AnyAnswer], state: LimitState, doubts: list[str], **values: Any
+    kind: type[AnyAnswer], state: LimitState, *, doubts: Sequence[str] = (), **values: Any
 ) -> AnyAnswer:
     """Issue the doubts as warnings, and return the answer with them."""
     for text in doubts:
@@ -171,16 +152,92 @@ def answered(
     )
 
 
+def prepare(
+    experiment: Experiment,
+    event: Event,
+    workers: int | None,
+    meter: Meter,
+    max_evaluations: int | None,
+    *,
+    algorithm: str = "subset",
+    per_pressure: bool = False,
+) -> tuple[LimitState, int]:
+    """Return the limit state and the evaluations allowed, or refuse what cannot be computed."""
+    state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
+    problems = []
+    if per_pressure and not experiment.pressure > 0.0:
+        problems.append(
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)"
+        )
+    if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
+        problems.append(f"method: {slow}")
+    elif algorithm == "two_level" and (reason := two_levels_refused(state)):
+        problems.append(f"algorithm: 'two_level' is not possible: {reason}")
+    if problems:
+        raise InputError(problems)
+    experiment.check_fields()
+    seconds = max(1e-9, float(experiment.method.seconds_per_sample(experiment.problem)))
+    return state, max_evaluations or int(min(MOST, max(FEWEST, SECONDS / seconds)))
+
+
+def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
+    """Return why chains of samples take too long by this method; None if not, or if allowed."""
+    seconds = CHAIN * experiment.method.seconds_per_sample(experiment.problem)
+    kind = experiment.method.type
+    if (seconds <= PATIENCE and kind != "rupture") or (max_evaluations or 0) >= CHAIN:
+        return None
+    return (
+        f"{CHAIN:,} evaluations of subset simulation by {kind!r} would take about"
+        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or count"
+        " (failure_probability with algorithm='plain', or quantiles of st.monte_carlo)"
+    )
+
+
 def bounded(lowest: float) -> bool:
-    """Return whether a least possible stress says anything: zero or none does not."""
+    """Return whether a least possible stress is a bound: zero or none is not."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 
 def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     """Return that the estimate is less precise than asked for, if so, and what to do."""
-    if cv <= target_cv:
-        return []
-    return [
+    text = (
         f"the coefficient of variation is {cv:.3g}, not {target_cv:g}: {evaluations} evaluations"
         " do not suffice; raise max_evaluations"
+    )
+    return [text] if cv > target_cv else []
+
+
+def distinct(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return up to `count` positions with different values, in random order."""
+    _, first = np.unique(values, return_index=True)  # chains repeat states
+    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
+    return chosen
+
+
+def exact_doubts(
+    state: LimitState, near: tuple[Array, Array], stress: float, probability: float
+) -> list[str]:
+    """Solve some samples of the local criterion exactly; return a warning if they fail otherwise.
+
+    `near` holds draws and stresses of samples on both sides of the stress, the lowest there are.
+    """
+    exact, (draws, values) = exact_counterpart(state.experiment), near
+    if exact is None or draws.shape[0] == 0:
+        return []
+    (few, most), cost = CHECKED, exact.method.seconds_per_sample(exact.problem)
+    count = int(min(max(few, 10.0 / cost), most))
+    chosen = distinct(values, count, np.random.default_rng(0))
+    state.meter.note = "checking by equilibrium"
+    with collect_warnings():
+        below = replace(state, experiment=exact)(draws[chosen]) < stress
+    failed = values[chosen] < stress
+    by_one, by_other, differing = (int(np.sum(own)) for own in (failed, below, below != failed))
+    if abs(by_other - by_one) <= 2.0 * math.sqrt(max(differing, 1)):
+        return []
+    there = probability * max(by_other, 1) / max(by_one, 1)
+    return [
+        f"of {chosen.size} samples in the tail {by_one} fail by the local criterion and"
+        f" {by_other} by equilibrium: by equilibrium the probability of failure is"
+        f" {'about' if by_other else 'below'} {min(there, 1.0):.2g} instead of"
+        f" {probability:.2g}; use method=st.Equilibrium()"
     ]

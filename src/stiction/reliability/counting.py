@@ -1,44 +1,31 @@
 """Plain Monte Carlo: count the failures among the samples of the ensemble."""
 
 import math
-from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.reliability.limit_state import LimitState
 from stiction.reliability.uncertainty import binomial_interval
 
 BATCH = 1024
-SHOWN = 64
-"""Failing samples remembered."""
 
 
-@dataclass(frozen=True, eq=False)
-class Count:
+class Count(NamedTuple):
     """Failures among the first samples of an ensemble.
 
     Attributes
     ----------
     failures, samples : int
-    numbers : (up to 64,) int array
-        Sample numbers of the first failures.
     until_failure : bool
-        Whether counting ended at a failure, because it was the last one wanted. That one says
-        nothing of how frequent failures are, and neither does its sample.
-    near, near_values : (up to 64,) arrays
-        Sample numbers and stresses of the weakest samples up to one of the failures, twice as many
-        as failures among them: samples on both sides of the stress, failures and others in the
-        shares that they have.
+        Whether counting ended at a failure, because it was the last one wanted. That one does not
+        show how frequent failures are, and neither does its sample.
     """
 
     failures: int
     samples: int
-    numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     until_failure: bool = False
-    near: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    near_values: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def probability(self) -> float:
@@ -68,17 +55,6 @@ class Count:
         return low, high
 
 
-def tally(values: Array, stress: float, first: int = 0) -> Count:
-    """Count among samples first, first + 1, ... of these stresses at onset."""
-    failed = np.flatnonzero(values < stress)
-    some = failed[: SHOWN // 2]
-    seen = values[: some[-1] + 1] if some.size else values[:0]
-    near = np.argsort(seen, kind="stable")[: 2 * some.size]
-    return Count(
-        failed.size, values.size, first + failed[:SHOWN], False, first + near, seen[near]
-    )
-
-
 def count_failures(
     state: LimitState,
     seed: int,
@@ -88,7 +64,7 @@ def count_failures(
     least: int,
     max_evaluations: int,
     start: int = 0,
-) -> tuple[Count, int]:
+) -> tuple[Count, Array]:
     """Count until there are enough failures, among at least `least` samples from `start` on.
 
     Stopping when the estimate looks precise enough would favour counts that saw many failures
@@ -98,8 +74,8 @@ def count_failures(
     Returns
     -------
     count : Count
-    evaluations : int
-        Those that do not count included.
+    values : (samples,) array
+        Stresses of samples start, start + 1, ..., those that do not count included.
     """
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)
@@ -114,9 +90,9 @@ def count_failures(
         done, failures = done + size, failures + int(np.sum(parts[-1] < stress))
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
     values = np.concatenate(parts)
-    count = tally(values, stress, start)
+    count = Count(failures, done)
     if failures >= wanted:
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
-            count = replace(count, failures=wanted, samples=last + 1, until_failure=True)
-    return count, done
+            count = Count(wanted, last + 1, until_failure=True)
+    return count, values

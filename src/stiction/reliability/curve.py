@@ -1,5 +1,6 @@
-"""The failure curve: P(onset < s) over decades."""
+"""The stress at a probability: one for a design, or a curve of them over decades."""
 
+import math
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,26 +15,123 @@ from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.answer import Budget, Confidence, Probability, TargetCv, prepare
-from stiction.reliability.guide import budget_of, exact_doubts
-from stiction.reliability.limit_state import Event, LimitState
-from stiction.reliability.tail import Tail, sample_tail
+from stiction.reliability.answer import (
+    Budget,
+    Confidence,
+    DesignStress,
+    Probability,
+    TargetCv,
+    answered,
+    exact_doubts,
+    imprecise,
+    prepare,
+)
+from stiction.reliability.failure import FREQUENT
+from stiction.reliability.limit_state import Event
+from stiction.reliability.tail import sample_tail
 from stiction.reliability.uncertainty import lognormal_interval
 from stiction.results import Variable, to_dataset
 
 COMMONEST = 0.5
 
-VARIABLES: dict[str, Variable] = {
-    "stress": Variable("Pa", "stress", ("point",)),
-    "stress_above_bound": Variable("Pa", "stress above the least possible one", ("point",)),
-    "friction_coefficient": Variable("1", "stress over the mean normal pressure", ("point",)),
-    "probability": Variable("1", "probability of an onset below the stress", ("point",)),
-    "probability_low": Variable("1", "lower end of its interval", ("point",)),
-    "probability_high": Variable("1", "upper end of its interval", ("point",)),
-    "cv": Variable("1", "coefficient of variation of the probability", ("point",)),
-    "stress_low": Variable("Pa", "lower end of the interval of the stress", ("point",)),
-    "stress_high": Variable("Pa", "upper end of the interval of the stress", ("point",)),
+VARIABLES = {
+    name: Variable(unit, text, ("point",))
+    for name, unit, text in (
+        ("stress", "Pa", "stress"),
+        ("stress_above_bound", "Pa", "stress above the least possible one"),
+        ("friction_coefficient", "1", "stress over the mean normal pressure"),
+        ("probability", "1", "probability of an onset below the stress"),
+        ("probability_low", "1", "lower end of its interval"),
+        ("probability_high", "1", "upper end of its interval"),
+        ("cv", "1", "coefficient of variation of the probability"),
+        ("stress_low", "Pa", "lower end of the interval of the stress"),
+        ("stress_high", "Pa", "upper end of the interval of the stress"),
+    )
 }
+
+
+@checked
+def design_stress(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    *,
+    probability: Probability,
+    method: MethodObject,
+    target_cv: TargetCv = 0.1,
+    seed: Number = 0,
+    max_evaluations: Budget | None = None,
+    confidence: Confidence = 0.95,
+    event: Event = "critical_stress",
+    workers: Count | None = None,
+    progress: Progress = True,
+) -> DesignStress:
+    """Estimate the stress below which the interface slides with a given probability.
+
+    The quantile of the stress at onset, from one set of repetitions of subset simulation.
+
+    Parameters
+    ----------
+    probability : float
+        Between 0 and 1, such as 1e-6.
+    method : LocalCriterion or Equilibrium
+        `Rupture`, and a method that would take more than a quarter of an hour on one core, is
+        refused unless `max_evaluations` is 20,000 or more.
+    target_cv : float
+        Coefficient of variation to reach, of the failure probability at the stress.
+    problem, random, seed, max_evaluations, confidence, event, workers, progress
+        As in `failure_probability`.
+
+    Returns
+    -------
+    DesignStress
+        With `stress` and `interval`, Pa.
+
+    Warns
+    -----
+    AccuracyWarning
+        As `failure_probability`, and if the onset piles up on the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.LocalCriterion()
+    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cv=0.3)
+    >>> bool(found.stress > found.lower_bound)
+    True
+    """
+    experiment = Experiment(problem, random, method, seed=seed)
+    meter = Meter("design_stress", show=progress)
+    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+    often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
+    with meter:
+        tail = sample_tail(
+            state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
+            probability=probability, reason="frequent" if often else "rare",
+        )  # fmt: skip
+        if tail.complete:
+            stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
+            cv, on_it = tail.cv(stress), tail.probability(least)
+            if on_it >= probability:
+                stress, cv = lowest, tail.cv(least)
+                doubts.append(
+                    f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa, as far as"
+                    f" the method can tell: the stress at P = {probability:g} is the bound itself"
+                )
+            interval = tail.stress_interval(probability, cv, confidence, lowest)
+            doubts += imprecise(cv, target_cv, tail.spent)
+            if tail.algorithm == "subset":
+                near = tail.repetitions[-1].around(stress)
+                doubts += exact_doubts(state, near, stress, probability)
+        else:  # below the lowest value seen of the tail nothing is known
+            cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
+            interval = (lowest, stress) if stress > lowest else state.bounds
+            doubts.append(tail.short_of(f"P = {probability:g}"))
+    return answered(
+        DesignStress, state, stress=stress, probability=probability, cv=cv, interval=interval,
+        confidence=confidence, doubts=doubts, **tail.attributes,
+    )  # fmt: skip
 
 
 @checked
@@ -56,19 +154,14 @@ def failure_curve(
 
     Parameters
     ----------
-    problem : Problem
-    random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa.
-    method : LocalCriterion or Equilibrium
-        As in `design_stress`.
     smallest : float
         Probability down to which the curve goes.
     points_per_decade : int
         Stresses a factor of ten in probability.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
-    seed, max_evaluations, confidence, event, workers, progress
-        As in `failure_probability`.
+    problem, random, method, seed, max_evaluations, confidence, event, workers, progress
+        As in `design_stress`.
 
     Returns
     -------
@@ -78,16 +171,10 @@ def failure_curve(
         `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
         the attribute `lower_bound` is zero or less.
 
-    Raises
-    ------
-    InputError
-        Naming everything that does not fit.
-
     Warns
     -----
     AccuracyWarning
-        If the evaluations allowed do not suffice, or samples at the end of the curve fail
-        otherwise by equilibrium than by the local criterion.
+        As `failure_probability`, for the end of the curve.
 
     Examples
     --------
@@ -100,55 +187,39 @@ def failure_curve(
     """
     experiment = Experiment(problem, random, method, seed=seed)
     meter = Meter("failure_curve", show=progress)
-    state = prepare(experiment, event, workers, meter, max_evaluations)
+    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
     with meter:
         tail = sample_tail(
-            state, algorithm="subset", target_cv=target_cv, seed=seed,
-            budget=budget_of(state, max_evaluations), probability=smallest,
-        )  # fmt: skip
-        deepest = _deepest(state, tail, smallest)
+            state, algorithm="subset", target_cv=target_cv, budget=budget, probability=smallest
+        )
+        if tail.complete:
+            stress = tail.quantile(smallest)
+            near = tail.repetitions[-1].around(stress)
+            doubts = exact_doubts(state, near, stress, smallest)
+        else:
+            doubts = [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+            smallest = tail.probability(tail.reached)
+    for text in doubts:
+        warn_accuracy(text)
+    lowest, pressure = state.bounds[0], experiment.pressure
+    decades = max(np.log10(COMMONEST / smallest), 0.0)
+    count = int(np.ceil(decades * points_per_decade)) + 1
+    rows = []
+    for chance in (COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)).tolist():
+        stress = tail.quantile(chance)
+        found, cv = tail.probability(stress), tail.cv(stress)
+        ends = lognormal_interval(found, cv, confidence)
+        sides = tail.stress_interval(chance, cv, confidence, lowest)
+        rows.append((stress, stress - lowest, stress / pressure, found, *ends, cv, *sides))
+    values: dict[str, Any] = dict(zip(VARIABLES, np.array(rows).T, strict=True))
+    if not np.isfinite(pressure):
+        del values["friction_coefficient"]
     attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
-        "lower_bound": state.bounds[0],
+        "lower_bound": lowest,
         "event": event,
         "confidence": confidence,
         "seed": seed,
         "evaluations": tail.spent,
         "method": method.type,
     }
-    values = _points(state, tail, deepest, points_per_decade, confidence)
     return to_dataset(values, VARIABLES, {}, attributes)
-
-
-def _deepest(state: LimitState, tail: Tail, smallest: float) -> float:
-    """Return the probability at which the curve ends; warn if it ends early, or is not exact."""
-    if tail.complete:
-        stress = tail.quantile(smallest)
-        near = tail.repetitions[-1].around(stress)
-        doubts = exact_doubts(state, near, stress, smallest)
-    else:
-        doubts = [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
-        smallest = tail.probability(tail.reached)
-    for text in doubts:
-        warn_accuracy(text)
-    return smallest
-
-
-def _points(
-    state: LimitState, tail: Tail, deepest: float, points_per_decade: int, confidence: float
-) -> dict[str, Any]:
-    """Return the variables of the curve."""
-    decades = max(np.log10(COMMONEST / deepest), 0.0)
-    count = int(np.ceil(decades * points_per_decade)) + 1
-    chances = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
-    lowest, pressure = state.bounds[0], state.experiment.pressure
-    rows = []
-    for chance in map(float, chances):
-        stress = tail.quantile(chance)
-        found, cv = tail.probability(stress), tail.cv(stress)
-        ends = lognormal_interval(found, cv, confidence)
-        sides = tail.stress_interval(chance, cv, confidence, lowest)
-        rows.append((stress, stress - lowest, stress / pressure, found, *ends, cv, *sides))
-    values = dict(zip(VARIABLES, np.array(rows).T, strict=True))
-    if not np.isfinite(pressure):
-        del values["friction_coefficient"]
-    return values

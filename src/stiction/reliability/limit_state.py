@@ -1,12 +1,10 @@
 """The limit state: from standard normal draws to the stress at which the interface slides."""
 
-from __future__ import annotations
-
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -16,7 +14,7 @@ from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.friction import SCALES
-from stiction.model import Count, checked, real_array
+from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions
 from stiction.random.random_field import RandomField
@@ -28,7 +26,7 @@ FEWEST = 16
 """Fewest samples worth a thread of their own."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LimitState:
     """Stress at onset as a function of standard normal draws; see `stiction.external.limit_state`.
 
@@ -41,7 +39,7 @@ class LimitState:
         Whether stresses are taken per normal pressure: where that is random, each is multiplied by
         the mean pressure over that of its sample, so that one number stands for a coefficient.
     workers : int
-        Threads. A sample does not depend on its batch, so the numbers do not depend on this.
+        Threads; the numbers do not depend on this.
     meter : Meter
         Counts the samples.
     """
@@ -50,7 +48,7 @@ class LimitState:
     event: Event = "critical_stress"
     per_pressure: bool = False
     workers: int = 1
-    meter: Meter = field(default=SILENT, compare=False, repr=False)
+    meter: Meter = SILENT
 
     @cached_property
     def _portions(self) -> Portions:
@@ -62,11 +60,11 @@ class LimitState:
         return self.experiment.dimension
 
     @property
-    def random_pressure(self) -> bool:
+    def _random_pressure(self) -> bool:
         """Whether stresses are divided by a pressure that differs between samples."""
         return self.per_pressure and "normal_pressure" in self.experiment.random.names
 
-    def by(self, method: Any) -> LimitState:
+    def by(self, method: Any) -> Self:
         """Return the same limit state by another method."""
         return replace(self, experiment=self.experiment.by(method))
 
@@ -81,16 +79,6 @@ class LimitState:
         """Return sampled profiles by name, each of shape (samples, *shape)."""
         return self.experiment.profiles(draws)
 
-    def _stress(self, draws: Array) -> Array:
-        profiles = self.profiles(draws)
-        found = self.experiment.onset(profiles)[self.event]
-        if self.random_pressure:
-            pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
-            found = found * self.experiment.pressure / pressure
-        # Rounding may leave a stress a hair below the bound.
-        result: Array = np.maximum(found, self.bounds[0])
-        return result
-
     def __call__(self, draws: Array) -> Array:
         """Return the stress at onset, Pa: (samples,) or a number.
 
@@ -103,31 +91,41 @@ class LimitState:
         InputError
             If the draws are not finite numbers of this shape.
         """
-        try:
-            draws = real_array(draws)
-        except TypeError as error:
-            raise InputError(f"draws: must be numbers; {error}") from None
-        if draws.ndim not in (1, 2) or draws.shape[-1] != self.dimension:
+        given = check("draws", draws, Numbers)
+        if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
-                f"draws: must have shape (samples, {self.dimension}), got {draws.shape}"
+                f"draws: must have shape (samples, {self.dimension}), got {describe(given)}"
             )
-        if not np.isfinite(draws).all():
+        if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
-        rows = np.atleast_2d(draws)
+        rows = np.atleast_2d(given)
         found = np.empty(rows.shape[0])
         for some in self._portions(rows.shape[0]):
             found[some] = self._in_threads(rows[some])
             self.meter.advance(some.stop - some.start)
-        return found if draws.ndim == 2 else found[0]
+        return found if given.ndim == 2 else found[0]
 
     def _in_threads(self, draws: Array) -> Array:
-        fewest = 1 if self._portions.slow else FEWEST
-        parts = min(self.workers, max(1, draws.shape[0] // fewest))
+        lowest = self.bounds[0]  # before the threads need it
+        parts = draws.shape[0] // (1 if self._portions.slow else FEWEST)
+        parts = min(self.workers, max(1, parts))
         if parts == 1:
-            return self._stress(draws)
-        _ = self.bounds  # before the threads need them
-        with ThreadPoolExecutor(parts) as pool:
-            return np.concatenate(list(pool.map(self._stress, np.array_split(draws, parts))))
+            found = self._stress(draws)
+        else:
+            with ThreadPoolExecutor(parts) as pool:
+                found = np.concatenate(
+                    list(pool.map(self._stress, np.array_split(draws, parts)))
+                )
+        result: Array = np.maximum(found, lowest)  # rounding may leave a stress a hair below
+        return result
+
+    def _stress(self, draws: Array) -> Array:
+        profiles = self.profiles(draws)
+        found: Array = self.experiment.onset(profiles)[self.event]
+        if self._random_pressure:
+            pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
+            found = found * self.experiment.pressure / pressure
+        return found
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -137,14 +135,14 @@ class LimitState:
         every node; and the mean stress of an interface whose slip sums to no net force is at most
         the mean of its strength. Both hold for every method and every sample.
         """
-        if self.random_pressure:  # the stress per pressure has no other bounds
+        if self._random_pressure:  # the stress per pressure has no other bounds
             return 0.0, math.inf
-        problem = self.experiment.problem
+        problem, random = self.experiment.problem, self.experiment.random
         low, high = self.experiment.support("strength")
         profile = np.asarray(problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(problem.load.initial_stress, dtype=np.float64)
         most: Any = least
-        if "initial_stress" in self.experiment.random.names:
+        if "initial_stress" in random.names:
             least, most = self.experiment.support("initial_stress")
         lowest_load = float(np.min((low - most) / profile))
         shape = problem.interface.shape
@@ -183,18 +181,12 @@ def limit_state(
 ) -> LimitState:
     """Return the stress at onset as a function of standard normal draws.
 
-    For the reliability codes of others. Failure below a stress s is ``limit_state(draws) < s``.
+    For other reliability codes. Failure below a stress s is ``limit_state(draws) < s``.
 
     Parameters
     ----------
-    problem : Problem
-    random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa.
-    method : LocalCriterion, Equilibrium or Rupture
-    event : {"critical_stress", "first_instability"}
-        Which stress.
-    workers : int, optional
-        Threads; all cores by default.
+    problem, random, method, event, workers
+        As in `failure_probability`.
 
     Returns
     -------
@@ -213,13 +205,10 @@ def limit_state(
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> stress = st.external.limit_state(problem, strength, st.LocalCriterion())
+    >>> method = st.LocalCriterion()
+    >>> stress = st.external.limit_state(problem, strength, method)
     >>> draws = stress.draws(seed=0, first=0, samples=3)
-    >>> draws.shape == (3, stress.dimension)
-    True
-    >>> ensemble = st.monte_carlo(
-    ...     problem, strength, method=st.LocalCriterion(), samples=3, seed=0
-    ... )
+    >>> ensemble = st.monte_carlo(problem, strength, method=method, samples=3, seed=0)
     >>> bool((stress(draws) == ensemble.critical_stress.values).all())
     True
     """

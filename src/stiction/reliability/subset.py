@@ -5,11 +5,9 @@ samples and grows them back to full number by Metropolis steps z' = sqrt(1 - b^2
 leave the normal distribution as it is and are rejected where they leave the level.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,6 @@ from stiction.arrays import Array
 from stiction.model import check_memory
 from stiction.reliability.uncertainty import ancestral_variance
 
-Integers = NDArray[np.int64]
 Function = Callable[[Array], Array]
 
 LEVEL_PROBABILITY = 0.1
@@ -33,8 +30,7 @@ COPIES = KEEP + 2  # the states of the chains and their noise
 ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
 
 
-@dataclass(frozen=True, eq=False)
-class Population:
+class Population(NamedTuple):
     """Samples of one level: standard normal, given that the value is below `ceiling`.
 
     Attributes
@@ -54,25 +50,24 @@ class Population:
     ceiling: float
     log_probability: float
     values: Array
-    ancestors: Integers
-    draws: Array = field(repr=False)
+    ancestors: NDArray[np.int64]
+    draws: Array
     acceptance: float = 1.0
     step: float = FIRST_STEP
 
-    def without_draws(self) -> Population:
+    def light(self) -> Self:
         """Return the same without draws, which take nearly all of the memory."""
-        return replace(self, draws=np.empty((0, self.draws.shape[1])))
+        return self._replace(draws=np.empty((0, self.draws.shape[1])))
 
 
-@dataclass(frozen=True, eq=False)
-class Descent:
+class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
     Attributes
     ----------
     samples : int
         N, samples of the first level and, within a few, of each other.
-    populations : tuple of Population
+    populations : list of Population
     threshold : float
         Below it lies the share of the last population that would go on; the failures, if complete.
     evaluations : int
@@ -82,7 +77,7 @@ class Descent:
     """
 
     samples: int
-    populations: tuple[Population, ...]
+    populations: list[Population]
     threshold: float
     evaluations: int
     complete: bool
@@ -92,28 +87,29 @@ class Descent:
         """Lowest and highest value seen."""
         return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
 
-    def light(self) -> Descent:
+    def light(self) -> Self:
         """Return the same without draws."""
-        return replace(self, populations=tuple(one.without_draws() for one in self.populations))
+        return self._replace(populations=[one.light() for one in self.populations])
 
-    def _below(self, value: float) -> tuple[Population, NDArray[np.bool_]]:
-        """Return the rarest population that holds a value, and which of its samples lie below."""
-        holder = self.populations[0]
-        for population in self.populations[1:]:
-            if population.ceiling < value:
-                break
-            holder = population
-        return holder, holder.values < value
+    def _holders(self, value: float) -> list[Population]:
+        """Return the populations that hold a value, the rarest last."""
+        return [one for one in self.populations if one.ceiling >= value]
 
     def probability(self, value: float) -> float:
-        """Estimate of P(function < value); zero where no sample went so low."""
-        population, below = self._below(value)
-        return math.exp(population.log_probability) * float(below.mean())
+        """Return the estimate of P(function < value); zero where no sample went so low."""
+        rarest = self._holders(value)[-1]
+        return math.exp(rarest.log_probability) * float((rarest.values < value).mean())
 
     def relative_variance(self, value: float) -> float:
-        """Squared coefficient of variation of `probability(value)`, from ancestry."""
-        population, below = self._below(value)
-        return ancestral_variance(population.ancestors[below], self.samples)
+        """Return the squared coefficient of variation of `probability(value)`, from ancestry."""
+        rarest = self._holders(value)[-1]
+        return ancestral_variance(rarest.ancestors[rarest.values < value], self.samples)
+
+    def failing(self, value: float) -> tuple[Array, Array]:
+        """Return draws and values of samples of the last population below a value."""
+        last = self.populations[-1]
+        below = last.values < value
+        return last.draws[below], last.values[below]
 
     def around(self, value: float) -> tuple[Array, Array]:
         """Return draws and values of samples on both sides of a value, in their true shares.
@@ -121,12 +117,12 @@ class Descent:
         The lowest of a population, twice as many as lie below the value. A population of which
         more than half does would show next to nothing of the other side.
         """
-        holder, below = self._below(value)
-        for population in reversed(self.populations[: self.populations.index(holder)]):
-            if 2 * below.sum() <= below.size or not population.draws.size:
-                break
-            holder, below = population, population.values < value
-        count = min(2 * int(below.sum()), holder.draws.shape[0])
+        *wider, holder = self._holders(value)
+        below = int(np.sum(holder.values < value))
+        while wider and wider[-1].draws.size and 2 * below > holder.values.size:
+            holder = wider.pop()
+            below = int(np.sum(holder.values < value))
+        count = min(2 * below, holder.draws.shape[0])
         lowest = np.argsort(holder.values, kind="stable")[:count]
         return holder.draws[lowest], holder.values[lowest]
 
@@ -140,7 +136,7 @@ def grow(
     step: float,
     rng: np.random.Generator,
 ) -> tuple[Array, Array, float, float]:
-    """Chains of `steps` states, the given ones first; states, values, acceptance, last step size.
+    """Return states and values of chains, the given ones first, acceptance and last step size.
 
     All chains move together, one call of the function a step; the step size follows the
     acceptance over all chains, ever more slowly.
@@ -183,10 +179,9 @@ def descend(
         From draws (k, dimension) to values (k,), whose low values are rare.
     samples : int
         N of each level; a tenth as many chains walk side by side.
-    threshold : float
-        Failure is a value below it; levels stop there.
-    probability : float
-        Or stop when a level's lowest share reaches this probability.
+    threshold, probability : float
+        Failure is a value below the threshold. Levels stop there, or when the lowest share of one
+        reaches the probability.
     floor : float
         No value is below it: a level whose lowest share lies on it is the last.
     max_evaluations : int, optional
@@ -213,7 +208,7 @@ def descend(
         here = populations[-1]
         values = here.values
         if len(populations) > KEEP:
-            populations[-KEEP - 1] = populations[-KEEP - 1].without_draws()
+            populations[-KEEP - 1] = populations[-KEEP - 1].light()
         lowest = float(np.partition(values, count)[count])
         final, bottom = lowest < threshold, lowest <= floor
         if final:
@@ -233,7 +228,7 @@ def descend(
         cost = seeds.size * (steps - 1)
         stuck = share == 0.0 or len(populations) >= MOST_LEVELS
         if complete or stuck or evaluations + cost > max_evaluations:
-            return Descent(samples, tuple(populations), lowest, evaluations, complete)
+            return Descent(samples, populations, lowest, evaluations, complete)
         states, found, acceptance, step = grow(
             function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )

@@ -2,36 +2,34 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.methods import methods
 from stiction.progress import SILENT, Meter
-from stiction.reliability.counting import Count, tally
-from stiction.reliability.guide import first_stage, resembles, two_levels_refused
-from stiction.reliability.limit_state import LimitState
+from stiction.reliability.counting import Count
+from stiction.reliability.limit_state import LimitState, no_single_length
 from stiction.reliability.subset import MOST_LEVELS, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
 MARGIN = 1.1
 """The variance known so far is itself an estimate; aim a little further."""
-SUBSET, SUBSET_MOST = 1_000, 5_000
-"""Samples a level of the first repetition of subset simulation and of the largest."""
-BRIDGE, BRIDGE_MOST = 200, 1_000
-"""Exact samples of the first repetition over two levels and of the largest."""
+SUBSET, BRIDGE = (1_000, 5_000), (200, 1_000)
+"""Samples a level, or exact samples, of the first repetition and of the largest."""
 DEEPER = 0.3
 """Repetitions go on to this share of a probability, to know the lower end of the interval."""
 PILOT = 500
-"""Plain samples that tell whether a less expensive method is a guide."""
+"""Plain samples by which a less expensive method is judged as a guide."""
+ALIKE = 0.9
+"""Share of the weakest of them that a guide must pick to lead to the rarest."""
 POOR = 0.02
 """Of the samples that a guide leads to, those that fail: fewer, and it is no guide."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tail:
+class Tail(NamedTuple):
     """The lower tail of the stress at onset from pooled repetitions.
 
     Attributes
@@ -60,59 +58,60 @@ class Tail:
 
     def short_of(self, goal: str) -> str:
         """Return in words that it does not reach as far down as asked for."""
-        text = f"{self.spent} evaluations do not reach {goal}"
+        text, advice = f"{self.spent} evaluations do not reach {goal}", "raise max_evaluations"
         if self.algorithm == "two_level":
-            return f"{text}: raise max_evaluations"
-        deep = len(self.repetitions[0].populations) >= MOST_LEVELS
-        return (
-            f"{text}: they have come down to {self.reached:.7g} Pa"
-            f" (P = {self.probability(self.reached):.2g});"
-            + (f" it stops after {MOST_LEVELS} levels" if deep else " raise max_evaluations")
-        )
+            return f"{text}: {advice}"
+        if len(self.repetitions[0].populations) >= MOST_LEVELS:
+            advice = f"it stops after {MOST_LEVELS} levels"
+        chance = self.probability(self.reached)
+        return f"{text}: they come down to {self.reached:.7g} Pa (P = {chance:.2g}); {advice}"
 
     @property
     def extent(self) -> tuple[float, float]:
         """Lowest and highest stress seen, Pa."""
-        extents = [one.extent for one in self.repetitions]
-        return min(low for low, _ in extents), max(high for _, high in extents)
+        lowest, highest = zip(*(one.extent for one in self.repetitions), strict=True)
+        return min(lowest), max(highest)
 
     @property
-    def first_stage_evaluations(self) -> int:
-        """Samples that only the less expensive method was asked for."""
-        return sum(getattr(one, "first_stage_evaluations", 0) for one in self.repetitions)
+    def attributes(self) -> dict[str, Any]:
+        """What an answer holds of it."""
+        firsts = (getattr(one, "first_stage_evaluations", 0) for one in self.repetitions)
+        return {
+            "evaluations": self.spent,
+            "first_stage_evaluations": sum(firsts),
+            "algorithm": self.algorithm,
+            "reason": self.reason,
+        }
 
-    @property
-    def weights(self) -> list[float]:
-        """Each repetition's part in the mean: its size, which does not depend on its outcome."""
+    def _parts(self, stress: float) -> list[float]:
+        """Each repetition's part in the mean, by its size: that does not depend on its outcome."""
         total = sum(one.samples for one in self.repetitions)
-        return [one.samples / total for one in self.repetitions]
+        return [one.samples / total * one.probability(stress) for one in self.repetitions]
 
     def probability(self, stress: float) -> float:
         """Return the estimate of P(onset below `stress`)."""
-        parts = zip(self.weights, self.repetitions, strict=True)
-        return float(sum(weight * one.probability(stress) for weight, one in parts))
+        return float(sum(self._parts(stress)))
 
     def cv(self, stress: float) -> float:
         """Return its coefficient of variation; infinite where no sample is so low."""
-        whole = self.probability(stress)
-        if whole == 0.0:
-            return math.inf
-        variance = 0.0
-        for weight, one in zip(self.weights, self.repetitions, strict=True):
-            part = weight * one.probability(stress)
-            if part > 0.0:
-                variance += part * part * one.relative_variance(stress)
-        return math.sqrt(variance) / whole
+        parts = self._parts(stress)
+        pairs = zip(parts, self.repetitions, strict=True)
+        variance = sum(
+            part * part * one.relative_variance(stress) for part, one in pairs if part
+        )
+        return math.sqrt(variance) / sum(parts) if any(parts) else math.inf
 
     def counted(self, stress: float) -> Count | None:
         """Return a count where failure is so likely that no repetition had a second level.
 
         All samples are independent then.
         """
-        populations: list[Any] = [getattr(one, "populations", ()) for one in self.repetitions]
-        if not self.complete or any(len(each) != 1 for each in populations):
+        if self.algorithm == "two_level" or not self.complete:
             return None
-        return tally(np.concatenate([each[0].values for each in populations]), stress)
+        if any(len(one.populations) > 1 for one in self.repetitions):
+            return None
+        values = np.concatenate([one.populations[0].values for one in self.repetitions])
+        return Count(int(np.sum(values < stress)), values.size)
 
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability."""
@@ -148,26 +147,17 @@ def repeat_until_precise(
     largest: int,
     max_evaluations: int,
     meter: Meter = SILENT,
-    enough: Callable[[Any], bool] = lambda one: False,
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    All of them are complete, or it is a single incomplete one.
-
-    Parameters
-    ----------
-    make : callable
-        (samples, number of the repetition, evaluations left) to a repetition.
-    judge : callable
-        Coefficient of variation of some repetitions together.
-    first, largest : int
-        Size of the first repetition and of the largest; many of moderate size bound the memory.
-    enough : callable
-        Whether the first repetition is such that no more are wanted.
+    All of them are complete, or it is a single incomplete one. `make` takes (samples, number of the
+    repetition, evaluations left), and `judge` returns the coefficient of variation of some of them,
+    or zero if no more are wanted. `first` and `largest` are sizes of a repetition: many of moderate
+    size bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first
-    while True:
+    while size >= first:
         one = make(size, len(done), max_evaluations - spent)
         spent += one.evaluations
         if not one.complete:
@@ -175,15 +165,29 @@ def repeat_until_precise(
         done = [*(earlier.light() for earlier in done), one]
         cv = judge(done)
         meter.note = f"{len(done)} repetitions, c.o.v. {cv:.2g} (target {target_cv:g})"
-        if cv <= target_cv or (len(done) == 1 and enough(one)):
-            return done
+        if cv <= target_cv:
+            break
         total = sum(each.samples for each in done)
         price = sum(each.evaluations for each in done) / total
         wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
-        if size < first:
-            return done
+    return done
+
+
+def two_levels_refused(state: LimitState) -> str | None:
+    """Return why two levels are not possible, or None if they are."""
+    experiment = state.experiment
+    if getattr(experiment.method, "first_stage", None) is None:
+        return f"{experiment.method.type!r} names no less expensive method as its first stage"
+    return no_single_length(experiment.problem, experiment.random)
+
+
+def agreement(guide: Array, exact: Array) -> float:
+    """Return the share of the exactly weakest fiftieth of samples in the guide's weakest tenth."""
+    weakest = np.argsort(exact)[: max(5, exact.size // 50)]
+    seen = np.argsort(guide)[: max(10, exact.size // 10)]
+    return float(np.isin(weakest, seen).mean())
 
 
 def sample_tail(
@@ -191,74 +195,69 @@ def sample_tail(
     *,
     algorithm: str,
     target_cv: float,
-    seed: int,
     budget: int,
-    stress: float | None = None,
+    stress: float = -math.inf,
     probability: float = 0.0,
     reason: str = "as asked",
     pilot: tuple[Array, Array] | None = None,
 ) -> Tail:
     """Sample the lower tail down to a stress, or down to a probability.
 
-    Parameters
-    ----------
-    algorithm : {"auto", "subset", "two_level"}
-        'auto' takes two levels where a less expensive method is a guide to the weakest samples:
-        where it picks the same ones among some plain samples, and the first repetition finds
-        failures among the samples that it leads to.
-    target_cv : float
-        Of the probability at the stress, or at its own quantile.
-    budget : int
-        Evaluations of the method, those of the pilot included.
-    pilot : (draws, stresses), optional
-        Plain samples that are there already.
+    Algorithm 'auto' takes two levels where a less expensive method is a guide to the weakest
+    samples: where it picks the same ones among some plain samples, and the first repetition finds
+    failures among the samples that it leads to. `budget` counts evaluations of the method, those of
+    the pilot included: (draws, stresses) of plain samples that are there already.
     """
+    guide, auto, seed = None, algorithm == "auto", state.experiment.seed
+    if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
+        guide = state.by(methods()[state.experiment.method.first_stage]())
+    if auto and guide and pilot is None:
+        draws = state.draws(seed, 0, min(PILOT, budget // 5))
+        pilot = draws, state(draws)
     spent = 0 if pilot is None else pilot[1].size
-    auto = algorithm == "auto"
-    if auto:
-        algorithm = "subset"
-        if two_levels_refused(state) is None:
-            if pilot is None:
-                draws = state.draws(seed, 0, min(PILOT, budget // 5))
-                pilot, spent = (draws, state(draws)), draws.shape[0]
-            good, text = resembles(state, *pilot)
-            algorithm, reason = ("two_level" if good else "subset"), f"{reason}; {text}"
+    if auto and guide and pilot:
+        share = agreement(guide(pilot[0]), pilot[1])
+        label = guide.experiment.method.label
+        reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
+        guide = guide if share >= ALIKE else None
 
     def make(samples: int, number: int, left: int) -> Any:
-        rng = generator(seed, 3 if algorithm == "two_level" else 1, number)
-        if algorithm == "two_level":
-            return bridge(
-                state.by(first_stage(state)), state, state.dimension, samples=samples, rng=rng,
-                max_evaluations=left, threshold=stress, probability=probability,
-                floor=state.bounds[0],
-            )  # fmt: skip
-        return descend(
-            state, state.dimension, samples=samples, rng=rng, max_evaluations=left,
-            threshold=-math.inf if stress is None else stress,
-            probability=DEEPER * probability, floor=state.bounds[0],
-        )  # fmt: skip
-
-    def judge(repetitions: Sequence[Any]) -> float:
-        tail = Tail(repetitions)
-        return tail.cv(tail.quantile(probability) if stress is None else stress)
+        options: dict[str, Any] = {
+            "samples": samples,
+            "max_evaluations": left,
+            "threshold": stress,
+            "floor": state.bounds[0],
+        }
+        if guide is None:
+            deepest, rng = DEEPER * probability, generator(seed, 1, number)
+            return descend(state, state.dimension, rng=rng, probability=deepest, **options)
+        rng = generator(seed, 3, number)
+        return bridge(
+            guide, state, state.dimension, rng=rng, probability=probability, **options
+        )
 
     def is_poor(one: Any) -> bool:
-        return auto and algorithm == "two_level" and bool(one.complete and one.share < POOR)
+        return auto and guide is not None and one.complete and one.share < POOR
+
+    def judge(repetitions: Sequence[Any]) -> float:
+        if is_poor(repetitions[0]):
+            return 0.0
+        tail = Tail(repetitions)
+        return tail.cv(tail.quantile(probability) if probability else stress)
 
     def repeated() -> list[Any]:
-        both = (BRIDGE, BRIDGE_MOST) if algorithm == "two_level" else (SUBSET, SUBSET_MOST)
+        first, largest = SUBSET if guide is None else BRIDGE
         # Fewer than usual where the budget would not even hold four levels.
-        first = min(both[0], max((budget - spent) // 4, 20))
         return repeat_until_precise(
-            make, judge, target_cv=target_cv, first=first, largest=both[1],
-            max_evaluations=budget - spent, meter=state.meter, enough=is_poor,
+            make, judge, target_cv=target_cv, first=min(first, max((budget - spent) // 4, 20)),
+            largest=largest, max_evaluations=budget - spent, meter=state.meter,
         )  # fmt: skip
 
     found = repeated()
     if is_poor(found[0]):
         spent += sum(one.evaluations for one in found)
-        label = first_stage(state).label
         reason += f"; of what fails by the {label} {found[0].share:.1%} fails: a poor guide"
-        algorithm = "subset"
+        guide = None
         found = repeated()
-    return Tail(found, algorithm, reason, spent + sum(one.evaluations for one in found))
+    spent += sum(one.evaluations for one in found)
+    return Tail(found, "subset" if guide is None else "two_level", reason, spent)

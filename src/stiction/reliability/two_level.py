@@ -9,19 +9,17 @@ small, so that a few hundred exact evaluations do what thousands would.
 
 The last factor is measured by walks that start from failures with L < b. Failures which L does not
 see, and to which no short walk leads, stay unseen: whether L ranks samples as E does has to be
-known from elsewhere (`stiction.reliability.guide`).
+known from elsewhere (`stiction.reliability.tail`).
 """
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass, field
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.reliability.subset import Descent, Function, descend, grow
+from stiction.reliability.subset import Function, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
@@ -35,49 +33,47 @@ MARGIN = 2.5
 """The guide's level should be this many times likelier than the probability asked for, or more."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bridge:
+class Bridge(NamedTuple):
     """One repetition over both levels.
 
     Attributes
     ----------
     samples : int
         Exact evaluations meant for the middle factor.
-    descent : Descent
-        Of the guide, without draws.
+    rarest : float
+        Probability of the last level of the guide.
     evaluations, first_stage_evaluations : int
         Of the exact limit state and of the guide.
     complete : bool
-        Whether the exact limit state was asked. If it found no failure, the estimate is zero:
+        Whether the exact limit state was evaluated. If it found no failure, the estimate is zero:
         leaving it out of a mean would favour repetitions that found one.
-    ceiling, log_probability : float
-        b, Pa, and the logarithm of the estimate of P(L < b).
+    log_probability : float
+        Logarithm of the estimate of P(L < b).
     values, ancestors : (samples,) arrays
         Exact stress of samples with L < b, and the guide's first samples they descend from.
     share : float
         Share of them that fails.
     last, last_variance : float
         P(L < b | E < s), and the squared coefficient of variation of its estimate.
-    failing, failing_values : arrays
-        Draws and exact stress of failing samples.
+    draws, stresses : arrays
+        Of failing samples.
     """
 
     samples: int
-    descent: Descent
+    rarest: float
     evaluations: int
     first_stage_evaluations: int
     complete: bool = False
-    ceiling: float = -math.inf
     log_probability: float = -math.inf
-    values: Array = field(default_factory=lambda: np.zeros(0))
-    ancestors: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    values: Array = np.zeros(0)
+    ancestors: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     share: float = 0.0
     last: float = 1.0
     last_variance: float = 0.0
-    failing: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    failing_values: Array = field(default_factory=lambda: np.zeros(0))
+    draws: Array = np.zeros((0, 0))
+    stresses: Array = np.zeros(0)
 
-    def light(self) -> Bridge:
+    def light(self) -> Self:
         """Return the same; nothing in it is large."""
         return self
 
@@ -89,20 +85,24 @@ class Bridge:
         return float(self.values.min()), float(self.values.max())
 
     def probability(self, value: float) -> float:
-        """Estimate of P(E < value), for values near its threshold."""
+        """Return the estimate of P(E < value), for values near its threshold."""
         share = float(np.mean(self.values < value)) if self.values.size else 0.0
         return math.exp(self.log_probability) * share / self.last
 
     def relative_variance(self, value: float) -> float:
-        """Squared coefficient of variation of `probability(value)`."""
+        """Return the squared coefficient of variation of `probability(value)`."""
         family = self.ancestors[self.values < value]
         return ancestral_variance(family, self.values.size) + self.last_variance
+
+    def failing(self, value: float) -> tuple[Array, Array]:
+        """Return draws and stresses of failing samples; `value` is its threshold."""
+        return self.draws, self.stresses
 
 
 def _covered(
     states: Array, guide: Function, ceiling: float, families: NDArray[np.int64], samples: int
 ) -> tuple[float, float]:
-    """P(L < b | E < s) from walkers in the failure set, and its relative variance.
+    """Return P(L < b | E < s) from walkers in the failure set, and its relative variance.
 
     Walkers of one ancestor are alike: each family is one observation.
     """
@@ -122,11 +122,11 @@ def bridge(
     samples: int,
     rng: np.random.Generator,
     max_evaluations: int,
-    threshold: float | None = None,
+    threshold: float = -math.inf,
     probability: float = 0.0,
     floor: float = -math.inf,
 ) -> Bridge:
-    """The exact lower tail near a threshold, or near a probability if no threshold is given.
+    """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
     Parameters
     ----------
@@ -136,19 +136,15 @@ def bridge(
         Exact evaluations for the middle factor; as many again walk in the failure set.
     max_evaluations : int
         Of the exact limit state.
-    floor : float
-        No stress is below it.
+    threshold, probability, floor : float
+        As in `descend`.
     """
     descent = descend(
-        guide,
-        dimension,
-        rng=rng,
-        samples=GUIDING * samples,
-        threshold=-math.inf if threshold is None else threshold,
-        probability=MARGIN * probability,
-        floor=floor,
-    )
-    guided, spent = descent.evaluations, 0
+        guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,
+        probability=MARGIN * probability, floor=floor,
+    )  # fmt: skip
+    guided, spent, lowest = descent.evaluations, 0, descent.populations[-1]
+    rarest = math.exp(lowest.log_probability)
     best: Bridge | None = None
     for population in reversed(descent.populations):
         if population.draws.shape[0] == 0 or spent + samples + STEPS > max_evaluations:
@@ -157,9 +153,8 @@ def bridge(
         draws, families = population.draws[looked], population.ancestors[looked]
         values = exact(draws)
         spent += looked.size
-        if threshold is not None:
-            limit = threshold
-        else:
+        limit = threshold
+        if probability:
             share = probability / math.exp(population.log_probability)
             limit = float(np.quantile(values, share)) if share < 1.0 else -math.inf
             if limit == floor:  # so many lie on it that the probability asked for does, too
@@ -168,41 +163,28 @@ def bridge(
         if not failed.any():
             if best is not None:
                 break
-            if threshold is None:  # this level is rarer than the probability asked for
+            if probability:  # this level is rarer than the probability asked for
                 continue
         last, last_variance = 1.0, 0.0
-        failing, failing_values = draws[failed], values[failed]
+        failing, stresses = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
-            walkers = min(failing_values.size, max(16, samples // STEPS), room)
+            walkers = min(stresses.size, max(16, samples // STEPS), room)
             # The seeds themselves come first, and do not count.
             states, found, *_ = grow(
-                exact, failing[:walkers], failing_values[:walkers], limit, STEPS + 1,
-                descent.populations[-1].step, rng,
-            )  # fmt: skip
+                exact, failing[:walkers], stresses[:walkers], limit, STEPS + 1, lowest.step, rng
+            )
             spent += walkers * STEPS
             later = states[walkers * (1 + FORGOTTEN) :]
             last, last_variance = _covered(
                 later, guide, population.ceiling, families[failed][:walkers], samples
             )
             guided += later.shape[0]
-            failing, failing_values = states[-walkers:], found[-walkers:]
+            failing, stresses = states[-walkers:], found[-walkers:]
         best = Bridge(
-            samples=samples,
-            descent=descent.light(),
-            evaluations=spent,
-            first_stage_evaluations=guided,
-            complete=True,
-            ceiling=population.ceiling,
-            log_probability=population.log_probability,
-            values=values,
-            ancestors=families,
-            share=float(failed.mean()),
-            last=last,
-            last_variance=last_variance,
-            failing=failing,
-            failing_values=failing_values,
-        )
+            samples, rarest, spent, guided, True, population.log_probability, values, families,
+            float(failed.mean()), last, last_variance, failing, stresses,
+        )  # fmt: skip
         if last >= COVERED:
             break
-    return best or Bridge(samples, descent.light(), spent, guided)
+    return best or Bridge(samples, rarest, spent, guided)

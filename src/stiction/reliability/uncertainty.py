@@ -1,17 +1,18 @@
 """How far an estimated probability may be off: intervals, and the variance of correlated chains."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtrit
 
-Integers = NDArray[np.int64]
-
 
 def log_width(cv: float, confidence: float) -> float:
-    """Half the width of the interval of the logarithm of an estimate."""
+    """Half the width of the interval of the logarithm of an estimate.
+
+    The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
+    so Student's distribution takes the place of the normal one.
+    """
     if cv == 0.0:
         return 0.0
     freedom = max(1.0, 1.0 / (cv * cv) - 1.0)
@@ -19,11 +20,7 @@ def log_width(cv: float, confidence: float) -> float:
 
 
 def lognormal_interval(probability: float, cv: float, confidence: float) -> tuple[float, float]:
-    """Interval of an estimate whose logarithm is about normal, within [0, 1].
-
-    The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
-    so Student's distribution takes the place of the normal one.
-    """
+    """Interval of an estimate whose logarithm is about normal, within [0, 1]."""
     if not math.isfinite(cv):
         return 0.0, 1.0
     width = log_width(cv, confidence)
@@ -33,15 +30,13 @@ def lognormal_interval(probability: float, cv: float, confidence: float) -> tupl
 
 def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[float, float]:
     """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
-    tail = 0.5 * (1.0 - confidence)
-    low = betaincinv(failures, samples - failures + 1, tail) if failures else 0.0
-    high = (
-        betaincinv(failures + 1, samples - failures, 1.0 - tail) if failures < samples else 1.0
-    )
+    tail, held = 0.5 * (1.0 - confidence), samples - failures
+    low = betaincinv(failures, held + 1, tail) if failures else 0.0
+    high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
     return float(low), float(high)
 
 
-def ancestral_variance(ancestors: Integers, samples: int) -> float:
+def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Squared coefficient of variation of a subset estimate, from the ancestry of its failures.
 
     Families that descend from different first samples evolve independently, so the spread of
@@ -68,11 +63,9 @@ def ancestral_variance(ancestors: Integers, samples: int) -> float:
 
 
 def generator(seed: int, *key: int) -> np.random.Generator:
-    """An independent generator for each key under one seed.
+    """Return an independent generator for each key under one seed.
 
     The leading number of the spawn key keeps clear of the streams of random fields.
     """
-    words: Any = (7_000_000, *key)
-    return np.random.Generator(
-        np.random.PCG64DXSM(np.random.SeedSequence(entropy=seed, spawn_key=words))
-    )
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
+    return np.random.Generator(np.random.PCG64DXSM(sequence))
