@@ -78,8 +78,8 @@ import numpy as np
 import scipy.stats
 
 import stiction as st
-from stiction.friction import FrictionLaw, kernels
-from stiction.jit import jit
+from stiction import friction
+from stiction.friction import FrictionLaw
 from stiction.load import LoadShape, distance, register
 from stiction.model import Positive, model
 """

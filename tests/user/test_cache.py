@@ -67,21 +67,16 @@ def test_kernels_need_no_folder(run):
 LAWS = """
 from typing import NamedTuple
 import numpy as np, stiction as st
-from stiction.jit import jit
-from stiction.friction import kernels
+from stiction.friction import kernels, register
 
 class OwnParameters(NamedTuple):
     scale: float
+    initial_slope: float = 1.0
 
-@jit
-def strength(law, peak, residual, rate, slip):
-    return law.scale * peak
+def shape(law, u):
+    return law.scale * 1.0, 1.0
 
-@jit
-def slope(law, peak, residual, rate, slip):
-    return 0.0
-
-kernels.register(OwnParameters, strength, slope)
+register(OwnParameters, shape)
 ones = np.ones(3)
 linear = st.LinearWeakening(weakening_rate=1.0).parameters
 for law in (OwnParameters(2.0), linear):
@@ -93,7 +88,7 @@ def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, run):
     """Its module may be missing in the next process, or changed; numba would notice neither."""
     cache = tmp_path / "cache"
     assert run(LAWS, cache) == ["[2. 2. 2.]", "[0.5 0.5 0.5]"]
-    edited = LAWS.replace("law.scale * peak", "3.0 * law.scale * peak")
+    edited = LAWS.replace("law.scale * 1.0", "law.scale * 3.0")
     assert run(edited, cache) == ["[6. 6. 6.]", "[0.5 0.5 0.5]"]
     assert list(cache.rglob("*.nbc"))
     assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))

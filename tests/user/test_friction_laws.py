@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.friction import FrictionLaw
-from stiction.friction.kernels import register
-from stiction.jit import jit
+from stiction.friction import FrictionLaw, register
 from stiction.model import model
 
 EXPONENTIAL = st.ExponentialWeakening(weakening_rate=0.5e12)
@@ -167,32 +165,15 @@ def test_checkpoint_of_another_law_is_refused(tmp_path, with_law, tau_p):
 
 
 class OwnParameters(NamedTuple):
-    """None."""
+    initial_slope: float = 1.0
 
 
-@jit
-def own_strength(law, peak, residual, rate, slip):
-    drop = peak - residual
-    return residual + drop * np.exp(-rate * slip / drop) if drop > 0.0 else residual
-
-
-@jit
-def own_slope(law, peak, residual, rate, slip):
-    drop = peak - residual
-    return rate * np.exp(-rate * slip / drop) if drop > 0.0 else 0.0
-
-
-register(OwnParameters, own_strength, own_slope)
+register(OwnParameters, lambda law, u: (np.exp(-u), np.exp(-u)))
 
 
 @model
 class OwnLaw(FrictionLaw):
     """Exponential weakening, as somebody else would write it."""
-
-    initial_slope = integral = 1.0
-
-    def fraction(self, u):
-        return np.exp(-np.asarray(u))
 
     def area(self, u):
         return 1.0 - np.exp(-np.asarray(u))
@@ -228,17 +209,32 @@ def test_law_without_a_compiled_strength_is_refused(with_law, tau_p):
     for method in (st.Equilibrium(), RUPTURE):
         with pytest.raises(st.InputError, match="Sketch"):
             st.onset(with_law(Sketch(weakening_rate=0.5e12)), tau_p, method=method)
-    with pytest.raises(TypeError, match=r"abstract.*fraction"):
+    with pytest.raises(TypeError, match=r"abstract.*slip_at"):
         FrictionLaw(weakening_rate=0.5e12)
+
+
+class HumpParameters(NamedTuple):
+    initial_slope: float = 1.0
+
+
+class LateParameters(NamedTuple):
+    initial_slope: float = 1.0
+
+
+class SteeperParameters(NamedTuple):
+    initial_slope: float = 2.0
+
+
+register(HumpParameters, lambda law, u: (np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0]), 1.0))
+register(LateParameters, lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)))
+register(SteeperParameters, lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)))
 
 
 @model
 class Hump(OwnLaw):
     """Rises by a tenth before it falls: no method of the package can follow it."""
 
-    def fraction(self, u):
-        u = np.asarray(u)
-        return np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0])
+    parameters = HumpParameters()
 
     def slip_at(self, fraction):
         return 1.0 - 0.8 * fraction / 1.1
@@ -246,24 +242,23 @@ class Hump(OwnLaw):
 
 @model
 class Late(OwnLaw):
-    def fraction(self, u):
-        return 0.5 * np.exp(-np.asarray(u))
+    parameters = LateParameters()
 
 
 @model
 class Steeper(OwnLaw):
-    """Its kernels are those of another law, and its slope is not that of its fraction."""
+    """Its slope is not that of its f."""
 
-    initial_slope = 2.0
+    parameters = SteeperParameters()
 
 
 @pytest.mark.parametrize(
     ("law", "words"),
     [
         (Hump, "friction: Hump: strength must not rise with slip, as beyond u = 0"),
-        (Late, r"friction: Late.fraction\(0\) must be 1, got 0.5"),
-        (Steeper, r"Steeper: initial_slope is 2, but 1 by its fraction"),
-        (Steeper, r"Steeper: the strength of its kernels at u = 0.568 is"),
+        (Late, r"friction: Late: f\(0\) must be 1, got 0.5"),
+        (Steeper, r"Steeper: initial_slope is 2, but 1 by its f"),
+        (Steeper, r"Steeper: -f'\(0.568\) is"),
     ],
 )
 def test_a_law_that_contradicts_itself_is_refused(with_law, law, words):

@@ -12,7 +12,6 @@ from stiction.elasticity.kernel_cache import kernel_sum
 from stiction.elasticity.memory_kernels import static_stiffness
 from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError
-from stiction.friction.parameters import FUNCTIONS
 from stiction.interface import Interface
 from stiction.model import check_memory
 from stiction.problem import Problem
@@ -49,16 +48,6 @@ class Medium:
     @functools.cached_property
     def _line_table(self) -> tuple[Floats, Floats]:
         return step_table(self.grid, self.step)
-
-
-def refused_laws(problem: Problem) -> list[str]:
-    """Why the friction law of a problem cannot be followed; nothing if it can."""
-    if type(problem.friction.parameters) in FUNCTIONS:
-        return []
-    return [
-        f"friction: {type(problem.friction).__name__} has no compiled strength; give its"
-        " `parameters` a type that stiction.friction.kernels.register knows"
-    ]
 
 
 def prepare_medium(

@@ -19,7 +19,7 @@ from stiction.dynamics.checks import (
 from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_history, turning_times
-from stiction.dynamics.medium import Medium, prepare_medium, refused_laws
+from stiction.dynamics.medium import Medium, prepare_medium
 from stiction.dynamics.slow_start import slow_start, static_setting
 from stiction.dynamics.state import Nodes, Setting, State, Thresholds
 from stiction.dynamics.summary import scalars, summary
@@ -181,12 +181,9 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Reasons why it cannot take a problem; none if it can."""
-        refused = refused_laws(problem)
         if self.stop == "runaway" and problem.interface.is_plane:
-            refused.append(
-                "stop: 'runaway' is known of lines only; stop at 'sliding' or 'onset'"
-            )
-        return refused
+            return ["stop: 'runaway' works on lines only; stop at 'sliding' or 'onset'"]
+        return []
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return what the solver returns for each sample."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.friction import FrictionLaw
-from stiction.friction.parameters import FUNCTIONS, Linear, Polygon
+from stiction.friction.parameters import Linear, Polygon
 from stiction.jit import jit, jit_inside
 from stiction.problem import Sample as Samples
 
@@ -54,10 +54,9 @@ def refused(law: FrictionLaw) -> list[str]:
     name, kind = type(law).__name__, type(law.parameters)
     if kind in (Linear, Polygon):
         return []
-    instead = "use st.Rupture(...)" if kind in FUNCTIONS else "use another law"
     return [
         f"friction: equilibria are followed along straight pieces, and {name} has none;"
-        f" use st.PiecewiseWeakening.from_law(friction, pieces=32), or {instead}"
+        " use st.PiecewiseWeakening.from_law(friction, pieces=32), or st.Rupture(...)"
     ]
 
 

@@ -9,6 +9,7 @@ from stiction.friction.laws import (
     PiecewiseWeakening,
     contradictions,
 )
+from stiction.friction.parameters import register
 
 __all__ = [
     "SCALES",
@@ -18,4 +19,5 @@ __all__ = [
     "LinearWeakening",
     "PiecewiseWeakening",
     "contradictions",
+    "register",
 ]

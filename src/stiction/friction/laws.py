@@ -1,21 +1,19 @@
 """Friction laws: strength that falls with slip from tau_p to tau_r.
 
-To add one, derive from `FrictionLaw`, register its kernels in `kernels.py` and add it to `LAWS`; in
-Python, an object of any class that derives from `FrictionLaw` serves.
+To add one, derive from `FrictionLaw`, `register` its function f and add it to `LAWS`; in Python, an
+object of any class that derives from `FrictionLaw` serves.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
     Literal,
-    NamedTuple,
     TypeAlias,
     Union,
 )
@@ -33,7 +31,7 @@ from pydantic import (
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.friction.parameters import FUNCTIONS, Exponential, Linear, Polygon
+from stiction.friction.parameters import SHAPES, Exponential, Linear, Polygon
 from stiction.model import OptionalProfile, Profile, Real, at_least, checked, is_unplaced, model
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
@@ -42,19 +40,20 @@ NEARLY_RESIDUAL = 0.01
 """Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
 
 
-def _outside(name: str, value: Any, valid: Callable[[Array], Any], words: str) -> list[str]:
-    """Refuse numbers out of range; a profile that is not placed yet is checked once it is."""
-    given = np.empty(0) if value is None or is_unplaced(value) else np.ravel(value)
-    wrong = given[~valid(given)]
-    return [f"{name} must {words}, got {wrong.min():g}"] if wrong.size else []
+_VALID = {
+    **dict.fromkeys(SCALES, (lambda value: value > 0.0, "be positive everywhere")),
+    "residual_strength": (lambda value: value >= 0.0, "not be negative"),
+    "residual_ratio": (lambda value: (value >= 0.0) & (value < 1.0), "lie in [0, 1)"),
+}
 
 
 @model
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
 
-    A law is the function f, with its slope at zero slip -f'(0) and its integral. The scale of slip
-    follows from one of W, d_c and Gamma; the other two vary with tau_p - tau_r.
+    A law is the function f, `register`ed for the type of its `parameters`, with its integral and
+    its inverse. The scale of slip follows from one of W, d_c and Gamma; the other two vary with
+    tau_p - tau_r.
 
     The parameters are those of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
     Gamma = (tau_p - tau_r) d_c times the integral of f.
@@ -68,21 +67,20 @@ class FrictionLaw(ABC):
 
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
-        residual, ratio = self.residual_strength, self.residual_ratio
-        problems = _outside(
-            "residual_strength", residual, lambda r: r >= 0.0, "not be negative"
-        )
-        problems += _outside(
-            "residual_ratio", ratio, lambda r: (r >= 0.0) & (r < 1.0), "lie in [0, 1)"
-        )
+        problems = []
+        for name, (valid, words) in _VALID.items():
+            value = getattr(self, name)
+            if value is None or is_unplaced(value):  # a profile is checked once it is placed
+                continue
+            wrong = np.ravel(value)[~valid(np.ravel(value))]
+            if wrong.size:
+                problems.append(f"{name} must {words}, got {wrong.min():g}")
         given = [name for name in SCALES if getattr(self, name) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "none"
             problems.append(f"give one of {', '.join(SCALES)}, got {found}")
-        for name in given:
-            value = getattr(self, name)
-            problems += _outside(name, value, lambda v: v > 0.0, "be positive everywhere")
-        if ratio is not None and (is_unplaced(residual) or np.any(residual != 0.0)):
+        residual = self.residual_strength
+        if self.residual_ratio is not None and (is_unplaced(residual) or np.any(residual)):
             problems.append("give either residual_strength or residual_ratio, got both")
         if problems:
             raise InputError(problems)
@@ -90,22 +88,8 @@ class FrictionLaw(ABC):
 
     @property
     @abstractmethod
-    def initial_slope(self) -> float:
-        """-f'(0)."""
-
-    @property
-    def steepest_slope(self) -> float:
-        """The largest -f'(u)."""
-        return self.initial_slope
-
-    @property
-    @abstractmethod
-    def integral(self) -> float:
-        """Integral of f(u) over all u >= 0."""
-
-    @abstractmethod
-    def fraction(self, u: Any) -> Array:
-        """Return f(u) at slips u in units of d_c, any shape."""
+    def parameters(self) -> Any:
+        """What f and kernels are given, with `initial_slope`: a NamedTuple of the law's own."""
 
     @abstractmethod
     def area(self, u: Any) -> Array:
@@ -115,10 +99,26 @@ class FrictionLaw(ABC):
     def slip_at(self, fraction: float) -> float:
         """Return u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
 
+    def fraction(self, u: Any) -> Array:
+        """Return f(u) at slips u in units of d_c, any shape."""
+        parameters = self.parameters
+        shape = SHAPES[type(parameters)]
+        return np.vectorize(lambda one: shape(parameters, one)[0], otypes=[float])(u)
+
     @property
-    @abstractmethod
-    def parameters(self) -> NamedTuple:
-        """What compiled kernels are given; see `stiction.friction.kernels`."""
+    def initial_slope(self) -> float:
+        """-f'(0)."""
+        return float(self.parameters.initial_slope)
+
+    @property
+    def steepest_slope(self) -> float:
+        """The largest -f'(u)."""
+        return self.initial_slope
+
+    @property
+    def integral(self) -> float:
+        """Integral of f(u) over all u >= 0."""
+        return float(self.area(np.inf))
 
     @property
     def linear(self) -> bool:
@@ -203,14 +203,7 @@ class LinearWeakening(FrictionLaw):
     """
 
     type: Literal["linear"] = "linear"
-
-    initial_slope: ClassVar[float] = 1.0
-    integral: ClassVar[float] = 0.5
     parameters: ClassVar[Linear] = Linear()
-
-    def fraction(self, u: Any) -> Array:
-        """Return f(u) = max(1 - u, 0)."""
-        return np.maximum(1.0 - np.asarray(u, dtype=np.float64), 0.0)
 
     def area(self, u: Any) -> Array:
         """Return w - w²/2 with w = min(u, 1)."""
@@ -239,14 +232,7 @@ class ExponentialWeakening(FrictionLaw):
     """
 
     type: Literal["exponential"] = "exponential"
-
-    initial_slope: ClassVar[float] = 1.0
-    integral: ClassVar[float] = 1.0
     parameters: ClassVar[Exponential] = Exponential()
-
-    def fraction(self, u: Any) -> Array:
-        """Return f(u) = exp(-u)."""
-        return np.exp(-np.asarray(u, dtype=np.float64))
 
     def area(self, u: Any) -> Array:
         """Return 1 - exp(-u)."""
@@ -319,20 +305,10 @@ class PiecewiseWeakening(FrictionLaw):
         return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
 
     @property
-    def slopes(self) -> Array:
-        """-f' of each piece."""
-        u, f = self.corners
-        return -np.diff(f) / np.diff(u)
-
-    @property
-    def initial_slope(self) -> float:
-        """-f'(0), that of the first piece."""
-        return float(self.slopes[0])
-
-    @property
     def steepest_slope(self) -> float:
         """-f' of the steepest piece."""
-        return float(self.slopes.max())
+        u, f = self.corners
+        return float((-np.diff(f) / np.diff(u)).max())
 
     @property
     def integral(self) -> float:
@@ -340,18 +316,15 @@ class PiecewiseWeakening(FrictionLaw):
         u, f = self.corners
         return float(np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(u)))
 
-    def fraction(self, u: Any) -> Array:
-        """Return f(u) by interpolation between the corners."""
-        return np.interp(np.asarray(u, dtype=np.float64), *self.corners)
-
     def area(self, u: Any) -> Array:
         """Return the area under the polygon up to u."""
         corners, f = self.corners
+        slopes = -np.diff(f) / np.diff(corners)
         at_corners = np.append(0.0, np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(corners)))
         u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
         piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
         into = u - corners[piece]
-        return at_corners[piece] + into * (f[piece] - 0.5 * self.slopes[piece] * into)
+        return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
 
     def slip_at(self, fraction: float) -> float:
         """Return u on the polygon."""
@@ -361,7 +334,9 @@ class PiecewiseWeakening(FrictionLaw):
     @property
     def parameters(self) -> Polygon | Linear:
         """For kernels; a single piece is the linear law to the bit."""
-        return Linear() if len(self.slip) == 1 else Polygon(*self.corners)
+        u, f = self.corners
+        first = (f[0] - f[1]) / (u[1] - u[0])
+        return Linear() if len(self.slip) == 1 else Polygon(u, f, float(first))
 
     @classmethod
     @checked
@@ -374,9 +349,8 @@ class PiecewiseWeakening(FrictionLaw):
         Returns
         -------
         PiecewiseWeakening
-            With the residual strength of `law`, and its weakening rate, critical slip or fracture
-            energy, whichever was given, as the polygon has it: the first piece is a chord, less
-            steep than the law at zero slip (by 1/(2 pieces) of an exponential one).
+            With the residual strength of `law`; its first piece is a chord, less steep than the law
+            at zero slip (by 1/(2 pieces) of an exponential one).
 
         Raises
         ------
@@ -426,37 +400,31 @@ LAWS = {law.type: law for law in (LinearWeakening, ExponentialWeakening, Piecewi
 def contradictions(law: FrictionLaw) -> list[str]:
     """Return in what a law of somebody else breaks the promises that every method relies on.
 
-    Strength begins at tau_p and never rises with slip; slope, integral and inverse are those of
-    `fraction`, and so are the functions registered for kernels.
+    Strength begins at tau_p and never rises with slip; slope, area and inverse are those of f.
     """
     if type(law) in LAWS.values():
         return []
-    name, step = type(law).__name__, 1e-6 * law.reach
-    u = np.linspace(0.0, law.reach, 4097)
-    f = np.asarray(law.fraction(u), dtype=np.float64)
+    name, parameters = type(law).__name__, law.parameters
+    if type(parameters) not in SHAPES:
+        return [f"{name}: register its f for the type of its parameters (friction.register)"]
+    step, u = 1e-6 * law.reach, np.linspace(0.0, law.reach, 4097)
+    f = law.fraction(u)
     if abs(f[0] - 1.0) > 1e-9:
-        return [f"{name}.fraction(0) must be 1, got {f[0]:g}"]
+        return [f"{name}: f(0) must be 1, got {f[0]:g}"]
     if (rising := np.flatnonzero(np.diff(f) > 1e-9)).size:
         return [f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}"]
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, (1.0 - law.fraction(step)) / step),
         "area(reach)": (law.area(law.reach), np.trapezoid(f, u)),
-        "fraction(slip_at(0.5))": (law.fraction(law.slip_at(0.5)), 0.5),
+        "f(slip_at(0.5))": (law.fraction(law.slip_at(0.5)), 0.5),
     }
-    # In plain Python, so that nothing is compiled. With tau_p = 1, tau_r = 0 and d_c = 1 strength
-    # is f and slip is u.
-    kernels = FUNCTIONS.get(type(law.parameters), ())[:2]
-    for at in law.reach * np.array([0.0, 0.1234, 0.5678]) if kernels else ():
-        here, ahead = law.fraction(at), law.fraction(at + step)
-        for what, kernel, own in zip(
-            ("strength", "slope"), kernels, (here, (here - ahead) / step), strict=True
-        ):
-            plain = getattr(kernel, "py_func", kernel)
-            found = plain(law.parameters, 1.0, 0.0, law.initial_slope, at)
-            pairs[f"the {what} of its kernels at u = {at:.3g}"] = (found, own)
+    for at in law.reach * np.array([0.1234, 0.5678]):
+        slope = SHAPES[type(parameters)](parameters, at)[1]
+        fall = law.fraction(at) - law.fraction(at + step)
+        pairs[f"-f'({at:.3g})"] = (slope, fall / step)
     tolerance = 1e-3 * max(1.0, law.steepest_slope)
     return [
-        f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its fraction"
+        f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its f"
         for what, (found, own) in pairs.items()
         if abs(found - own) > tolerance
     ]
@@ -466,9 +434,7 @@ def _law(value: Any, handler: Any) -> Any:
     if isinstance(value, FrictionLaw):
         return value
     if not isinstance(value, dict):
-        raise ValueError(
-            "must be a friction law such as st.LinearWeakening(weakening_rate=...)"
-        )
+        raise ValueError("must be a friction law such as st.LinearWeakening(critical_slip=...)")
     return handler(value)
 
 
