@@ -3,10 +3,8 @@
 Computes, draws, judges and writes a page. A second call completes what is missing.
 """
 
-from __future__ import annotations
-
 import argparse
-import dataclasses
+import os
 import sys
 import time
 import warnings
@@ -15,27 +13,8 @@ from pathlib import Path
 if not __package__:  # `python reproduction`
     sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-STUDIES = {
-    "local": "onsets by the local criterion",
-    "moments": "nucleation stress of the same samples",
-    "exact": "onsets by exact equilibrium",
-    "ruptures": "ruptures until the whole interface slides",
-    "printed": "onsets with the printed modulus",
-    "readings": "onsets under four readings of the modulus",
-    "theory": "variance of the nucleation stress by integration",
-    "representative": "one rupture in space and time",
-    "convergence": "ruptures with other loading rates, grids and time steps",
-    "trend": "onsets over a wide range of correlation lengths",
-    "window": "onsets as the nucleation length vanishes",
-    "modes": "onsets with more modes, and with rounded weights",
-    "growth": "slip patches on the way to the onset",
-    "mechanism": "patches that act on each other",
-    "arrest": "arrested samples again, with inertia",
-    "driving": "arrested fronts under non-uniform loads",
-    "free_end": "onsets with free ends",
-    "failure": "failure probability down to one in a million",
-}
-BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "representative")
+BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "representative",
+         "dynamic")  # fmt: skip
 NEEDS = {
     1: (), 2: (), 3: (), 4: (), 5: (), 6: (), 7: (), 8: (), 9: ("trend",), 10: ("convergence",),
     11: ("growth", "mechanism"), 12: ("arrest",), 13: ("driving",),
@@ -55,15 +34,11 @@ def main(arguments: list[str] | None = None) -> None:
     from reproduction.runner import FULL, QUICK, USUAL
 
     size = QUICK if options.quick else FULL if options.full else USUAL
-    if options.samples:
-        size = dataclasses.replace(size, samples=options.samples,
-                                   readings=min(size.readings, options.samples))  # fmt: skip
     out = Path(options.out)
     run = runner.Runner(out, size, options.seed, options.workers)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
-        wanted = _wanted(options.figures)
-        data = claims.Data(_compute(run, wanted), size)
+        data = claims.Data(_compute(run, options.figures), size)
         images = _draw(run, data, options.figures, out / "figures")
     warned = sorted(
         {str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning)}
@@ -90,13 +65,9 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--figures", type=_numbers, default=(), metavar="N,N",
                         help="only these figures, without the page, such as 5,6")  # fmt: skip
     parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
-    parser.add_argument("--samples", type=int, metavar="N",
-                        help="samples at each correlation length, 10,000 if left out")  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=_cores(), help="threads")
     options = parser.parse_args(arguments)
-    if options.samples is not None and options.samples < 100:
-        parser.error("--samples: at least 100 are needed for densities and quantiles")
     if unknown := [number for number in options.figures if number not in NEEDS]:
         parser.error(f"--figures: there are figures 1 to {max(NEEDS)}, not {unknown[0]}")
     return options
@@ -107,40 +78,16 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _cores() -> int:
-    import os
-
-    return (
-        len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1
-    )
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _wanted(figures) -> set[str]:
-    from reproduction.studies import WHAT_IFS
-
-    if not figures:
-        return {*STUDIES, *WHAT_IFS}
-    return {*BASIC, *(name for number in figures for name in NEEDS[number])}
-
-
-def _compute(run, wanted) -> dict:
+def _compute(run, figures) -> dict:
     from reproduction import studies
 
+    wanted = {*BASIC, *(name for number in figures for name in NEEDS[number])}
     results = {}
-    jobs = [(name, text, getattr(studies, name)) for name, text in STUDIES.items()]
-    if run.size.dynamic:
-        jobs.append(("dynamic", f"{run.size.dynamic:,} ruptures at each correlation length",
-                     studies.dynamic))  # fmt: skip
-        wanted = {*wanted, "dynamic"}
-    for name, text in studies.WHAT_IFS.items():
-        jobs.append((name, f"what if: {text}", lambda r, name=name: studies.what_if(r, name)))
-        if name in studies.ARRESTS:
-            text = f"what if: {text}, {run.size.arrests} ruptures each"
-            jobs.append((f"{name}-inertia", text,
-                         lambda r, name=name: studies.what_if_dynamic(r, name)))  # fmt: skip
-    for name, text, function in jobs:
-        if name.removesuffix("-inertia") in wanted:
+    for name, text, function in studies.jobs(run.size):
+        if not figures or name.removesuffix("-inertia") in wanted:
             started = time.monotonic()
             run.say(text)
             results[name] = function(run)

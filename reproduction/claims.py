@@ -1,14 +1,12 @@
 """A claim is a row: what the paper says, where, what is computed for it, and the rule."""
 
-from __future__ import annotations
-
-import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from reproduction import setting
@@ -145,14 +143,15 @@ def rounded(number: Number) -> str:
 
 def write_csv(findings: Sequence[Finding], path: Path) -> None:
     """Write every number of every claim, one a row."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(("claim", "verdict", "quantity", "xi_0/h_n", "case", "value", "error",
-                        "unit", "judged"))  # fmt: skip
-        for found in findings:
-            for series in (*found.judged, *found.beside):
-                for key, number in series.rows:
-                    ratio, case = (key, "") if isinstance(key, float) else ("", key)
-                    table.writerow((found.claim.name, found.verdict.value, series.label, ratio,
-                                    case, float(number.value), float(number.error), series.unit,
-                                    series in found.judged))  # fmt: skip
+    rows = []
+    for found in findings:
+        for series in (*found.judged, *found.beside):
+            for key, number in series.rows:
+                ratio, case = (key, "") if isinstance(key, float) else ("", key)
+                rows.append({
+                    "claim": found.claim.name, "verdict": found.verdict.value,
+                    "quantity": series.label, "xi_0/h_n": ratio, "case": case,
+                    "value": number.value, "error": number.error, "unit": series.unit,
+                    "judged": series in found.judged,
+                })  # fmt: skip
+    pd.DataFrame(rows).to_csv(path, index=False)

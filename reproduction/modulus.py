@@ -3,8 +3,6 @@
 The text says plane stress and prints G* = G/(1 - nu), which belongs to plane strain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page: findings first, then departures, figures, statements and provenance."""
 
-from __future__ import annotations
-
 import base64
 import platform
 import re
@@ -52,17 +50,7 @@ def physics(text: str) -> Markup:
 
 
 def write(path: Path, data: Data, groups, images, runner, warned) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    path : Path
-    data : Data
-    groups : dict of str to list of Finding
-    images : dict of int to Path
-    runner : Runner
-    warned : list of str
-    """
+    """Write the page: groups of findings by title, images by figure number, texts of warnings."""
     found = [finding for rows in groups.values() for finding in rows]
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"physics": physics, "number": rounded}

@@ -1,7 +1,5 @@
 """Rules that turn numbers with errors into a verdict; three standard errors decide."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Where studies are run and kept: a folder that a second call only completes."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib
@@ -88,15 +86,12 @@ class Runner:
         """Return the seed of a correlation length: each has draws of its own, as in the paper."""
         return self.seed * 1000 + round(100 * ratio)
 
-    def what_if(self, name: str, *, samples: int | None = None, method=None, **ensemble):
-        """Run a study file of `what_if/`, with fewer samples or by another method."""
+    def what_if(self, name: str, samples: int | None) -> xr.Dataset:
+        """Run a study file of `what_if/`, with at most so many samples."""
         study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
         count = min(samples or self.size.what_if, study.ensemble.samples)
-        changes = {"ensemble": st.Ensemble(samples=count, seed=self.seed, **ensemble)}
-        if method is not None:
-            changes["method"] = method
-        label = name if method is None else f"{name}-{method.type}"
-        return self.study(label, dataclasses.replace(study, **changes))
+        ensemble = st.Ensemble(samples=count, seed=self.seed)
+        return self.study(name, dataclasses.replace(study, ensemble=ensemble))
 
     def map(self, function, items) -> list:
         """Return [function(item) for item in items], computed by all threads."""

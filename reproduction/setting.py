@@ -1,7 +1,5 @@
 """The paper's setting, and the names of `stiction` that the other files share."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

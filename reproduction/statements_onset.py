@@ -1,7 +1,5 @@
 """What the paper says of its parameters, the nucleation stress, and the onset."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -20,7 +18,7 @@ from reproduction.numbers_with_errors import (
     root_mean_square,
     share,
     skewness,
-)  # fmt: skip
+)
 from reproduction.rules import (
     above,
     below,
@@ -31,7 +29,7 @@ from reproduction.rules import (
     printed,
     rising,
     within,
-)  # fmt: skip
+)
 from reproduction.setting import DEVIATION, HIGH, LOW, MEAN, RATIOS, SIMULATED
 from reproduction.studies import infinite_variance_ratio
 

@@ -1,7 +1,5 @@
 """What the paper says of slip patches, arrest, size, and of how things would otherwise be."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -16,7 +14,7 @@ from reproduction.numbers_with_errors import (
     mean,
     relative_changes,
     share,
-)  # fmt: skip
+)
 from reproduction.rules import (
     above,
     below,
@@ -28,7 +26,7 @@ from reproduction.rules import (
     never,
     rising,
     within,
-)  # fmt: skip
+)
 from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
 from reproduction.studies import points
 

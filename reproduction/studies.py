@@ -1,8 +1,7 @@
 """What is computed: each study is a function of a runner and returns a labelled dataset."""
 
-from __future__ import annotations
-
 import dataclasses
+import functools
 import itertools
 import math
 
@@ -13,7 +12,7 @@ from scipy.stats import ks_2samp
 import stiction as st
 from reproduction import setting
 from reproduction.numbers_with_errors import mean
-from reproduction.runner import Runner, along, kept
+from reproduction.runner import Runner, Size, along, kept
 from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
@@ -33,33 +32,33 @@ READINGS = {
 
 
 def local(run: Runner) -> xr.Dataset:
-    """Onset by the local criterion: the paper's Monte Carlo study."""
+    """Onsets by the local criterion."""
     return run.sweep("local", PROBLEM, strength, LOCAL, run.size.samples)
 
 
 def exact(run: Runner) -> xr.Dataset:
-    """Exact quasi-static onset of the same samples, with every interaction between patches."""
+    """Onsets by exact equilibrium, with every interaction between patches."""
     return run.sweep("exact", PROBLEM, strength, EXACT, run.size.samples)
 
 
 def printed(run: Runner) -> xr.Dataset:
-    """The local criterion with the printed modulus, on the first of the same samples."""
+    """Onsets by the local criterion with the printed modulus."""
     return run.sweep("printed", STRAIN, strength, LOCAL, run.size.readings, SIMULATED)
 
 
 def ruptures(run: Runner) -> xr.Dataset:
-    """Elastodynamic ruptures of the first samples, until the whole interface slides."""
+    """Ruptures of the first samples, until the whole interface slides."""
     return run.sweep("ruptures", PROBLEM, strength, RUPTURE, run.size.ruptures, SIMULATED)
 
 
 def dynamic(run: Runner) -> xr.Dataset:
-    """Monte Carlo study by elastodynamics, until nothing can stop the rupture."""
+    """Monte Carlo study by ruptures, until nothing can stop them."""
     return run.sweep("dynamic", PROBLEM, strength, RUNAWAY, run.size.dynamic)
 
 
 @kept(samples=lambda size: size.samples)
 def moments(run: Runner, samples: int) -> xr.Dataset:
-    """Weakest point, moments and histogram of tau_n, and the bound that is strict on the grid."""
+    """Nucleation stress: weakest point, moments, histogram, and the bound that the grid has."""
     interface = PROBLEM.interface
     weights = setting.discrete_weights()
     kernel = np.zeros(interface.size)
@@ -111,7 +110,7 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
 
 @kept()
 def theory(run: Runner) -> xr.Dataset:
-    """Correlations, and the variance of tau_n on this interface and on an infinite one."""
+    """Variance of the nucleation stress by integration, and correlations."""
     interface = PROBLEM.interface
     ratios = np.geomspace(0.02, 20.0, 41)
     usable = ratios[ratios > 0.1]
@@ -146,7 +145,7 @@ def infinite_variance_ratio(ratio: float) -> float:
 
 
 def readings(run: Runner) -> xr.Dataset:
-    """What each reading of the modulus predicts for all that is printed and depends on it."""
+    """Onsets under four readings of the modulus, for all that is printed and depends on it."""
     count = run.size.readings
 
     def in_printed(ratio: float):
@@ -271,7 +270,7 @@ def convergence(run: Runner, count: int) -> xr.Dataset:
 
 
 def trend(run: Runner) -> xr.Dataset:
-    """Critical stress far beyond the paper's range, with L or L/xi_0 held fixed.
+    """Onsets over a wide range of correlation lengths, with L held fixed.
 
     `mean_mode` 0 and 1 have L fixed, without and with a random mean of z.
     """
@@ -293,7 +292,7 @@ def trend(run: Runner) -> xr.Dataset:
 
 @kept(samples=lambda size: size.trend // 2)
 def window(run: Runner, samples: int) -> xr.Dataset:
-    """One field and ever smaller h_n: xi_0/h_n grows with L/xi_0 held fixed."""
+    """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
     ratio = RATIOS[-1]
     fine = setting.grid(PROBLEM, nodes=2.0)
 
@@ -330,7 +329,7 @@ def window(run: Runner, samples: int) -> xr.Dataset:
 
 @kept()
 def modes(run: Runner) -> xr.Dataset:
-    """Changes of tau_cr by rounded weights, by the modes left out, and by Eq. 11 cut off."""
+    """Onsets with rounded weights, with more modes of the strength, and with fewer."""
     parts = []
     for ratio in RATIOS:
         field, interface = strength(ratio), PROBLEM.interface
@@ -364,7 +363,7 @@ def patches(slipping):
 
 @kept(count=lambda size: size.few)
 def growth(run: Runner, count: int) -> xr.Dataset:
-    """How slip patches appear, grow and merge while the load rises to the onset."""
+    """Slip patches that appear, grow and merge while the load rises to the onset."""
     interface = PROBLEM.interface
 
     def one(item):
@@ -413,7 +412,7 @@ def dips(*places):
 
 @kept(samples=lambda size: size.samples)
 def mechanism(run: Runner, samples: int) -> xr.Dataset:
-    """How patches act on each other: one, two, a pair with a helper, and misplaced samples."""
+    """Patches that act on each other: one, two, a pair with a helper, and misplaced samples."""
 
     def onset(profile, problem=PROBLEM):
         return st.onset(problem, profile, method=EXACT, progress=False)
@@ -489,7 +488,7 @@ def _contest(run: Runner) -> dict:
 
 @kept(samples=lambda size: size.samples, most=lambda size: 10)
 def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
-    """Samples whose first instability comes to rest by equilibrium, run again with inertia."""
+    """Arrested samples again, with inertia."""
     found = exact(run)["arrested_events"]
     interface = PROBLEM.interface
     chosen = [
@@ -541,7 +540,7 @@ def driven(case: str):
 
 @kept(count=lambda size: 16 if size.few >= 24 else 4)
 def driving(run: Runner, count: int) -> xr.Dataset:
-    """Arrested events under non-uniform loads, by equilibrium and with inertia."""
+    """Arrested fronts under non-uniform loads, by equilibrium and with inertia."""
     field = strength(RATIOS[1])
 
     def one(item):
@@ -598,7 +597,7 @@ def _held(problem, tau_p, stress: float) -> float:
 
 @kept(count=lambda size: min(size.what_if, 400))
 def free_end(run: Runner, count: int) -> xr.Dataset:
-    """Onset on interfaces with free ends in mode III, where a mirrored field has them exactly.
+    """Onsets with free ends in mode III, where a mirrored field has them exactly.
 
     A field mirrored at x = 0 and L makes antiplane displacement even there: no stress acts on
     these planes, as if the solids ended.
@@ -641,7 +640,7 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
 
 @kept()
 def failure(run: Runner) -> xr.Dataset:
-    """P(tau_cr < s) down to one in a million at xi_0 = h_n/2, by the local criterion."""
+    """Failure probability down to one in a million at xi_0 = h_n/2, by the local criterion."""
     return st.failure_curve(
         PROBLEM, strength(RATIOS[1]), method=LOCAL, smallest=1e-6, target_cv=0.2,
         seed=run.seed, progress=False,
@@ -673,7 +672,7 @@ ARRESTS = {
 def what_if(run: Runner, name: str) -> xr.Dataset:
     """A study file of `what_if/`, its swept points stacked along 'point'."""
     samples = run.size.trend if name in CHEAP else None
-    return stacked(run.what_if(name, samples=samples))
+    return stacked(run.what_if(name, samples))
 
 
 def stacked(found: xr.Dataset) -> xr.Dataset:
@@ -705,3 +704,21 @@ def points(name: str) -> list[int]:
     sizes = [len(next(iter(axis.values()))) for axis in plain["sweep"]]
     grid = np.arange(math.prod(sizes)).reshape(sizes)
     return [int(point) for point in grid[np.ix_(*ARRESTS[name])].ravel()]
+
+
+STUDIES = (
+    local, moments, exact, ruptures, printed, readings, theory, representative, convergence, trend,
+    window, modes, growth, mechanism, arrest, driving, free_end, failure,
+)  # fmt: skip
+"""In the order in which they are computed."""
+
+
+def jobs(size: Size):
+    """Yield the name, what a reader is told, and the function of every study."""
+    for study in (*STUDIES, dynamic) if size.dynamic else STUDIES:
+        yield study.__name__, study.__doc__.partition(".")[0], study
+    for name, text in WHAT_IFS.items():
+        yield name, f"What if: {text}", functools.partial(what_if, name=name)
+        if name in ARRESTS:
+            text = f"What if: {text}, {size.arrests} ruptures each"
+            yield f"{name}-inertia", text, functools.partial(what_if_dynamic, name=name)

@@ -1,7 +1,5 @@
 """What the page says of the numbers; what it says besides is in `page.toml`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reproduction import setting

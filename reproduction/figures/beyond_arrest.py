@@ -1,14 +1,12 @@
 """Figures 12 to 16, beyond the paper: arrest, driving, size, what if, and which modulus."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
 import numpy as np
 
 from reproduction import setting
-from reproduction.claims import Data, Series
+from reproduction.claims import Data
 from reproduction.figures.style import (
     COLOURS,
     GREY,
@@ -17,9 +15,12 @@ from reproduction.figures.style import (
     TAU_CR,
     XI,
     dots,
-    letter,
+    letters,
     line,
     new,
+    numbers,
+    plain_ticks,
+    ratio_axis,
 )
 from reproduction.numbers_with_errors import deviation, mean
 from reproduction.setting import HIGH, MEAN, RATIOS, SIMULATED, H, L
@@ -27,11 +28,6 @@ from reproduction.statements_rupture import arrested, shares
 from reproduction.studies import DRIVING
 
 XI_UNIT = r"$h_\mathrm{n}$"
-
-
-def _values(rows):
-    values = [number.value for _, number in rows]
-    return values, [2 * number.error for _, number in rows]
 
 
 def figure_12(d: Data):
@@ -63,15 +59,13 @@ def figure_12(d: Data):
     if "dynamic" in d:
         studies.append(("dynamic", 0.06, RED, "D", "with inertia"))
     for name, shift, colour, marker, text in studies:
-        found = [(r, arrested(d, r, name)) for r in RATIOS]
-        value, error = _values(found)
-        bottom.errorbar(np.log2(RATIOS) + shift, 100 * np.array(value), 100 * np.array(error),
-                        fmt=marker, color=colour, ms=5, label=text)  # fmt: skip
-    bottom.set_xticks(np.log2(RATIOS), [f"{r:g}" for r in RATIOS])
-    bottom.set(xlabel=XI, ylabel="samples with an\narrested event (%)", ylim=(0, None))
+        found = [arrested(d, ratio, name) * 100 for ratio in RATIOS]
+        style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
+        numbers(bottom, np.log2(RATIOS) + shift, found, **style)
+    ratio_axis(bottom)
+    bottom.set(ylabel="samples with an\narrested event (%)", ylim=(0, None))
     bottom.legend()
-    letter(top, "a", x=-0.12)
-    letter(bottom, "b", x=-0.12)
+    letters((top, bottom))
     return figure
 
 
@@ -101,8 +95,7 @@ def figure_13(d: Data):
     bottom.set(xlim=(0, limit), ylim=(0, limit), xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
     bottom.legend(loc="upper left")
-    letter(top, "a", x=-0.12)
-    letter(bottom, "b", x=-0.12)
+    letters((top, bottom))
     return figure
 
 
@@ -113,17 +106,13 @@ def _shares(axes, d: Data, name: str, title: str) -> None:
         (static, -0.12, COLOURS[0], "o", "without inertia"),
         (moving, 0.12, RED, "D", "with inertia"),
     ):
-        _bars(axes, series, places, shift, colour, marker, text)
+        y = [places[case] + shift for case, _ in series.rows]
+        value = np.array([100 * number.value for _, number in series.rows])
+        error = np.array([200 * number.error for _, number in series.rows])
+        inside = (np.minimum(error, value), np.minimum(error, 100 - value))
+        axes.errorbar(value, y, xerr=inside, fmt=marker, color=colour, ms=4, label=text)
     axes.set_yticks(range(len(places)), [case.replace("h_n", XI_UNIT) for case in places])
     axes.set(xlim=(-3, 103), title=title, ylim=(len(places) - 0.5, -0.5))
-
-
-def _bars(axes, series: Series, places, shift: float, colour, marker: str, text: str) -> None:
-    y = [places[case] + shift for case, _ in series.rows]
-    value, error = (100 * np.array(found) for found in _values(series.rows))
-    lower = np.minimum(error, value)
-    axes.errorbar(value, y, xerr=(lower, np.minimum(error, 100 - value)), fmt=marker, color=colour,
-                  ms=4, label=text)  # fmt: skip
 
 
 def figure_14(d: Data):
@@ -139,8 +128,7 @@ def figure_14(d: Data):
         _shares(panel, d, name, title)
     axes[1].legend(loc="upper right")
     axes[-1].set_xlabel("samples with an arrested event (%)")
-    for text, panel in zip("abcd", axes, strict=True):
-        letter(panel, text, x=-0.25)
+    letters(axes, x=-0.25)
     return figure
 
 
@@ -151,14 +139,11 @@ def figure_15(d: Data):
     extents = np.array((12.5, 25, 50, 100, 200, 400, 800))
     rows = d["length"]["critical_stress"].values
     found = [deviation(row / row.mean()) * 100 for row in rows]
-    length.errorbar(extents, [n.value for n in found], [2 * n.error for n in found],
-                    color=COLOURS[0], marker="o", ms=4)  # fmt: skip
+    numbers(length, extents, found, color=COLOURS[0], marker="o")
     length.set(xscale="log", yscale="log", xlabel="length of the interface (mm)",
                ylabel=f"variation of {TAU_CR} (%)")  # fmt: skip
-    length.set_xticks(extents, [f"{x:g}" for x in extents])
-    length.set_xticks([], minor=True)
-    length.set_yticks((2, 3, 5), ("2", "3", "5"))
-    length.set_yticks([], minor=True)
+    plain_ticks(length.xaxis, extents)
+    plain_ticks(length.yaxis, (2, 3, 5))
     for chosen, colour, marker, text in (
         ((0, 1, 2), COLOURS[0], "o", r"$\xi_0$ fixed"),
         ((3, 1, 4), COLOURS[2], "^", r"$\xi_0/h_\mathrm{n}$ fixed"),
@@ -170,15 +155,12 @@ def figure_15(d: Data):
     pressure.legend(title="mean, and its deviation")
     change = d["free_end"]["change"].values * 100
     found = [mean(row) for row in change[:4]]
-    end.errorbar(np.log2(RATIOS), [n.value for n in found], [2 * n.error for n in found],
-                 color=COLOURS[0], marker="o", ms=4, label="$L$")  # fmt: skip
+    numbers(end, np.log2(RATIOS), found, color=COLOURS[0], marker="o", label="$L$")
     for i, text, marker in ((5, "$L/2$", "s"), (4, "$L/4$", "^")):
-        number = mean(change[i])
-        end.errorbar(-2, number.value, 2 * number.error, color=COLOURS[2], marker=marker, ms=4,
-                     label=text)  # fmt: skip
+        numbers(end, [-2], [mean(change[i])], color=COLOURS[2], marker=marker, label=text)
     end.axhline(0, color=GREY, lw=0.8)
-    end.set_xticks(np.log2(RATIOS), [f"{r:g}" for r in RATIOS])
-    end.set(xlabel=XI, ylabel=f"{TAU_CR} by free ends (%)")
+    ratio_axis(end)
+    end.set(ylabel=f"{TAU_CR} by free ends (%)")
     end.legend(loc="lower right", ncols=3)
     study = d["failure"]
     tail.semilogy(study["stress"] * 1e-6, study["probability"], color=COLOURS[0],
@@ -189,8 +171,7 @@ def figure_15(d: Data):
                   label="counting", zorder=0)  # fmt: skip
     tail.set(xlabel="stress (MPa)", ylabel="probability of failure", ylim=(5e-7, 1))
     tail.legend(loc="lower right")
-    for text, panel in zip("abcd", (length, pressure, end, tail), strict=True):
-        letter(panel, text, x=-0.12)
+    letters((length, pressure, end, tail))
     return figure
 
 
@@ -218,8 +199,7 @@ def figure_16(d: Data):
                       **{**dots(ratio), "linestyle": "-"}, ms=4, label=f"{ratio:g}")  # fmt: skip
     spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",
                  ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
-    spectrum.set_xticks((1.5, 2, 4, 8), ("1.5", "2", "4", "8"))
-    spectrum.set_xticks([], minor=True)
+    plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))
     spectrum.legend(title=XI, loc="upper right")
     for start, colour, marker, text in (
         (0, COLOURS[0], "o", "uniform $W$"),
@@ -228,13 +208,10 @@ def figure_16(d: Data):
         rows = [
             mean(d.what_if("uniform_dc", "critical_stress", start + i) / MEAN) for i in range(4)
         ]
-        law.errorbar(x, [n.value for n in rows], [2 * n.error for n in rows], color=colour,
-                     marker=marker, ms=4, label=text)  # fmt: skip
+        numbers(law, x, rows, color=colour, marker=marker, label=text)
     law.set(ylabel=r"$\langle\tau_\mathrm{cr}\rangle/\langle\tau_\mathrm{p}\rangle$")
     law.legend()
     for panel in (skew, law):
-        panel.set_xticks(x, [f"{r:g}" for r in RATIOS])
-        panel.set_xlabel(XI)
-    for text, panel in zip("abc", (skew, spectrum, law), strict=True):
-        letter(panel, text, x=-0.12)
+        ratio_axis(panel)
+    letters((skew, spectrum, law))
     return figure

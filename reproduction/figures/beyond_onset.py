@@ -1,12 +1,21 @@
 """Figures 8 to 11, beyond the paper: exact onset, the whole trend, loading rate, patches."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reproduction import setting
 from reproduction.claims import Data
-from reproduction.figures.style import COLOURS, GREY, OVER_MEAN, RED, XI, letter, line, new
+from reproduction.figures.style import (
+    COLOURS,
+    GREY,
+    OVER_MEAN,
+    RED,
+    XI,
+    letters,
+    line,
+    new,
+    numbers,
+    plain_ticks,
+)
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
 from reproduction.statements_onset import trend
@@ -33,8 +42,7 @@ def figure_8(d: Data):
         axes.set(xlim=(-0.1, 2.0), yscale="log", ylim=(1e-3, 1.3), xlabel=text,
                  ylabel="share of samples above")  # fmt: skip
     top.legend(title=XI, loc="upper right")
-    letter(top, "a", x=-0.13)
-    letter(bottom, "b", x=-0.13)
+    letters((top, bottom))
     return figure
 
 
@@ -47,9 +55,8 @@ def figure_9(d: Data):
     for mode, colour, dashes, marker, label in cases:
         for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
             rows = trend(d, function, factor, mode)
-            axes.errorbar([r for r, _ in rows], [n.value for _, n in rows],
-                          [2 * n.error for _, n in rows], color=colour, ls=dashes, marker=marker,
-                          ms=4, label=label)  # fmt: skip
+            style = {"color": colour, "ls": dashes, "marker": marker, "label": label}
+            numbers(axes, [r for r, _ in rows], [n for _, n in rows], **style)
     rows = trend(d, deviation, 1e-3)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=GREY,
                 label="standard deviation, fixed mean")  # fmt: skip
@@ -58,14 +65,10 @@ def figure_9(d: Data):
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.92))
     top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
     bottom.set(yscale="log", xlabel=XI, ylabel="median less lower quartile (kPa)")
-    ticks = (0.0625, 0.25, 1, 4, 16)
-    bottom.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    bottom.set_xticks([], minor=True)
-    bottom.set_yticks((10, 20, 50, 100), ("10", "20", "50", "100"))
-    bottom.set_yticks([], minor=True)
+    plain_ticks(bottom.xaxis, (0.0625, 0.25, 1, 4, 16))
+    plain_ticks(bottom.yaxis, (10, 20, 50, 100))
     bottom.legend(loc="upper left")
-    letter(top, "a", x=-0.12)
-    letter(bottom, "b", x=-0.12)
+    letters((top, bottom))
     return figure
 
 
@@ -123,10 +126,7 @@ def figure_11(d: Data):
     pair.legend(loc="upper center", ncols=2)
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
-    lowering.set_xticks((1.25, 2, 3, 5, 8), ("1.25", "2", "3", "5", "8"))
-    lowering.set_xticks([], minor=True)
-    lowering.set_yticks((0.03, 0.1, 0.3), ("0.03", "0.1", "0.3"))
-    lowering.set_yticks([], minor=True)
-    for text, axes in zip("abcd", (number, one, pair, lowering), strict=True):
-        letter(axes, text, x=-0.12)
+    plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
+    plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3))
+    letters((number, one, pair, lowering))
     return figure

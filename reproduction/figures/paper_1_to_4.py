@@ -1,7 +1,5 @@
 """Figures 1 to 4 of the paper: problem, random field, one rupture, theory against simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from scipy.stats import norm
@@ -21,7 +19,7 @@ from reproduction.figures.style import (
     dots,
     letter,
     new,
-)  # fmt: skip
+)
 from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, SIMULATED, H, L
 from reproduction.statements_onset import offsets
 

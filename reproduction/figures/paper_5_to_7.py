@@ -1,7 +1,5 @@
 """Figures 5 to 7 of the paper: the Monte Carlo study, and the variance of tau_n."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import stiction as st
@@ -16,10 +14,13 @@ from reproduction.figures.style import (
     RED,
     XI,
     letter,
+    letters,
     line,
     new,
+    numbers,
+    ratio_axis,
     thin,
-)  # fmt: skip
+)
 from reproduction.numbers_with_errors import mean, quantile
 from reproduction.setting import (
     DEVIATION,
@@ -113,9 +114,9 @@ def _statistics(axes, found, ends) -> None:
     styles = (("mean", "-", "o", COLOURS[0]), ("median", "--", "s", COLOURS[1]),
               ("25 % quantile", ":", "^", COLOURS[2]))  # fmt: skip
     for i, (name, dashes, marker, colour) in enumerate(styles):
-        row = [numbers[i].value for numbers in found]
-        errors = [2 * numbers[i].error for numbers in found]
-        axes.errorbar(x, row, errors, color=colour, ls=dashes, marker=marker, ms=4, label=name)
+        row = [each[i].value for each in found]
+        style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
+        numbers(axes, x, [each[i] for each in found], **style)
         axes.plot(_PLACES[:2], [ends[0][i], row[0]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[-2:], [row[-1], ends[1][i]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[[0, -1]], [ends[0][i], ends[1][i]], marker, color=colour, ms=4,
@@ -167,8 +168,8 @@ def figure_6(d: Data):
     best = [dynamic_mean(d, ratio) * (1 / MEAN) for ratio in SIMULATED]
     inset.plot(np.log2(RATIOS), [n[0].value for n in found], "-o", color=COLOURS[0], ms=4)
     inset.plot(places, [n.value for n in best], "x", color=RED, ms=7)
-    inset.set_xticks(np.log2(RATIOS), [f"{ratio:g}" for ratio in RATIOS])
-    inset.set(ylabel="mean", xlim=(-2.4, 1.4))
+    ratio_axis(inset)
+    inset.set(xlabel="", ylabel="mean", xlim=(-2.4, 1.4))
     bottom.legend(*_chosen(bottom, 1), loc="lower left")
     letter(bottom, "b", x=-0.12)
     return figure
@@ -211,6 +212,5 @@ def figure_7(d: Data):
     axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")
     axes[1, 0].legend(loc="lower right")
-    for text, panel in zip("abcd", axes.flat, strict=True):
-        letter(panel, text, x=-0.25)
+    letters(axes.flat, x=-0.25)
     return figure

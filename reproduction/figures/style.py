@@ -1,7 +1,6 @@
 """What all figures share: width, colours, letters of panels."""
 
-from __future__ import annotations
-
+import numpy as np
 from matplotlib.figure import Figure
 
 from reproduction.setting import RATIOS
@@ -38,6 +37,31 @@ def dots(ratio: float) -> dict:
 def letter(axes, text: str, *, x: float = 0.0) -> None:
     """Letter a panel, above its upper left corner."""
     axes.text(x, 1.02, f"({text})", transform=axes.transAxes, fontweight="bold", va="bottom")
+
+
+def letters(panels, *, x: float = -0.12) -> None:
+    """Letter panels in their order."""
+    for text, axes in zip("abcd", panels, strict=False):
+        letter(axes, text, x=x)
+
+
+def numbers(axes, x, found, **style) -> None:
+    """Draw numbers with two standard errors."""
+    values, errors = [n.value for n in found], [2 * n.error for n in found]
+    axes.errorbar(x, values, errors, **{"ms": 4} | style)
+
+
+def plain_ticks(axis, places) -> None:
+    """Put ticks at these places only, with plain labels."""
+    axis.set_ticks(places, [f"{place:g}" for place in places])
+    axis.set_ticks([], minor=True)
+
+
+def ratio_axis(axes) -> None:
+    """Label an axis of log2(xi_0/h_n)."""
+    plain_ticks(axes.xaxis, np.log2(RATIOS))
+    axes.set_xticklabels([f"{ratio:g}" for ratio in RATIOS])
+    axes.set_xlabel(XI)
 
 
 def thin(axes) -> None:
