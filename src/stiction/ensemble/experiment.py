@@ -142,7 +142,7 @@ class Experiment:
 
     def mean(self, name: str) -> float:
         """Return the mean of a random property, in its unit; of a coefficient as a stress, Pa."""
-        return mean_in_stress(self.problem, self.random.properties, name)
+        return mean_in_stress(self.problem, self.random, name)
 
     def support(self, name: str) -> tuple[float, float]:
         """Return the bounds of a random property; those of a coefficient as a stress, Pa."""

@@ -57,31 +57,28 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     if isinstance(value, dict) and "dims" in value:
         value = xr.DataArray.from_dict(value)
     if isinstance(value, dict) and "values" in value:
-        rows = [np.ravel(value[name]) for name in ("x", "y", "values") if name in value]
+        rows = [value[name] for name in ("x", "y", "values") if name in value]
     else:
-        dims = getattr(value, "dims", None)
-        if dims not in (("x",), ("x", "y"), ("y", "x")) or any(
-            d not in value.coords for d in dims
-        ):
+        names = sorted(getattr(value, "dims", ()))
+        if names not in (["x"], ["x", "y"]) or not set(names) <= set(value.coords):
             raise ValueError(
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
-        names = sorted(dims)
         value = value.transpose(*names)
         places = np.meshgrid(*(value[name].values for name in names), indexing="ij")
-        rows = [np.ravel(each) for each in (*places, value.values)]
-    points = np.array(rows, dtype=np.float64)
+        rows = [*places, value.values]
+    points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     points = points[:, np.isfinite(points).all(axis=0)]
-    if points.ndim != 2 or points.shape[1] == 0:
+    if points.shape[1] == 0:
         raise ValueError("must hold at least one value")
     points.flags.writeable = False
     return points
 
 
 def _table(points: Array) -> dict[str, list[float]]:
-    names = ("x", "y", "values") if points.shape[0] == 3 else ("x", "values")
-    return {name: row.tolist() for name, row in zip(names, points, strict=True)}
+    names = ("x", "y")[: len(points) - 1]
+    return dict(zip((*names, "values"), points.tolist(), strict=True))
 
 
 Points = Annotated[
@@ -94,15 +91,7 @@ Points = Annotated[
 
 @model
 class Conditions:
-    """What was measured of a field; see `RandomField.given`.
-
-    Parameters
-    ----------
-    profile : DataArray over x (m), on a plane over x and y
-        Measured values, in the unit of the field; NaN where nothing was measured.
-    noise : float
-        Standard deviation of the error of a value, in the same unit, positive.
-    """
+    """What was measured of a field: values and their error, in its unit (`RandomField.given`)."""
 
     profile: Points
     noise: Positive
@@ -117,84 +106,32 @@ class Conditions:
         """The measured values, (points,)."""
         return self.profile[-1]
 
-    def gaussian(
-        self, marginal: Any, factor: float, mean: Array, variance: Array
-    ) -> tuple[Array, Array, float]:
-        """Replace the likelihood of z at each place by a Gaussian.
-
-        Parameters
-        ----------
-        marginal : Beta or any other marginal
-        factor : float
-            By which it is multiplied.
-        mean, variance : (points,) arrays
-            Of z from all else.
-
-        Returns
-        -------
-        (points,) arrays
-            Values of z and their precisions.
-        float
-            Logarithm of what the product of all, with unit maxima, is to be multiplied by.
-        """
-        law, noise, value = marginal.distribution, self.noise / factor, self.values / factor
-        # Where the likelihood and z from all else overlap.
-        edges = value + REACH * noise * np.array([[-1.0], [1.0]])
-        below = law.cdf(edges)
-        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges))).clip(
-            -FURTHEST, FURTHEST
-        )
-        width = REACH * np.sqrt(variance)
-        low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
-        low, high = np.where(low < high, (low, high), (mean - width, mean + width))
-        half = np.maximum(0.5 * (high - low), TINY)[:, None]
-        z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
-        off = (z - mean[:, None]) ** 2 / variance[:, None]
-        density = -0.5 * (off + ((value[:, None] - from_normal(marginal, z)) / noise) ** 2)
-        top = density.max(axis=1, keepdims=True)
-        weight = np.exp(density - top)
-        total = weight.sum(axis=1)
-        centre = (weight * z).sum(axis=1) / total
-        spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
-        spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
-        precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
-        found = mean + (centre - mean) * (1.0 + 1.0 / (precision * variance))
-        whole = variance + 1.0 / precision
-        scale = np.log(total * half[:, 0]) + top[:, 0]
-        scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
-        return found, precision, float(scale.sum())
-
     def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
-        if len(self.places) != len(interface.shape):
-            raise InputError("given.profile: " + _OTHER_DIMENSION[interface.is_plane])
+        names = interface.dims
+        if len(self.places) != len(names):
+            measured, given = ("xy"[: len(dims)] for dims in (self.places, names))
+            raise InputError(
+                f"given.profile: was measured over {', '.join(measured)}, the interface runs along"
+                f" {', '.join(given)}"
+            )
         problems = [
             f"given.profile: {name} reaches from {row.min():g} to {row.max():g} m, the interface is"
             f" {length:g} m long"
-            for name, row, length in zip("xy", self.places, interface.lengths, strict=False)
+            for name, row, length in zip(names, self.places, interface.lengths, strict=True)
             if row.min() < -1e-9 * length or row.max() > length * (1.0 + 1e-9)
         ]
         low, high = marginal.distribution.support()
         away = np.maximum(low - self.values, self.values - high)
         if factor is None and away.max() > IMPOSSIBLE * self.noise:
-            worst, names = int(away.argmax()), "xy"[: len(self.places)]
-            at = ", ".join(
-                f"{name} = {row[worst]:g} m"
-                for name, row in zip(names, self.places, strict=True)
-            )
+            *place, value = self.profile[:, away.argmax()]
+            at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
             problems.append(
-                f"given.profile: {self.values[worst]:g} at {at} lies outside the marginal, which"
-                f" reaches from {low:g} to {high:g}, by more than {IMPOSSIBLE:g} times its error of"
-                f" {self.noise:g}"
+                f"given.profile: {value:g} at {at} lies outside the marginal, from {low:g} to"
+                f" {high:g}, by more than {IMPOSSIBLE:g} times its error of {self.noise:g}"
             )
         if problems:
             raise InputError(problems)
-
-
-_OTHER_DIMENSION = {
-    True: "was measured along a line, and the interface is a plane: give its y, too",
-    False: "was measured on a plane, and the interface is a line",
-}
 
 
 def basis(modes: Modes, mean_mode: bool, lengths: Sequence[float], places: Array) -> Array:
@@ -209,16 +146,9 @@ def basis(modes: Modes, mean_mode: bool, lengths: Sequence[float], places: Array
 
 
 class Measured(NamedTuple):
-    """What was measured of one property.
+    """What was measured of one property: z at its places is phi @ draws, (points, dimension).
 
-    Attributes
-    ----------
-    conditions : Conditions
-    marginal : Beta or any other marginal
-    phi : (points, dimension) array
-        z at its places is phi @ draws.
-    factor : marginal or None
-        Of the factor between specimens, by whose draw the marginal is multiplied.
+    `factor` is the marginal of the factor between specimens, by whose draw it is multiplied.
     """
 
     conditions: Conditions
@@ -227,11 +157,50 @@ class Measured(NamedTuple):
     factor: Any = None
 
     def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
-        """Return `Conditions.gaussian` for the draw u of the factor between specimens."""
-        factor = 1.0
+        """Replace the likelihood of z at each place by a Gaussian.
+
+        Parameters
+        ----------
+        u : float
+            Draw of the factor between specimens.
+        mean, variance : (points,) arrays
+            Of z from all else.
+
+        Returns
+        -------
+        (points,) arrays
+            Values of z and their precisions.
+        float
+            Logarithm of the factor of the product of all, with unit maxima.
+        """
+        factor, law = 1.0, self.marginal.distribution
         if self.factor is not None:
             factor = float(quantile_of_normal(self.factor.distribution, np.array(u)))
-        return self.conditions.gaussian(self.marginal, factor, mean, variance)
+        noise, value = self.conditions.noise / factor, self.conditions.values / factor
+        # Where the likelihood and z from all else overlap.
+        edges = value + REACH * noise * np.array([[-1.0], [1.0]])
+        below = law.cdf(edges)
+        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges)))
+        score = score.clip(-FURTHEST, FURTHEST)
+        width = REACH * np.sqrt(variance)
+        low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
+        low, high = np.where(low < high, (low, high), (mean - width, mean + width))
+        half = np.maximum(0.5 * (high - low), TINY)[:, None]
+        z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
+        off = (z - mean[:, None]) ** 2 / variance[:, None]
+        density = -0.5 * (off + ((value[:, None] - from_normal(self.marginal, z)) / noise) ** 2)
+        top = density.max(axis=1, keepdims=True)
+        weight = np.exp(density - top)
+        total = weight.sum(axis=1)
+        centre = (weight * z).sum(axis=1) / total
+        spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
+        spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
+        precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
+        found = mean + (centre - mean) * (1.0 + 1.0 / (precision * variance))
+        whole = variance + 1.0 / precision
+        scale = np.log(total * half[:, 0]) + top[:, 0]
+        scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
+        return found, precision, float(scale.sum())
 
 
 class Conditioning:
@@ -258,11 +227,10 @@ class Conditioning:
         self.phi = np.concatenate([one.phi for one in measured])
         check_memory("given.profile", 24.0 * self.phi.size, "give fewer places")
         self.grid: Array | None = None
-        alone = np.zeros(self.phi.shape[0]), np.ones(self.phi.shape[0])
-        middle, moves = 0.0, np.zeros((1, alone[0].size))
+        others = alone = np.zeros(len(self.phi)), np.ones(len(self.phi))
+        middle, moves = 0.0, np.zeros((1, len(self.phi)))
         if any(one.factor is not None for one in measured):
             middle, moves = self._tabulate(alone)
-        others = alone
         for _ in range(TURNS):
             z, precision, _ = self._gaussian(middle, others)
             self._regress(z, precision)
@@ -273,13 +241,12 @@ class Conditioning:
 
     def _gaussian(self, u: float, others: tuple[Array, Array]) -> tuple[Array, Array, float]:
         """Gaussians that stand for the measured values, given z from all others."""
-        parts, first = [], 0
-        for one in self.measured:
-            here = slice(first, first + one.phi.shape[0])
-            parts.append(one.gaussian(u, others[0][here], others[1][here]))
-            first = here.stop
-        z, precision = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-        return z, precision, sum(part[2] for part in parts)
+        ends = np.cumsum([len(one.phi) for one in self.measured])[:-1]
+        each = zip(self.measured, *(np.split(part, ends) for part in others), strict=True)
+        z, precision, scale = zip(
+            *(one.gaussian(u, *given) for one, *given in each), strict=True
+        )
+        return np.concatenate(z), np.concatenate(precision), sum(scale)
 
     def _regress(self, z: Array, precision: Array) -> None:
         root = np.sqrt(precision)
@@ -311,9 +278,8 @@ class Conditioning:
         """Find the posterior of u; return its mean, and how values of z move along the grid."""
         middle, spread = 0.0, 1.0
         for _ in range(3):
-            grid = np.clip(
-                middle + spread * np.linspace(-REACH, REACH, NODES), -FURTHEST, FURTHEST
-            )
+            grid = middle + spread * np.linspace(-REACH, REACH, NODES)
+            grid = np.clip(grid, -FURTHEST, FURTHEST)
             z, precision, _ = self._gaussian(middle, alone)
             self._regress(z, precision)
             values = [self._gaussian(u, alone) for u in grid]
@@ -336,21 +302,18 @@ class Conditioning:
 
     def specimen(self, u: Array) -> Array:
         """Return the draws of the factor between specimens, conditioned."""
-        if self.grid is None:
-            return u
-        found: Array = np.interp(u, self.score, self.quantile)
-        return found
+        return u if self.grid is None else np.interp(u, self.score, self.quantile)
 
     def draws(self, draws: Array, u: Array | None = None) -> Array:
         """Return conditioned draws of the fields, (samples, dimension), with u from `specimen`."""
         data = self.data
         if u is not None and self.grid is not None:
-            data = np.stack([np.interp(u, self.grid, row) for row in self.data.T], axis=1)
-        gain = self.values / (1.0 + self.values**2)
+            data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
+        share = 1.0 + self.values**2
         out = np.array(draws)
-        narrow = (1.0 + self.values**2) ** -0.5 - 1.0
         transposed = np.ascontiguousarray(self.right.T)
-        condition(self.right, transposed, np.ascontiguousarray(data * gain), narrow, out)
+        offsets = np.ascontiguousarray(data * (self.values / share))
+        condition(self.right, transposed, offsets, share**-0.5 - 1.0, out)
         return out
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
@@ -363,7 +326,7 @@ class Conditioning:
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
-        points = self.phi.shape[0]
+        points = len(self.phi)
         if self.chi_square > points + DOUBTFUL * np.sqrt(2.0 * points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"

@@ -122,11 +122,6 @@ def hermite_coefficients(marginal: Any) -> Array:
     return coefficients
 
 
-def share_unaccounted(coefficients: Array) -> float:
-    """Return the largest error of a correlation: what the last coefficient stands for."""
-    return float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
-
-
 def _expand(distribution: Any, reach: float) -> tuple[Array, float]:
     """Coefficients from |z| <= `reach`, and the share of the variance that lies beyond."""
     half = round(reach / STEP)

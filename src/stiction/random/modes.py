@@ -60,10 +60,7 @@ def make_modes(
 ) -> Modes:
     """Find the modes of a spectrum: wave vectors on a line, or in an ellipse; of k and -k one.
 
-    Raises
-    ------
-    InputError
-        If there are too many modes, or none.
+    An `InputError` if there are too many, or none.
     """
     dimensions = len(interface.shape)
     cutoff = spectrum.cutoff(dimensions)

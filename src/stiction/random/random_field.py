@@ -15,23 +15,9 @@ from scipy.special import ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import (
-    Flag,
-    Number,
-    Numbers,
-    Positive,
-    Real,
-    check_memory,
-    checked,
-    model,
-)
+from stiction.model import Flag, Number, Numbers, Positive, Real, check_memory, checked, model
 from stiction.random.conditioning import Conditioning, Conditions, Measured, basis
-from stiction.random.mapping import (
-    correlation_of_mapped,
-    from_normal,
-    hermite_coefficients,
-    share_unaccounted,
-)
+from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
@@ -65,24 +51,17 @@ class RandomField:
         On a plane, the correlation length along y over that along x, which is that of the
         spectrum; 1 if left out.
     of : {"friction_coefficient"}, optional
-        The field holds friction coefficients: times the normal pressure at a point they are the
-        strength there (or another stress, where the field stands for one).
+        The field holds friction coefficients: the strength (or another stress, where the field
+        stands for one) is their product with the normal pressure.
     conditions : Conditions, optional
         What was measured of it, as `given` enters it; in a study file the table ``given``.
 
-    Raises
-    ------
-    InputError
-        If the marginal or the spectrum is not valid.
-
     Notes
     -----
-    The same object serves lines and planes. On a plane the field is isotropic unless told
-    otherwise, and a line cut through it along x has the correlation of the field on a line,
-    but for what truncation leaves out, which is a little more on a plane.
-
-    Translation process after Grigoriu (1995), spectral representation after Shinozuka and
-    Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
+    The same object serves lines and planes. A line cut through a plane along x has the
+    correlation of the field on a line, but for what truncation leaves out, which is a little
+    more on a plane. Translation process after Grigoriu (1995), spectral representation after
+    Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
 
     Examples
     --------
@@ -115,13 +94,10 @@ class RandomField:
 
     @checked
     def modes(self, interface: Interface) -> Modes:
-        """Return the modes of this field on an interface.
+        """Return the modes of this field on an interface, or raise an `InputError`.
 
-        Raises
-        ------
-        InputError
-            If truncation leaves no mode: the correlation length is too long for the
-            interface. If a line is given an anisotropy.
+        There is none if the correlation length is too long for the interface; a line has no
+        anisotropy.
         """
         return _modes(self, interface)
 
@@ -147,10 +123,8 @@ class RandomField:
         """
         modes = _modes(self, interface)
         check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
-        return standard_normal(
-            seed, samples, modes.ranks, first=first, stream=stream, mean_mode=self.mean_mode,
-            block=block_of(len(interface.shape)),
-        )  # fmt: skip
+        block = block_of(len(interface.shape))
+        return standard_normal(seed, stream, first, samples, modes.ranks, self.mean_mode, block)
 
     @checked
     def gaussian(self, interface: Interface, draws: Numbers) -> Array:
@@ -162,16 +136,10 @@ class RandomField:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        return gaussian(draws, modes.sigma, modes.numbers, self.mean_mode, interface.shape)
+        return gaussian(draws, modes, self.mean_mode, interface.shape)
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
-        """Map draws to profiles.
-
-        Parameters
-        ----------
-        interface : Interface
-        draws : (samples, dimension) array
-            Standard normal, in the order of `draws`.
+        """Map draws, (samples, dimension) in the order of `draws`, to profiles.
 
         Returns
         -------
@@ -203,11 +171,6 @@ class RandomField:
             Like any other, for one interface: the one that was measured. Its samples have the
             draws of those of this field, and tend to them as the noise grows.
 
-        Notes
-        -----
-        Gaussian regression of the draws on the values of z that were measured, whose errors are
-        ``noise`` over the slope of the map from z to the marginal, to first order.
-
         Examples
         --------
         >>> import stiction as st
@@ -226,26 +189,23 @@ class RandomField:
     @checked
     def quantile(self, interface: Interface, probability: Probability) -> Array:
         """Return the quantile of the field at each node, given what was measured, (*shape)."""
-        score = float(ndtri(probability))
         mean, deviation = np.zeros(interface.size), np.ones(interface.size)
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
-            places = np.array([row.ravel() for row in grid])
-            phi = basis(_modes(self, interface), self.mean_mode, interface.lengths, places)
+            phi = self._basis(interface, np.array([row.ravel() for row in grid]))
             mean, deviation = conditioning(self, interface).moments(phi)
-        found = from_normal(self.marginal, mean + score * deviation)
+        found = from_normal(self.marginal, mean + float(ndtri(probability)) * deviation)
         return found.reshape(interface.shape)
 
     def measured(self, interface: Interface, factor: Any = None) -> Measured:
-        """Return what was measured, with its places as functions of the draws.
-
-        `factor` is the marginal of a factor between specimens.
-        """
+        """Return what was measured, with the marginal of a factor between specimens, checked."""
         given = self.conditions
         assert given is not None
         given.check(self.marginal, interface, factor)
-        phi = basis(_modes(self, interface), self.mean_mode, interface.lengths, given.places)
-        return Measured(given, self.marginal, phi, factor)
+        return Measured(given, self.marginal, self._basis(interface, given.places), factor)
+
+    def _basis(self, interface: Interface, places: Array) -> Array:
+        return basis(_modes(self, interface), self.mean_mode, interface.lengths, places)
 
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0,
@@ -262,11 +222,6 @@ class RandomField:
         Returns
         -------
         (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
-
-        Raises
-        ------
-        InputError
-            If a number is not a whole number or negative, or no mode is left by truncation.
 
         Warns
         -----
@@ -328,7 +283,8 @@ class RandomField:
 
     def _map_coefficients(self) -> Array:
         coefficients = hermite_coefficients(self.marginal)
-        error = share_unaccounted(coefficients)
+        # The last coefficient stands for what the expansion leaves out.
+        error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
         if error > ENOUGH_ACCOUNTED:
             warn_accuracy(
                 f"the correlation of the strength is uncertain by up to {error:.2g}: so much of the"
@@ -341,12 +297,7 @@ class RandomField:
     def efolding_length(self, *, of: Of = "strength") -> float:
         """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
-        Truncation is included. On a plane it is that along x.
-
-        Parameters
-        ----------
-        of : {"strength", "z"}
-            Of the mapped field or of the Gaussian one.
+        That of the mapped field or of the Gaussian one, z, with truncation; on a plane along x.
         """
         if of == "z":
             return float(self.spectrum.efolding_length)
@@ -362,12 +313,7 @@ class RandomField:
     def with_efolding_length(self, length: Positive, *, of: Of = "strength") -> RandomField:
         """Return the same field with a correlation that falls to 1/e at `length` (m).
 
-        Parameters
-        ----------
-        length : float
-            m, positive.
-        of : {"strength", "z"}
-            Correlation of the mapped field or of the Gaussian one.
+        Of the mapped field or of the Gaussian one, z.
         """
         if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")
@@ -380,7 +326,7 @@ class RandomField:
 def _modes(field: RandomField, interface: Interface) -> Modes:
     if field.anisotropy is not None and not interface.is_plane:
         raise InputError(
-            f"anisotropy: is a ratio of correlation lengths along y and x, and a line has no y; got"
+            "anisotropy: is a ratio of correlation lengths along y and x, and a line has no y; got"
             f" {field.anisotropy:g}, leave it out"
         )
     return make_modes(field.spectrum, field.mean_mode, field.anisotropy or 1.0, interface)

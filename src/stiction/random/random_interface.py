@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from functools import cached_property, lru_cache, reduce
 from typing import Annotated, Any, NamedTuple
 
@@ -39,14 +38,12 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
             "must map pairs of names to numbers, such as"
             f' {{("strength", "residual_strength"): 0.8}}, got {describe(value)}'
         )
-    flat: dict[Any, Any] = {}
+    flat: list[tuple[Any, Any]] = []
     for key, inner in value.items():
-        if isinstance(inner, Mapping):
-            flat |= {(key, other): rho for other, rho in inner.items()}
-        else:
-            flat[key] = inner
+        nested = inner.items() if isinstance(inner, Mapping) else ()
+        flat += [((key, other), rho) for other, rho in nested] if nested else [(key, inner)]
     found: dict[str, dict[str, float]] = {}
-    for pair, rho in flat.items():
+    for pair, rho in flat:
         if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
             raise InputError(f"must name two different properties, got {describe(pair)}")
         unknown = [unknown_name("correlation", str(n), NAMES) for n in pair if n not in NAMES]
@@ -79,12 +76,6 @@ def lower_factor(matrix: Array) -> Array:
         root = factor[j, j] = np.sqrt(pivot)
         factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
     return factor
-
-
-def range_of_product(one: tuple[Any, Any], other: tuple[Any, Any]) -> tuple[float, float]:
-    """Return the bounds of a product of two numbers in these ranges, which may be infinite."""
-    ends = [0.0 if a == 0.0 or b == 0.0 else float(a * b) for a in one for b in other]
-    return min(ends), max(ends)
 
 
 class Stream(NamedTuple):
@@ -134,12 +125,6 @@ class RandomInterface:
         Marginals of factors that differ from specimen to specimen and are constant along each,
         by property: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. Positive, with mean 1.
 
-    Raises
-    ------
-    InputError
-        If two properties say the same, a correlated one is not given, or the correlations
-        contradict each other.
-
     Notes
     -----
     Correlated translation fields after Grigoriu (1995): the draws of a property are a
@@ -188,13 +173,22 @@ class RandomInterface:
             problems.append(
                 f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}"
             )
-        for one, others in (self.correlation or {}).items():
-            problems += [
-                f"correlation: {name!r} is correlated but not random here"
-                for name in (one, *others)
-                if name not in self.properties
-            ]
-        problems += _wrong_factors(self.between or {}, self.names)
+        correlated = self.correlation or {}
+        problems += [
+            f"correlation: {name!r} is correlated but not random here"
+            for name in (name for one, others in correlated.items() for name in (one, *others))
+            if name not in self.names
+        ]
+        for name, marginal in (self.between or {}).items():
+            mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
+            if name not in self.names:
+                valid = ", ".join(self.names)
+                problems.append(f"between: {name!r} is not random here (valid: {valid})")
+            if low < 0.0 or abs(float(mean) - 1.0) > 1e-6:
+                problems.append(
+                    f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
+                    f" lower bound {low:g}"
+                )
         if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
@@ -225,10 +219,14 @@ class RandomInterface:
                 matrix[i, j] = matrix[j, i] = rho
         return matrix
 
+    @property
+    def _linked(self) -> Array:
+        """Whether properties are correlated, directly or through others."""
+        return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
+
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        last = max(stream.columns.stop for stream in _layout(self, interface).values())
-        return last + len(self.between or ())
+        return _fields_dimension(self, interface) + len(self.between or ())
 
     @checked
     def draws(
@@ -247,25 +245,18 @@ class RandomInterface:
         check_memory("samples", 8.0 * samples * each)
         block = block_of(len(interface.shape))
         parts = [
-            standard_normal(
-                seed, samples, stream.ranks, first=first, stream=stream.number,
-                mean_mode=stream.mean_mode, block=block,
-            )
-            for stream in _layout(self, interface).values()
-        ]  # fmt: skip
-        parts += [
-            standard_normal(
-                seed, samples, np.arange(0), first=first, mean_mode=True,
-                stream=BETWEEN + NAMES.index(name),
-            )
-            for name in self.between or ()
-        ]  # fmt: skip
+            standard_normal(seed, one.number, first, samples, one.ranks, one.mean_mode, block)
+            for one in _layout(self, interface).values()
+        ]
+        for name in self.between or ():
+            stream = BETWEEN + NAMES.index(name)
+            parts.append(standard_normal(seed, stream, first, samples, np.arange(0), True))
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
         layout = _layout(self, interface)
-        last = self.dimension(interface) - len(self.between or ())
+        last = _fields_dimension(self, interface)
         specimen = dict(zip(self.between or (), draws[:, last:].T, strict=True))
         for name, columns, known in _conditioned(self, interface):
             u = known.specimen(specimen[name]) if name else None
@@ -297,13 +288,6 @@ class RandomInterface:
         """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
-    def support(self, name: str) -> tuple[float, float]:
-        """Return the bounds of a property, in its unit, with its factor between specimens."""
-        low, high = self.properties[name].marginal.distribution.support()
-        factor = (self.between or {}).get(name)
-        ends = (1.0, 1.0) if factor is None else factor.distribution.support()
-        return range_of_product((low, high), ends)
-
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn of fields that the grid or the interface cannot do justice to."""
         for field in self.properties.values():
@@ -316,9 +300,8 @@ class RandomInterface:
 def _layout(random: RandomInterface, interface: Interface) -> dict[str, Stream]:
     """Draws of each property by name."""
     properties = list(random.properties.values())
-    linked = np.linalg.matrix_power(random.matrix != 0.0, len(properties))
     found, start = {}, 0
-    for (name, field), row in zip(random.properties.items(), linked, strict=True):
+    for (name, field), row in zip(random.properties.items(), random._linked, strict=True):
         group = [properties[j] for j in np.flatnonzero(row)]
         ranks = reduce(np.union1d, [one.modes(interface).ranks for one in group])
         mean_mode = any(one.mean_mode for one in group)
@@ -334,6 +317,11 @@ def _layout(random: RandomInterface, interface: Interface) -> dict[str, Stream]:
     return found
 
 
+def _fields_dimension(random: RandomInterface, interface: Interface) -> int:
+    """Number of draws of a sample without those of factors between specimens."""
+    return max(stream.columns.stop for stream in _layout(random, interface).values())
+
+
 @lru_cache(maxsize=16)
 def _conditioned(
     random: RandomInterface, interface: Interface
@@ -343,51 +331,33 @@ def _conditioned(
     Each with the property whose factor between specimens it tells of ('' if none), and the columns
     of the draws.
     """
-    layout, factor = _layout(random, interface), lower_factor(random.matrix)
-    names, fields = random.names, random.properties
-    linked = np.linalg.matrix_power(random.matrix != 0.0, len(names))
+    factor, names, between = lower_factor(random.matrix), random.names, random.between or {}
+    columns = [
+        np.arange(one.columns.start, one.columns.stop)
+        for one in _layout(random, interface).values()
+    ]
+    own = [one.own for one in _layout(random, interface).values()]
     found = []
-    for group in np.unique(linked, axis=0):
+    for group in np.unique(random._linked, axis=0):
         members = np.flatnonzero(group)
-        known = [i for i in members if fields[names[i]].conditions is not None]
-        if not known:
-            continue
-        spans = [layout[names[j]].columns for j in members]
-        columns = np.concatenate([np.arange(span.start, span.stop) for span in spans])
-        measured = []
-        for i in known:
-            one = fields[names[i]].measured(interface, (random.between or {}).get(names[i]))
-            phi = np.zeros((one.phi.shape[0], random.dimension(interface)))
-            for j in np.flatnonzero(factor[i]):
-                start, stop = layout[names[j]].columns.start, layout[names[j]].columns.stop
-                phi[:, np.arange(start, stop)[layout[names[i]].own]] = factor[i, j] * one.phi
-            measured.append(one._replace(phi=np.ascontiguousarray(phi[:, columns])))
-        factors = [names[i] for i, one in zip(known, measured, strict=True) if one.factor]
+        known = [i for i in members if random.properties[names[i]].conditions is not None]
+        factors = [names[i] for i in known if names[i] in between]
         if len(factors) > 1:
             raise InputError(
                 f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
                 " at most one of them may have one"
             )
-        found.append((factors[0] if factors else "", columns, Conditioning(measured)))
+        of_group = np.concatenate([columns[j] for j in members])
+        measured = []
+        for i in known:
+            one = random.properties[names[i]].measured(interface, between.get(names[i]))
+            phi = np.zeros((len(one.phi), _fields_dimension(random, interface)))
+            for j in np.flatnonzero(factor[i]):
+                phi[:, columns[j][own[i]]] = factor[i, j] * one.phi
+            measured.append(one._replace(phi=phi[:, of_group]))
+        if measured:
+            found.append(("".join(factors), of_group, Conditioning(measured)))
     return found
-
-
-def _wrong_factors(between: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
-    """What is wrong with factors between specimens."""
-    problems = []
-    for name, marginal in between.items():
-        law = marginal.distribution
-        if name not in names:
-            problems.append(f"between: {name!r} is not random here (valid: {', '.join(names)})")
-        if law.support()[0] < 0.0 or abs(float(law.mean()) - 1.0) > 1e-6:
-            problems.append(
-                f"between.{name}: a factor must be positive with mean 1, got mean"
-                f" {float(law.mean()):g} and lower bound {law.support()[0]:g}"
-            )
-    return problems
-
-
-assert {f.name for f in fields(RandomInterface)} == {*NAMES, "correlation", "between"}
 
 
 def as_random_interface(given: Any) -> RandomInterface:

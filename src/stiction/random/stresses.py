@@ -1,14 +1,15 @@
 """What is random on a problem, as stresses: friction coefficients times the normal pressure."""
 
 from collections.abc import Mapping
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, range_of_product
+from stiction.random.random_interface import RandomInterface
 
 WORTH_SAYING = 1e-6
 MOST = 0.5
@@ -42,65 +43,63 @@ def profiles_in_stress(
     return found
 
 
-def _equally_likely(count: int) -> Array:
-    return (np.arange(count) + 0.5) / count
-
-
-def _quantiles(field: RandomField, count: int) -> Array:
-    """Values of a field at a point, equally likely."""
-    found: Array = field.marginal.distribution.ppf(_equally_likely(count))
-    return found
-
-
-def _pressures(problem: Problem, fields: Mapping[str, RandomField]) -> Array:
-    """Pressures that a point may have, equally likely."""
-    if "normal_pressure" in fields:
-        return _quantiles(fields["normal_pressure"], PRESSURES)
-    flat = np.sort(np.ravel(problem.load.normal_pressure))
-    return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
+def range_of_product(one: tuple[Any, Any], other: tuple[Any, Any]) -> tuple[float, float]:
+    """Return the bounds of a product of two numbers in these ranges, which may be infinite."""
+    ends = [0.0 if a == 0.0 or b == 0.0 else float(a * b) for a in one for b in other]
+    return min(ends), max(ends)
 
 
 def support_in_stress(
     problem: Problem, random: RandomInterface, name: str
 ) -> tuple[float, float]:
-    """Return the values between which a property lies, Pa."""
-    low, high = random.support(name)
-    if random.properties[name].of is None:
-        return low, high
-    ends = problem.load.normal_pressure
+    """Return the values between which a property lies, Pa, with its factor between specimens."""
+    factor = (random.between or {}).get(name)
+    marginals = [random.properties[name].marginal, *([factor] if factor else [])]
+    ends = [marginal.distribution.support() for marginal in marginals]
+    if random.properties[name].of is not None and "normal_pressure" in random.names:
+        ends.append(support_in_stress(problem, random, "normal_pressure"))
+    elif random.properties[name].of is not None:
+        ends.append(
+            (np.min(problem.load.normal_pressure), np.max(problem.load.normal_pressure))
+        )
+    return reduce(range_of_product, ends, (1.0, 1.0))
+
+
+def _equally_likely(distribution: Any, count: int) -> Array:
+    found: Array = distribution.ppf((np.arange(count) + 0.5) / count)
+    return found
+
+
+def _pressures(problem: Problem, random: RandomInterface) -> Array:
+    """Pressures that a point may have, equally likely."""
     if "normal_pressure" in random.names:
-        ends = random.support("normal_pressure")
-    return range_of_product((low, high), (float(np.min(ends)), float(np.max(ends))))
+        field = random.properties["normal_pressure"]
+        return _equally_likely(field.marginal.distribution, PRESSURES)
+    flat = np.sort(np.ravel(problem.load.normal_pressure))
+    return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
 
-def mean_in_stress(problem: Problem, fields: Mapping[str, RandomField], name: str) -> float:
+def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
     """Return the mean of a property, Pa."""
-    field = fields[name]
-    return field.mean * (1.0 if field.of is None else float(_pressures(problem, fields).mean()))
+    field = random.properties[name]
+    return field.mean * (1.0 if field.of is None else float(_pressures(problem, random).mean()))
 
 
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """Return the probability that the strength at a point is not above the residual strength.
 
-    Parameters
-    ----------
-    problem : Problem
-    random : RandomInterface
-        Its properties are taken as independent.
+    Properties are taken as independent.
     """
-    fields = random.properties
+    fields, factor = random.properties, (random.between or {}).get("strength")
     residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
-        residual = _quantiles(fields["residual_strength"], QUANTILES)
-    strength = fields["strength"]
-    if strength.of is not None:
-        residual = np.ravel(residual)[:, None] / _pressures(problem, fields)
-    factor = (random.between or {}).get("strength")
+        law = fields["residual_strength"].marginal.distribution
+        residual = _equally_likely(law, QUANTILES)
+    if fields["strength"].of is not None:
+        residual = np.ravel(residual)[:, None] / _pressures(problem, random)
     if factor is not None:
-        residual = np.ravel(residual)[:, None] / factor.distribution.ppf(
-            _equally_likely(PRESSURES)
-        )
-    return float(np.mean(strength.marginal.distribution.cdf(residual)))
+        residual = np.ravel(residual)[:, None] / _equally_likely(factor.distribution, PRESSURES)
+    return float(np.mean(fields["strength"].marginal.distribution.cdf(residual)))
 
 
 def check_residual(problem: Problem, random: RandomInterface) -> None:
@@ -109,11 +108,6 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
     A node whose strength does not exceed its residual strength does not weaken. A few of
     those can be meant: an `AccuracyWarning` gives a share above one in a million. If they
     are the rule, above a half, the interface does not weaken at all: an `InputError`.
-
-    Parameters
-    ----------
-    problem : Problem
-    random : RandomInterface
     """
     share = share_below_residual(problem, random)
     if share <= WORTH_SAYING:

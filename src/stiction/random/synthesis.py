@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.jit import jit
+from stiction.random.modes import Modes
 
 BLOCK = 256
 
@@ -24,29 +25,20 @@ def block_of(dimensions: int) -> int:
 
 def standard_normal(
     seed: int,
+    stream: int,
+    first: int,
     samples: int,
     ranks: NDArray[np.int64],
-    *,
-    first: int = 0,
-    stream: int = 0,
-    mean_mode: bool = False,
+    mean_mode: bool,
     block: int = BLOCK,
 ) -> Array:
-    """Draw samples number `first`, `first` + 1, ...
-
-    Parameters
-    ----------
-    seed, samples, first, stream : int
-    ranks : (modes,) array
-        Which modes, rising: those of rank 1, 2, ... where none is left out.
-    mean_mode : bool
-    block : int
-        Samples that share a generator.
+    """Draw samples number `first`, `first` + 1, ..., of a stream of a seed.
 
     Returns
     -------
     (samples, dimension) array
-        A, B of one mode after the other, with A_0 in front if `mean_mode`.
+        A, B of one mode after the other, of those of the given `ranks` (rising), with A_0 in
+        front if `mean_mode`. `block` samples share a generator.
     """
     modes = int(ranks[-1]) if ranks.size else 0
     kept: slice | NDArray[np.int64] = slice(2, None)
@@ -61,9 +53,7 @@ def standard_normal(
         place = (stream, number) if block == BLOCK else (stream, number, block)
         key = np.random.SeedSequence(entropy=seed, spawn_key=place)
         generator = np.random.Generator(np.random.PCG64DXSM(key))
-        rows = generator.standard_normal(
-            (2 * (modes + 1), block)
-        )  # A_j, B_j of modes 0, 1, ...
+        rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of all modes
         draws[done : done + count] = rows[kept, offset : offset + count].T
         done += count
     return draws
@@ -110,24 +100,17 @@ def _synthesise(
                     out[i, p, q] = field[p, q]
 
 
-def gaussian(
-    draws: Array,
-    sigma: Array,
-    numbers: NDArray[np.int64],
-    has_mean: bool,
-    shape: tuple[int, ...],
-) -> Array:
+def gaussian(draws: Array, modes: Modes, has_mean: bool, shape: tuple[int, ...]) -> Array:
     """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
 
-    One inverse transform a sample, so that the numbers do not depend on the batch. `draws`
-    are (samples, dimension), `sigma` and `numbers` those of `Modes`.
+    One inverse transform a sample, so that the numbers do not depend on the batch.
     """
-    z = np.empty((draws.shape[0], *shape))
+    numbers = modes.numbers
     if len(shape) == 1:
         numbers = np.concatenate([np.zeros_like(numbers), numbers])
-    out = z.reshape(z.shape[0], math.prod(shape[:-1]), shape[-1])
-    _synthesise(draws, sigma, numbers, has_mean, out)
-    return z
+    out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
+    _synthesise(draws, modes.sigma, numbers, has_mean, out)
+    return out.reshape(-1, *shape)
 
 
 @jit
