@@ -1,16 +1,15 @@
 """Marginal distributions: how strength is distributed at a point.
 
 In the families that are given by mean and coefficient of variation, `mean` is the mean of
-the field and `cv` its standard deviation over its mean, whatever the bound `low`. scipy's
-own parameters (shapes, loc, scale) follow from them. To add a family, write one class with
-a `distribution` and add it to `MARGINALS`.
+the field and `cv` its standard deviation over its mean, whatever the bound `low`. To add a
+family, write one class with a `distribution` and add it to `MARGINALS`.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 import scipy.stats
@@ -55,11 +54,6 @@ class Beta(Marginal):
     low, high : float
         Bounds, Pa, low < high.
 
-    Raises
-    ------
-    InputError
-        If a shape is not positive or the bounds are not in order.
-
     Examples
     --------
     >>> import stiction as st
@@ -96,14 +90,15 @@ class Beta(Marginal):
 
 @model(kw_only=True)
 class _ByMoments(Marginal):
-    """Families above a lower bound, known by mean and coefficient of variation."""
+    """Families above a lower bound, given by mean and coefficient of variation."""
 
     mean: Positive
     cv: Positive
     low: Real = 0.0
+    family: ClassVar[Any] = None
 
     @model_validator(mode="after")
-    def _mean_above_low(self) -> Self:
+    def _has_a_distribution(self) -> Self:
         if not self.mean > self.low:
             raise InputError(
                 f"mean must be above low, got mean={self.mean:g}, low={self.low:g}"
@@ -124,6 +119,15 @@ class _ByMoments(Marginal):
     def _ratio(self) -> float:
         """Standard deviation over the mean above the lower bound."""
         return self.cv * self.mean / self._excess
+
+    def _shape(self, ratio: float) -> tuple[float, float]:
+        """Shape of the family, and mean above `low` over scale, that have this ratio."""
+        raise NotImplementedError
+
+    @cached_property
+    def distribution(self) -> Any:
+        shape, mean_over_scale = self._shape(self._ratio)
+        return self.family(shape, self.low, self._excess / mean_over_scale)
 
     @property
     def affine(self) -> tuple[str, ...]:
@@ -153,63 +157,45 @@ class Lognormal(_ByMoments):
     """
 
     type: Literal["lognormal"] = "lognormal"
+    family: ClassVar[Any] = scipy.stats.lognorm
 
-    @cached_property
-    def distribution(self) -> Any:
-        shape = math.sqrt(math.log1p(self._ratio**2))
-        scale = self._excess / math.sqrt(1.0 + self._ratio**2)
-        return scipy.stats.lognorm(shape, self.low, scale)
+    def _shape(self, ratio: float) -> tuple[float, float]:
+        return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
 
 
 @model(kw_only=True)
 class Weibull(_ByMoments):
-    """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> round(st.Weibull(mean=1e6, cv=0.1).distribution.args[0], 2)  # shape
-    12.15
-    """
+    """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`."""
 
     type: Literal["weibull"] = "weibull"
+    family: ClassVar[Any] = scipy.stats.weibull_min
 
-    @cached_property
-    def distribution(self) -> Any:
-        if not 1e-3 < self._ratio < 10.0:
+    def _shape(self, ratio: float) -> tuple[float, float]:
+        if not 1e-3 < ratio < 10.0:
             raise InputError(
                 "cv: the standard deviation over the mean above low must lie between 0.001 and"
-                f" 10, got {self._ratio:g}"
+                f" 10, got {ratio:g}"
             )
 
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)
             spread = gammaln(1.0 + 2.0 * inverse) - 2.0 * gammaln(1.0 + inverse)
-            return float(math.expm1(spread)) - self._ratio**2
+            return float(math.expm1(spread)) - ratio**2
 
         # The ratio falls from 10 to 0.001 as the shape rises from 0.2 to 1300.
         shape = math.exp(brentq(excess, math.log(0.15), math.log(2e3), xtol=1e-14))
-        scale = self._excess / math.exp(gammaln(1.0 + 1.0 / shape))
-        return scipy.stats.weibull_min(shape, self.low, scale)
+        return shape, math.exp(gammaln(1.0 + 1.0 / shape))
 
 
 @model(kw_only=True)
 class Gamma(_ByMoments):
-    """Gamma distribution above `low`; parameters as for `Lognormal`.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> round(st.Gamma(mean=1e6, cv=0.5).distribution.args[0], 2)  # shape
-    4.0
-    """
+    """Gamma distribution above `low`; parameters as for `Lognormal`."""
 
     type: Literal["gamma"] = "gamma"
+    family: ClassVar[Any] = scipy.stats.gamma
 
-    @cached_property
-    def distribution(self) -> Any:
-        shape = self._ratio**-2
-        return scipy.stats.gamma(shape, self.low, self._excess / shape)
+    def _shape(self, ratio: float) -> tuple[float, float]:
+        return ratio**-2, ratio**-2
 
 
 @model(kw_only=True)
@@ -228,8 +214,8 @@ class TruncatedNormal(_ByMoments):
     Raises
     ------
     InputError
-        If the bounds are not in order, or no cut normal distribution has these moments: it is
-        less scattered than an exponential, between two bounds than a uniform, distribution.
+        If no cut normal distribution has these moments: it scatters less than an exponential,
+        between two bounds less than a uniform, distribution.
 
     Examples
     --------
@@ -295,6 +281,14 @@ class ScipyMarginal(Marginal):
     parameters: tuple[tuple[str, float], ...] = ()
     frozen: Any = None
 
+    def __post_init__(self) -> None:
+        mean, deviation = self.distribution.mean(), self.distribution.std()
+        if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
+            raise InputError(
+                f"{self.type}: must have a finite mean and a positive, finite standard deviation,"
+                f" got {mean:g} and {deviation:g} from {dict(self.parameters)}"
+            )
+
     @cached_property
     def distribution(self) -> Any:
         return self.frozen or getattr(scipy.stats, self.type)(**dict(self.parameters))
@@ -305,8 +299,8 @@ class ScipyMarginal(Marginal):
 
     @property
     def location_and_scale(self) -> tuple[float, float]:
-        own = dict(self.parameters)
-        return own.get("loc", 0.0), own.get("scale", 1.0)
+        own = {"loc": 0.0, "scale": 1.0} | dict(self.parameters)
+        return own["loc"], own["scale"]
 
     def plain(self) -> dict[str, Any]:
         """Return what a study file holds."""
@@ -326,10 +320,7 @@ MARGINALS: dict[str, Any] = {
 def marginal_of(value: Any) -> Marginal:
     """Return the marginal of one, of a table {type, ...}, or of a frozen scipy.stats distribution.
 
-    Raises
-    ------
-    InputError
-        If it is none of them, or its mean or standard deviation is not finite.
+    An `InputError` if it is none of them, or its mean or standard deviation is not finite.
     """
     if isinstance(value, Marginal):
         return value
@@ -348,9 +339,9 @@ def marginal_of(value: Any) -> Marginal:
         )
     name = str(getattr(family, "name", None))
     if type(family) is not type(getattr(scipy.stats, name, None)):  # a histogram, say
-        return _with_moments(ScipyMarginal(type(family).__name__, frozen=value))
-    given = dict(zip(_parameter_names(family), value.args, strict=False)) | value.kwds
-    return _of_scipy(name, given)
+        return ScipyMarginal(type(family).__name__, frozen=value)
+    given = zip(_parameter_names(family), value.args, strict=False)
+    return _of_scipy(name, dict(given) | value.kwds)
 
 
 def _parameter_names(family: Any) -> list[str]:
@@ -373,18 +364,7 @@ def _of_scipy(name: str, parameters: Mapping[str, Any]) -> Marginal:
     ]
     if problems:
         raise InputError(problems)
-    given = tuple((key, float(value)) for key, value in parameters.items())
-    return _with_moments(ScipyMarginal(name, given))
-
-
-def _with_moments(marginal: ScipyMarginal) -> Marginal:
-    mean, deviation = marginal.distribution.mean(), marginal.distribution.std()
-    if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
-        raise InputError(
-            f"{marginal.type}: must have a finite mean and a positive, finite standard deviation,"
-            f" got {mean:g} and {deviation:g} from {dict(marginal.parameters)}"
-        )
-    return marginal
+    return ScipyMarginal(name, tuple((key, float(one)) for key, one in parameters.items()))
 
 
 _ALSO = "the name of a continuous scipy.stats distribution with its shapes, loc and scale"

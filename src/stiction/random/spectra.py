@@ -3,9 +3,9 @@
 On a plane the field is isotropic, and a line cut through it has the correlation of the
 field on a line. That fixes the density in D dimensions as a function of the length of the
 wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
-added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the
-truncated spectrum, so correlations and lengths are of that. To add a spectrum, write one
-class and add it to `SPECTRA`.
+added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the truncated
+spectrum, so correlations and lengths are of that. To add a spectrum, write one class and
+add it to `SPECTRA`.
 """
 
 from __future__ import annotations
@@ -78,23 +78,14 @@ class SpectralDensity:
         share = self.default_power if self.power_kept is None else self.power_kept
         return self.quantile(share, dimensions)
 
-    def density_at(self, wavenumber: float) -> float:
-        """Return the density on a line at one wavenumber, rad/m, up to a factor."""
-        return float(self.density(np.array([wavenumber]))[0])
-
     def correlation(self, lag: Array) -> Array:
         """Return the correlation of z at `lag` (m), truncation included, on a line."""
         edges, power = _truncated(self)
+        density = moment(self, 0)
         found = [
-            integrate(self.density_at, edges, float(one), power).sum()
-            for one in np.abs(np.ravel(lag))
+            integrate(density, edges, float(one), power).sum() for one in np.abs(np.ravel(lag))
         ]
         return np.reshape(found, np.shape(lag)) / power
-
-    @property
-    def power_kept_by_truncation(self) -> float:
-        """Share of the power that truncation keeps, on a line."""
-        return self.power_within(self.cutoff())
 
     @property
     def efolding_length(self) -> float:
@@ -128,14 +119,14 @@ def integrate(
 
 def moment(spectrum: SpectralDensity, order: int) -> Callable[[float], float]:
     """Return the density on a line times a power of the wavenumber, as a function of that."""
-    return lambda k: spectrum.density_at(k) * k**order
+    return lambda k: float(spectrum.density(np.array([k]))[0]) * k**order
 
 
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
     """Edges of intervals up to the cutoff, rad/m, and the power below it, up to a factor."""
     edges = spectrum._edges(spectrum.cutoff())
-    return edges, float(integrate(spectrum.density_at, edges).sum())
+    return edges, float(integrate(moment(spectrum, 0), edges).sum())
 
 
 @lru_cache(maxsize=256)
@@ -201,25 +192,22 @@ class ScaledSpectrum(SpectralDensity):
 
 
 class _PowerOfWavenumber(ScaledSpectrum):
-    """Density (1 + (k/scale)^2)^-(p + (D - 1)/2)."""
+    """Density (1 + (k/scale)^2)^-(exponent + (D - 1)/2)."""
 
-    @property
-    def _power(self) -> float:
-        """p."""
-        raise NotImplementedError
+    exponent = 1.0
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         ratio = np.asarray(wavenumber) / self.scale
-        result: Array = (1.0 + ratio * ratio) ** -(self._power + 0.5 * (dimensions - 1))
+        result: Array = (1.0 + ratio * ratio) ** -(self.exponent + 0.5 * (dimensions - 1))
         return result
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         ratio = (wavenumber / self.scale) ** 2
-        return float(betainc(0.5 * dimensions, self._power - 0.5, ratio / (1.0 + ratio)))
+        return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
         # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
-        rest = float(betaincinv(self._power - 0.5, 0.5 * dimensions, 1.0 - share))
+        rest = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - rest) / rest)
 
 
@@ -258,10 +246,6 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     def scale(self) -> float:
         """lambda = 2 pi/xi_0, rad/m: the density falls as a power law above it."""
         return 2.0 * math.pi / self.correlation_length
-
-    @property
-    def _power(self) -> float:
-        return self.exponent
 
     def cutoff(self, dimensions: int = 1) -> float:
         if self.truncation is None and self.power_kept is None:
@@ -332,7 +316,6 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     type: Literal["exponential"] = "exponential"
 
     default_power: ClassVar[float] = 0.99
-    _power: ClassVar[float] = 1.0
 
     def untruncated_correlation(self, lag: Array) -> Array:
         result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
@@ -367,15 +350,10 @@ class CustomSpectrum(SpectralDensity):
         Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than
         a tenth of an octave needs its two ends here, or it may be missed.
 
-    Raises
-    ------
-    InputError
-        If the function is not a density, or its integral does not settle.
-
     Notes
     -----
-    For Python only: a study with a function of your own cannot be written to a file.
-    Integrals are by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
+    For Python only: a study with a function of your own cannot be written to a file. The function
+    is integrated by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
     """
 
     function: Annotated[
@@ -450,13 +428,7 @@ SPECTRA: dict[str, Any] = {
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return the spectrum of one, of a table {type, ...}, or of a function g(k).
-
-    Raises
-    ------
-    InputError
-        If it is none of them.
-    """
+    """Return the spectrum of one, of a table {type, ...}, or of a function g(k)."""
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):
