@@ -53,10 +53,10 @@ class Sample(NamedTuple):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); views of what was given, not to be
-        written to. Without the first axis for `one` sample. Strength may be infinite for methods
-        that accept barriers. Where it was given at or below the residual strength, both are equal:
-        strength is constant, whatever W.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Without the
+        first axis for `one` sample. Strength may be infinite for methods that accept barriers.
+        Where it was given at or below the residual strength, both are equal: strength is
+        constant, whatever W.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
@@ -143,8 +143,8 @@ class Problem:
     Raises
     ------
     InputError
-        If an array does not have one entry for each node, the nucleation length spans fewer than
-        four nodes, or an interface of two dimensions is given plane stress or mode III.
+        Naming all that does not fit, such as arrays of another shape than the interface, or fewer
+        than four nodes in the nucleation length.
 
     Examples
     --------
@@ -166,8 +166,7 @@ class Problem:
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
-        self._place_profiles()
-        problems = self._wrong_shapes()
+        problems = self._place_profiles()
         if isinstance(self.load.profile, LoadShape):
             self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
@@ -190,12 +189,19 @@ class Problem:
             self._warn_if_short(float(np.median(rate)))
         return self
 
-    def _place_profiles(self) -> None:
-        """Put profiles with coordinates of their own on the nodes."""
+    def _place_profiles(self) -> list[str]:
+        """Put profiles with coordinates of their own on the nodes; return what does not fit."""
         problems: list[str] = []
+        shape = self.interface.shape
+        nodes = " x ".join(map(str, shape))
         for part in ("friction", "load"):
             owner, placed = getattr(self, part), {}
             for name, value in vars(owner).items():
+                if isinstance(value, np.ndarray) and value.shape != shape:
+                    problems.append(
+                        f"{part}.{name}: must have one entry for each of the {nodes} nodes, got"
+                        f" {describe(value)}{turned(value.shape, shape)}"
+                    )
                 if is_unplaced(value):
                     try:
                         placed[name] = on_nodes(f"{part}.{name}", value, self.interface)
@@ -203,19 +209,7 @@ class Problem:
                         problems += error.problems
             if placed and not problems:  # frozen for others; validation is not over yet
                 object.__setattr__(self, part, dataclasses.replace(owner, **placed))
-        if problems:
-            raise InputError(problems)
-
-    def _wrong_shapes(self) -> list[str]:
-        shape = self.interface.shape
-        nodes = " x ".join(map(str, shape))
-        return [
-            f"{part}.{name}: must have one entry for each of the {nodes} nodes, got"
-            f" {describe(value)}{turned(value.shape, shape)}"
-            for part in ("friction", "load")
-            for name, value in vars(getattr(self, part)).items()
-            if isinstance(value, np.ndarray) and value.shape != shape
-        ]
+        return problems
 
     def _warn_if_short(self, rate: float) -> None:
         patch, length = self.nucleation_lengths(rate)[0], min(self.interface.lengths)
@@ -246,7 +240,8 @@ class Problem:
     @property
     def load_profile(self) -> Any:
         """p of the load: a number, or at the nodes, (*shape)."""
-        return self.load.profile_on(self.interface)
+        profile = self.load.profile
+        return profile.on(self.interface) if isinstance(profile, LoadShape) else profile
 
     @property
     def effective_modulus(self) -> float:
@@ -261,13 +256,9 @@ class Problem:
 
     @property
     def nucleation_length(self) -> float:
-        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
+        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
 
-        Raises
-        ------
-        InputError
-            If the weakening rate varies along the interface or follows from `critical_slip` or
-            `fracture_energy`.
+        An `InputError` if the rate varies along the interface or follows from other parameters.
         """
         if self.uniform_rate is None:
             raise InputError(
@@ -321,30 +312,25 @@ class Problem:
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
-        """What differs between samples, validated, with the problem's own for all the rest.
+        """Return what differs between samples, validated, and the problem's own for all the rest.
 
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
             Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by name:
-            'strength', and any of 'residual_strength', 'initial_stress', 'normal_pressure' (Pa)
-            and one of 'weakening_rate' (Pa/m), 'critical_slip' (m) and 'fracture_energy' (J/m²),
-            which may also be (samples, 1) or a number and replace the problem's own.
+            'strength', and any others of `PROFILES`, of 'weakening_rate', 'critical_slip' and
+            'fracture_energy' one. They may also be (samples, 1) or a number and replace the
+            problem's own.
         accept : collection of {"barriers", "overstress", "constant"}
             What the method at hand can do besides: infinite strength where nothing breaks; an
             initial stress above the strength. "constant": the caller has warned of nodes that do
             not weaken.
 
-        Returns
-        -------
-        Sample
-
         Raises
         ------
         InputError
             Naming all that is wrong: names, shapes, values that are not finite, strength not above
-            the initial stress, or nowhere above the residual strength, a weakening rate that is
-            not positive.
+            the initial stress, or nowhere above the residual strength.
 
         Notes
         -----

@@ -22,8 +22,7 @@ from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity
 from stiction.plot.style import PAGE, new_figure, panel, paper_style
 from stiction.results import DIRECTION
-from stiction.statistics.estimates import mean, standard_deviation
-from stiction.statistics.order_statistics import quantiles
+from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.run import StoredRun
 
 MOST_ROWS = 200

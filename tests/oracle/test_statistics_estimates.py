@@ -6,8 +6,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.statistics.densities import density
-from stiction.statistics.estimates import Estimate, mean, standard_deviation
-from stiction.statistics.order_statistics import quantiles
+from stiction.statistics.estimates import Estimate, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
 

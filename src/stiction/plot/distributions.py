@@ -12,7 +12,7 @@ from stiction.plot.axes import named, need, on_axes, scaled, shown_quantity
 from stiction.plot.style import color, series
 from stiction.results import DIRECTION
 from stiction.statistics.densities import density
-from stiction.statistics.order_statistics import quantiles as estimate_quantiles
+from stiction.statistics.estimates import quantiles as estimate_quantiles
 
 CURVES = 6
 FEWEST = 20

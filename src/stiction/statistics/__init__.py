@@ -5,8 +5,8 @@ from typing import Any
 
 _HOMES = {
     "density": "stiction.statistics.densities",
-    "quantiles": "stiction.statistics.order_statistics",
-    "combined_mean": "stiction.statistics.control_variates",
+    "quantiles": "stiction.statistics.estimates",
+    "combined_mean": "stiction.statistics.estimates",
     "misfit": "stiction.dynamics.misfit",
 }
 

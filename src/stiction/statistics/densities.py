@@ -55,16 +55,6 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
         Lower and upper bound of the distribution where it has them, in the unit of the
         values: for strength those of its marginal.
 
-    Returns
-    -------
-    Density
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 16 values, one is not finite or beyond the bounds, or all
-        are equal.
-
     Notes
     -----
     Diffusion estimator of Botev, Grotowski and Kroese (2010): the histogram on a fine grid
@@ -73,11 +63,10 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     fixed-point equation (14) without reference to a normal distribution.
 
     A density that vanishes at a bound would be made positive there. So the share of values
-    within a distance d of a bound is first fitted by d^b, with b from the logarithms of the
-    smallest distances (Hill, 1975). If b is significantly above 1, the estimate is that of
-    the values mapped by the beta distribution function with these exponents, for which the
-    density of the mapped values neither vanishes nor has a slope. Where there is no bound
-    the grid reaches beyond the sample.
+    within a distance d of a bound is first fitted by d^b (Hill, 1975). If b is significantly
+    above 1, the estimate is that of the values mapped by the beta distribution function with
+    these exponents, for which the density of the mapped values neither vanishes nor has a
+    slope. Where there is no bound the grid reaches beyond the sample.
 
     Examples
     --------
@@ -97,7 +86,7 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     mapped = betainc(*shape, np.clip((sample - low) / width, 0.0, 1.0))
     counts = np.bincount(np.minimum((mapped * CELLS).astype(int), CELLS - 1), minlength=CELLS)
     cosine = scipy.fft.dct(counts / sample.size, type=2)  # a_k, k = 0..cells-1
-    time = _diffusion_time(cosine, float(sample.size), CELLS)
+    time = _diffusion_time(cosine, float(sample.size))
     k = np.arange(CELLS)
     smooth = scipy.fft.idct(cosine * np.exp(-0.5 * (k * math.pi) ** 2 * time), type=2)
     # Where the bandwidth is down to a cell the cosine series rings below zero.
@@ -106,17 +95,11 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     below = np.interp(betainc(*shape, edges), edges, cumulative / cumulative[-1])
     middles = 0.5 * (edges[1:] + edges[:-1])
     stretch = beta.pdf(middles, *shape) / width  # of the mapped values
-    value = np.diff(below) * (CELLS / width)
-    bandwidth = math.sqrt(time)
+    value, bandwidth = np.diff(below) * (CELLS / width), math.sqrt(time)
     # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
     error = np.sqrt(value * stretch / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
-    middle = (float(np.median(sample)) - low) / width
-    return Density(
-        x=low + middles * width,
-        value=value,
-        error=error,
-        bandwidth=bandwidth * width / float(beta.pdf(middle, *shape)),
-    )
+    at_median = float(beta.pdf((float(np.median(sample)) - low) / width, *shape))
+    return Density(low + middles * width, value, error, bandwidth * width / at_median)
 
 
 def _exponent(distances: Array) -> float:
@@ -145,12 +128,11 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
 
 
-def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
+def _diffusion_time(cosine: Array, n: float) -> float:
     """Return the squared bandwidth on the unit interval (Botev et al., 2010, Algorithm 1)."""
-    squares = (np.arange(1, cells) ** 2).astype(np.float64)
-    power = (0.5 * cosine[1:]) ** 2
+    squares = (np.arange(1, CELLS) ** 2).astype(np.float64)
     log_squares = np.log(squares)
-    log_power = np.log(np.maximum(power, 1e-300))
+    log_power = np.log(np.maximum((0.5 * cosine[1:]) ** 2, 1e-300))
 
     def functional(order: int, time: float) -> float:
         exponent = order * log_squares + log_power - squares * math.pi**2 * time
@@ -167,10 +149,9 @@ def _diffusion_time(cosine: Array, n: float, cells: int) -> float:
         return time - (2.0 * n * math.sqrt(math.pi) * max(f, 1e-300)) ** -0.4
 
     # Below a cell's width the grid, not the sample, would be resolved.
-    finest, coarsest = (0.5 / cells) ** 2, 0.1
-    if excess(finest) >= 0.0:
-        return finest
-    times = np.geomspace(finest, coarsest, 60)
+    times = np.geomspace((0.5 / CELLS) ** 2, 0.1, 60)
+    if excess((0.5 / CELLS) ** 2) >= 0.0:
+        return (0.5 / CELLS) ** 2
     for left, right in pairwise(times):
         if excess(float(right)) > 0.0:  # the smallest root is the one that is meant
             root: float = brentq(excess, float(left), float(right), rtol=1e-6)

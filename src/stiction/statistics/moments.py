@@ -57,10 +57,6 @@ def nucleation_statistics(
     weights : {"exact", "rounded"}
         As in `nucleation_stress`.
 
-    Returns
-    -------
-    NucleationStatistics
-
     Raises
     ------
     InputError
@@ -73,10 +69,9 @@ def nucleation_statistics(
     the least over several shapes, which that takes, has no moments in closed form.
 
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the
-    double integral of the correlation of tau_p against the weights, on a periodic interface
-    the sum over wave vectors of the spectrum of tau_p times the squared transform of the
-    weight. The correlation is that of tau_p itself, by Hermite expansion (Grigoriu, 1995),
-    not that of the Gaussian field.
+    double integral of the correlation of tau_p (by Hermite expansion; Grigoriu, 1995) against
+    the weights, on a periodic interface the sum over wave vectors of the spectrum of tau_p
+    times the squared transform of the weight.
 
     Examples
     --------
@@ -118,31 +113,26 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     nucleation stress is not stationary.
     """
     check_law(problem)
-    sampled = (
-        "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
-    )
-    problems = [
-        f"load.{name}: varies along the interface, {sampled}"
-        for name, value in (
-            ("profile", problem.load_profile),
-            ("initial_stress", problem.load.initial_stress),
-        )
-        if np.ptp(value) > 0.0
-    ]
-    if strength.conditions is not None:
-        problems.append(f"strength: was measured in places, {sampled}")
-    if problem.uniform_rate is None:
-        problems.append(
-            f"friction.weakening_rate: varies or follows from the strength, {sampled}"
-        )
+    load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
+    varying = {
+        "load.profile: varies along the interface": np.ptp(load) > 0.0,
+        "load.initial_stress: varies along the interface": np.ptp(initial) > 0.0,
+        "load.normal_pressure: varies and strength is in coefficients": (
+            pressure is not None and np.ptp(pressure) > 0.0
+        ),
+        "strength: was measured in places": strength.conditions is not None,
+        "friction.weakening_rate: varies or follows from the strength": (
+            problem.uniform_rate is None
+        ),
+    }
+    problems = [
+        f"{what}, so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
+        for what, varies in varying.items()
+        if varies
+    ]
     if pressure is None:
         problems.append("load.normal_pressure: is missing, and strength is in coefficients")
-    elif np.ptp(pressure) > 0.0:
-        problems.append(
-            f"load.normal_pressure: varies and strength is in coefficients, {sampled}"
-        )
     if problems:
         raise InputError(problems)
-    load, initial = problem.load_profile, problem.load.initial_stress
     return float(np.max(pressure)), float(np.max(load)), float(np.max(initial))

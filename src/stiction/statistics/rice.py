@@ -53,12 +53,10 @@ class RiceDistribution:
         Sampling error of the crossing rate, one over the root of the crossings seen.
     trusted : (m,) array of bool
         Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
-        or dips were seen, and on a line `1 - point_survival` is at most 4 % of P: a profile
-        that is below the level at its start is counted for that and for the crossing that
-        brought it there, so P is too high by up to (1 - point_survival)/P where xi_0 is not
-        short against the interface. On a plane there are at most 1.1 dips for each sample
-        that has any: dips that come together make P too high by as much. Above P = 0.1 P is
-        too low, on a line by 4 to 9 % at the median.
+        or dips were seen, and on a line `1 - point_survival` is at most 4 % of P, since P is too
+        high by up to (1 - point_survival)/P where xi_0 is not short against the interface. On a
+        plane there are at most 1.1 dips for each sample that has any. Above P = 0.1 P is too
+        low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
@@ -85,13 +83,9 @@ class RiceDistribution:
         """Return the stress at which P(tau_cr <= stress) reaches `probability`, Pa."""
         if not 0.0 < probability < 1.0:
             raise InputError(f"probability: must be between 0 and 1, got {probability!r}")
-        return float(np.interp(probability, *self._rising))
-
-    @property
-    def _rising(self) -> tuple[Array, Array]:
-        """Probabilities without repetition, each with the highest stress that has it."""
+        # Probabilities without repetition, each with the highest stress that has it.
         chance, last = np.unique(self.probability[::-1], return_index=True)
-        return chance, self.stress[::-1][last]
+        return float(np.interp(probability, chance, self.stress[::-1][last]))
 
 
 @checked
@@ -131,12 +125,6 @@ def rice_distribution(
     -------
     RiceDistribution
         Its `trusted` says where the approximation holds.
-
-    Raises
-    ------
-    InputError
-        If the problem has no nucleation stress, its load is not uniform, the profiles are
-        few or the levels do not rise.
 
     Examples
     --------
