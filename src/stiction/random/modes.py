@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.random.synthesis import synthesise
 
 MOST_MODES = 1 << 22
 HAIR = 1.0 + 1e-12
@@ -53,6 +54,18 @@ class Modes:
         """Return the share of the variance at wavelengths that the nodes do not resolve."""
         limit = np.array(interface.shape)[:, None] // 2
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
+
+    def gaussian(self, draws: Array, has_mean: bool, shape: tuple[int, ...]) -> Array:
+        """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
+
+        One inverse transform a sample, so that the numbers do not depend on the batch.
+        """
+        numbers = self.numbers
+        if len(shape) == 1:
+            numbers = np.concatenate([np.zeros_like(numbers), numbers])
+        out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
+        synthesise(draws, self.sigma, numbers, has_mean, out)
+        return out.reshape(-1, *shape)
 
 
 def make_modes(

@@ -21,7 +21,7 @@ from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
-from stiction.random.synthesis import block_of, gaussian, standard_normal
+from stiction.random.synthesis import block_of, standard_normal
 
 ENOUGH_ACCOUNTED = 0.01
 FEWEST_LENGTHS = 8.0 * math.pi
@@ -136,7 +136,7 @@ class RandomField:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        return gaussian(draws, modes, self.mean_mode, interface.shape)
+        return modes.gaussian(draws, self.mean_mode, interface.shape)
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
         """Map draws, (samples, dimension) in the order of `draws`, to profiles.

@@ -6,14 +6,11 @@ that a spectrum with more modes extends the same field. A sample of a plane has 
 modes that it has a generator, a block of its own.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.jit import jit
-from stiction.random.modes import Modes
 
 BLOCK = 256
 
@@ -60,7 +57,7 @@ def standard_normal(
 
 
 @jit
-def _synthesise(
+def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
     """Fill `out`, (samples, rows, columns); a line is a plane of one row.
@@ -98,19 +95,6 @@ def _synthesise(
             for p in range(rows):
                 for q in range(columns):
                     out[i, p, q] = field[p, q]
-
-
-def gaussian(draws: Array, modes: Modes, has_mean: bool, shape: tuple[int, ...]) -> Array:
-    """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), shape (samples, *shape).
-
-    One inverse transform a sample, so that the numbers do not depend on the batch.
-    """
-    numbers = modes.numbers
-    if len(shape) == 1:
-        numbers = np.concatenate([np.zeros_like(numbers), numbers])
-    out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
-    _synthesise(draws, modes.sigma, numbers, has_mean, out)
-    return out.reshape(-1, *shape)
 
 
 @jit
