@@ -32,17 +32,15 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
 
 
 def _length(value: Any) -> float:
-    length = _number(value)
-    if not 0.0 < length < math.inf:
+    if not 0.0 < _number(value) < math.inf:
         raise ValueError("must be positive and finite")
-    return length
+    return _number(value)
 
 
 def _node_count(value: Any) -> int:
-    count = _count(value)
-    if count < FEWEST or count % 2:
+    if _count(value) < FEWEST or _count(value) % 2:
         raise ValueError(f"must be even and at least {FEWEST}")
-    return count
+    return _count(value)
 
 
 def _schema(kind: str) -> WithJsonSchema:
@@ -68,12 +66,6 @@ class Interface:
     nodes : int or (int, int)
         Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
         are fastest.
-
-    Raises
-    ------
-    InputError
-        If a length is not positive, a number of nodes is odd or out of range, or one of the two
-        says line and the other plane.
 
     Examples
     --------
@@ -177,20 +169,16 @@ class Interface:
         They broadcast against each other to the shape of a transformed profile: (n//2 + 1,) on a
         line; (nx, 1) and (1, ny//2 + 1) on a plane.
         """
-        unit = [2.0 * np.pi / length for length in self.lengths]
-        last = unit[-1] * np.arange(self.shape[-1] // 2 + 1)
-        if not self.is_plane:
-            return (last,)
+        *first, last = (2.0 * np.pi / length for length in self.lengths)
+        along = last * np.arange(self.shape[-1] // 2 + 1)
+        if not first:
+            return (along,)
         n = self.shape[0]
-        first = unit[0] * ((np.arange(n) + n // 2) % n - n // 2)
-        return first[:, None], last[None, :]
+        return (first[0] * ((np.arange(n) + n // 2) % n - n // 2))[:, None], along[None, :]
 
     @property
     def wavenumbers(self) -> Array:
-        """Absolute values of the wave vectors of `transform`, rad/m.
-
-        Shape (n//2 + 1,) on a line and (nx, ny//2 + 1) on a plane.
-        """
+        """Absolute values of the wave vectors, rad/m: (n//2 + 1,) or (nx, ny//2 + 1)."""
         vectors = self.wave_vectors
         return vectors[0] if len(vectors) == 1 else np.hypot(*vectors)
 
@@ -202,7 +190,7 @@ class Interface:
         """
         if not self.is_plane:
             return None
-        k = self.wavenumbers.copy()
+        k = self.wavenumbers
         k[0, 0] = 1.0
         share: Array = (self.wave_vectors[0] / k) ** 2
         share[0, 0] = 1.0

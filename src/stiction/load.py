@@ -5,7 +5,6 @@ A load of your own is a class that derives from `LoadShape`, as `GradientLoad` a
 
 from __future__ import annotations
 
-import dataclasses
 from abc import ABC, abstractmethod
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
@@ -23,6 +22,7 @@ from stiction.model import (
     Real,
     is_unplaced,
     model,
+    to_plain,
 )
 
 Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
@@ -128,21 +128,18 @@ class EdgeLoad(LoadShape):
         return 1.0 + self.excess * np.exp(-distance(interface, self.edge) / self.decay)
 
 
-def _shape(value: Any, handler: Any) -> Any:
+def _read(value: Any, handler: Any) -> Any:
     if isinstance(value, LoadShape):
         return value
-    if isinstance(value, dict) and "type" in value:
-        kind = value["type"]
-        if kind not in SHAPES:
-            raise InputError(unknown_name("type", str(kind), SHAPES))
-        return SHAPES[kind](**value)
-    return handler(value)
+    if not isinstance(value, dict) or "type" not in value:
+        return handler(value)
+    if value["type"] not in SHAPES:
+        raise InputError(unknown_name("type", str(value["type"]), SHAPES))
+    return SHAPES[value["type"]](**value)
 
 
 def _written(value: Any, handler: Any) -> Any:
-    if not isinstance(value, LoadShape):
-        return handler(value)
-    return dataclasses.asdict(value)  # type: ignore[call-overload]  # shapes are models
+    return to_plain(value) if isinstance(value, LoadShape) else handler(value)
 
 
 _SCHEMA = {
@@ -153,7 +150,7 @@ _SCHEMA = {
 }
 LoadProfile: TypeAlias = Annotated[
     Profile,
-    WrapValidator(_shape),
+    WrapValidator(_read),
     WrapSerializer(_written),
     WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, _SCHEMA]}),
 ]
@@ -172,11 +169,6 @@ class Load:
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. With it every onset has a `friction_coefficient`.
 
-    Raises
-    ------
-    InputError
-        If the profile is not positive or the pressure not positive on average.
-
     Examples
     --------
     >>> import stiction as st
@@ -190,23 +182,13 @@ class Load:
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         profile, pressure, problems = self.profile, self.normal_pressure, []
-        if (
-            not isinstance(profile, LoadShape)
-            and not is_unplaced(profile)
-            and np.min(profile) <= 0
-        ):
+        formula = isinstance(profile, LoadShape) or is_unplaced(profile)
+        if not formula and np.min(profile) <= 0.0:
             problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
-        if pressure is not None and not is_unplaced(pressure) and np.mean(pressure) <= 0.0:
-            mean = np.mean(pressure)
+        if not (pressure is None or is_unplaced(pressure)) and np.mean(pressure) <= 0.0:
             problems.append(
-                f"normal_pressure must be positive on average, its mean is {mean:g}"
+                f"normal_pressure must be positive on average, its mean is {np.mean(pressure):g}"
             )
         if problems:
             raise InputError(problems)
         return self
-
-    def profile_on(self, interface: Interface) -> Any:
-        """p as a number, or at the nodes."""
-        return (
-            self.profile.on(interface) if isinstance(self.profile, LoadShape) else self.profile
-        )

@@ -25,10 +25,6 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
     plane : {"stress", "strain"}
         The paper says plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu), which
         belongs to plane strain; ``plane="strain"`` gives the printed value.
-
-    Returns
-    -------
-    Problem
     """
     return Problem(
         solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
@@ -50,16 +46,9 @@ def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField
         Its nucleation length h_n sets the scale.
     correlation_ratio : float
         xi_0/h_n, positive; xi_0 = 2 pi/lambda.
-
-    Returns
-    -------
-    RandomField
     """
+    length = correlation_ratio * problem.nucleation_length
     return RandomField(
         marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=PowerLawSpectrum(
-            correlation_length=correlation_ratio * problem.nucleation_length,
-            exponent=4.0,
-            truncation=2.5,
-        ),
+        spectrum=PowerLawSpectrum(correlation_length=length, exponent=4.0, truncation=2.5),
     )

@@ -31,11 +31,6 @@ class Solid:
     plane : {"strain", "stress"}
         Plane state of the in-plane problem (mode II); mode III does not depend on it.
 
-    Raises
-    ------
-    InputError
-        If a value is missing, not finite or out of range.
-
     Examples
     --------
     >>> import stiction as st
@@ -51,14 +46,9 @@ class Solid:
     if TYPE_CHECKING:  # with what the validator below takes besides
 
         def __init__(
-            self,
-            shear_modulus: float = ...,
-            poisson_ratio: float = ...,
-            density: float = ...,
-            plane: Literal["strain", "stress"] = ...,
-            *,
-            youngs_modulus: float = ...,
-        ) -> None: ...
+            self, shear_modulus: float = ..., poisson_ratio: float = ..., density: float = ...,
+            plane: Literal["strain", "stress"] = ..., *, youngs_modulus: float = ...,
+        ) -> None: ...  # fmt: skip
 
     @model_validator(mode="before")
     @classmethod
@@ -131,8 +121,8 @@ class Solid:
     def effective_modulus(self, mode: Mode = "II") -> float:
         """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
 
-        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress; mode III: G. In every case
-        it is 2 G (1 - c_s^2/c_d^2) for mode II (Geubelle and Rice, 1995, static limit).
+        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress, that is 2 G (1 - c_s^2/c_d^2)
+        (Geubelle and Rice, 1995, static limit). Mode III: G.
         """
         if mode not in ("II", "III"):
             raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")
