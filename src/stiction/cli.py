@@ -305,7 +305,7 @@ def _numbers(point: Any) -> dict[tuple[str, str], float]:
 
 def _methods_that_apply(experiment: Any) -> dict[str, str]:
     """Which methods take the first point, and how far the local criterion is from the exact one."""
-    from stiction.ensemble.pilot import compare, first_samples
+    from stiction.ensemble.pilot import compare
     from stiction.methods import methods
 
     local, exact, dynamic = (
@@ -320,7 +320,7 @@ def _methods_that_apply(experiment: Any) -> dict[str, str]:
         refused = method.supports(experiment.problem)
         lines[method.label] = f"does not apply: {'; '.join(refused)}" if refused else text
     if lines[local().label] == "applies":
-        found = compare(experiment.by(local()), first_samples(experiment))
+        found = compare(experiment.by(local()))
         if found is not None:
             lines[local().label] = (
                 f"{100.0 * found.bias:+.2g} % of the exact onset on average, with a scatter of"

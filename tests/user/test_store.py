@@ -372,9 +372,9 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     points = make_study(sweep=[], ensemble=keep).experiments
     spans, largest = [Span(0, 0, 20000)], 0
     for tables in solve_spans(points, spans, executor=Watching(), workers=3):
-        largest = max(largest, *(table.nbytes for table in tables), 0)
+        largest = max(largest, *(table.rows.nbytes for table in tables), 0)
     assert most <= 6  # two a worker
-    # 128 nodes and four more numbers a sample make 1056 bytes: a fair share would be 3.5 MB.
+    # 128 nodes and six more numbers a sample make 1072 bytes: a fair share would be 3.5 MB.
     assert 2**18 < largest < 1.1 * 2**20
 
 

@@ -18,9 +18,8 @@ from pydantic import BeforeValidator
 from stiction import __version__
 from stiction.arrays import one_blas_thread
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.table import Failure, Table
+from stiction.ensemble.table import Failure, Table, rows_of
 from stiction.errors import InputError, WorkerError
-from stiction.methods import Values
 from stiction.random.synthesis import BLOCK, block_of
 
 SECONDS = 0.5
@@ -73,7 +72,7 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
             " the same versions there, or end that worker"
         )
     begin = time.perf_counter()
-    solved: list[tuple[int, Values]] = []
+    parts = [rows_of(span.point, span.first, {})]
     failures: list[Failure] = []
     waiting = deque(experiment.batches(span.first, span.samples))
     while waiting:
@@ -81,7 +80,8 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
         try:
             # The number of BLAS threads changes last bits, and the kernels are the parallel part.
             with one_blas_thread():
-                solved.append((first, experiment.results(experiment.seed, first, count)))
+                values = experiment.results(experiment.seed, first, count)
+            parts.append(rows_of(span.point, first, values))
         except Exception as error:
             if count > 1:  # find out which sample it is
                 waiting.extendleft((first + i, 1) for i in reversed(range(count)))
@@ -90,16 +90,8 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
             text = str(error) if known else f"{type(error).__name__}: {error}"
             text = " / ".join(text.split("\n"))
             failures.append(Failure(span.point, first, experiment.seed, text, known))
-    names = list(solved[0][1]) if solved else []
-    numbers = [first + np.arange(len(values[names[0]])) for first, values in solved]
-    samples = np.concatenate([np.empty(0, dtype=np.int64), *numbers])
-    return Table(
-        point=np.full(samples.size, span.point),
-        sample=samples,
-        values={name: np.concatenate([values[name] for _, values in solved]) for name in names},
-        failures=tuple(failures),
-        seconds=time.perf_counter() - begin,
-    )
+    rows = np.concatenate(parts[1:] or parts)
+    return Table(rows, tuple(failures), time.perf_counter() - begin)
 
 
 def piece_size(

@@ -1,37 +1,29 @@
 """Tables of samples, in any order, gathered to one labelled dataset over sweep, sample and x."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.table import Failure, Table
+from stiction.ensemble.table import NUMBER, POINT, Failure, Table
 from stiction.model import check_memory
 from stiction.results import SAMPLE, Variable, coordinate, to_dataset
 
 FAILED = "failed_samples"
+Coordinates = dict[str, tuple[NDArray[Any], Variable]]
+"""Values and meaning by name."""
 
 
-@dataclass(frozen=True)
-class GridAxis:
-    """One axis of a sweep as a dimension of the result.
-
-    Attributes
-    ----------
-    dim : str
-        Its name.
-    size : int
-    coordinates : mapping of (values, Variable)
-        What is swept along it, by name.
-    """
+class GridAxis(NamedTuple):
+    """One axis of a sweep as a dimension of the result, and what is swept along it."""
 
     dim: str
     size: int
-    coordinates: Mapping[str, tuple[NDArray[Any], Variable]]
+    coordinates: Coordinates
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
@@ -76,56 +68,47 @@ class Gathered:
         if only is None:
             largest = max(one.sample_bytes for one in distinct(points, "problem", "method"))
             check_memory("samples", largest * len(points) * samples)
-        self.points, self.samples, self.first = points, samples, first
+        self.points, self.first, self._only = points, first, only
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
-        known = variables_in(points).items()
-        self._variables = {name: v for name, v in known if only is None or name in only}
         self._arrays: dict[str, NDArray[Any]] = {}
         self._seen: dict[str, NDArray[np.bool_]] = {}
 
     def add(self, tables: Sequence[Table]) -> None:
-        """Put the rows of tables in their places."""
+        """Put the rows of tables in their places; those of other samples are left out."""
+        last = self.first + self.done.shape[1]
         for table in tables:
-            rows = table.sample - self.first
-            inside = (rows >= 0) & (rows < self.samples)
-            where = table.point[inside], rows[inside]
+            self._failures |= {
+                (failure.point, failure.sample - self.first): failure
+                for failure in table.failures
+                if self.first <= failure.sample < last
+            }
+            point, number = table.rows[POINT], table.rows[NUMBER]
+            inside = (number >= self.first) & (number < last)
+            where = point[inside], number[inside] - self.first
             self.done[where] = True
-            for failure in table.failures:
-                if 0 <= failure.sample - self.first < self.samples:
-                    self._failures[failure.point, failure.sample] = failure
-            for name in self._variables.keys() & table.values.keys():
-                self._put(name, where, table.values[name][inside])
+            names = {*(table.rows.dtype.names or ())} - {POINT, NUMBER}
+            for name in names if self._only is None else names & {*self._only}:
+                values = table.rows[name][inside]
+                if name not in self._arrays:
+                    shape = self.done.shape + values.shape[1:]
+                    self._arrays[name] = np.zeros(shape, dtype=values.dtype)
+                    self._seen[name] = np.zeros_like(self.done)
+                self._arrays[name][where] = values
+                self._seen[name][where] = True
 
-    def _put(self, name: str, where: tuple[Any, Any], array: NDArray[Any]) -> None:
-        if name not in self._arrays:
-            self._arrays[name] = np.zeros(self.done.shape + array.shape[1:], dtype=array.dtype)
-            self._seen[name] = np.zeros(self.done.shape, dtype=np.bool_)
-        self._arrays[name][where] = array
-        self._seen[name][where] = True
-
-    def _filled(self, name: str) -> NDArray[Any]:
-        """The array of a variable, NaN where nothing was put."""
-        array, seen = self._arrays[name], self._seen[name]
-        if not seen.all():
-            if array.dtype.kind != "f":
-                array = array.astype(np.float64)
-            array[~seen] = np.nan
-        return array
+    @property
+    def failed(self) -> list[Failure]:
+        """Samples that failed and are not there, in the order of points and samples."""
+        return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]
 
     @property
     def dealt_with(self) -> NDArray[np.bool_]:
         """Which samples are there or have failed, (points, samples)."""
         found = self.done.copy()
-        for failure in self.failed:
-            found[failure.point, failure.sample - self.first] = True
+        for at in self._failures:
+            found[at] = True
         return found
-
-    @property
-    def failed(self) -> list[Failure]:
-        """Samples that failed and are not there, in the order of points and samples."""
-        found = [self._failures[key] for key in sorted(self._failures)]
-        return [f for f in found if not self.done[f.point, f.sample - self.first]]
 
     def dataset(
         self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()
@@ -144,15 +127,20 @@ class Gathered:
         shape = tuple(axis.size for axis in axes)
         dims = tuple(axis.dim for axis in axes)
         values, variables = {}, {}
-        for name, variable in self._variables.items():
+        for name, variable in variables_in(self.points).items():
             if name in self._arrays:
-                array = self._filled(name)
+                array, seen = self._arrays[name], self._seen[name]
+                if not seen.all():
+                    if array.dtype.kind != "f":
+                        array = array.astype(np.float64)
+                    array[~seen] = np.nan
                 values[name] = array.reshape(shape + array.shape[1:])
                 variables[name] = replace(variable, dims=dims + variable.dims)
-        coordinates: dict[str, tuple[NDArray[Any], Variable]] = {}
+        coordinates: Coordinates = {}
         for axis in axes:
             coordinates |= axis.coordinates
-        coordinates["sample"] = (self.first + np.arange(self.samples), SAMPLE)
+        samples = self.first + np.arange(self.done.shape[1])
+        coordinates["sample"] = (samples, SAMPLE)
         used = {dim for variable in variables.values() for dim in variable.dims}
         for dim in sorted(used & {"x", "y", "direction"}):
             coordinates |= self._places(dim, dims, shape)
@@ -164,14 +152,12 @@ class Gathered:
             attributes["cut_short"] = f"{made} of {total} samples are done"
         return to_dataset(values, variables, coordinates, attributes)
 
-    def _places(
-        self, dim: str, dims: tuple[str, ...], shape: tuple[int, ...]
-    ) -> dict[str, tuple[NDArray[Any], Variable]]:
+    def _places(self, dim: str, dims: tuple[str, ...], shape: tuple[int, ...]) -> Coordinates:
         """Positions along a dimension; if the length is swept, those of each point."""
-        found = [coordinate(point.problem.interface, dim) for point in self.points]
-        values, meaning = found[0]
-        if all(np.array_equal(places, values) for places, _ in found):
-            return {dim: found[0]}
+        values, meaning = coordinate(self.points[0].problem.interface, dim)
+        found = [coordinate(point.problem.interface, dim)[0] for point in self.points]
+        if all(np.array_equal(places, values) for places in found):
+            return {dim: (values, meaning)}
         name = "position" if dim == "x" else f"position_{dim}"
         own = replace(meaning, dims=(*dims, dim))
-        return {name: (np.reshape([places for places, _ in found], (*shape, -1)), own)}
+        return {name: (np.reshape(found, (*shape, -1)), own)}

@@ -14,8 +14,8 @@ from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
-from stiction.methods import MethodObject, Solver, Values, prepared, variables_of
-from stiction.model import Count, Names, Number, check, describe, model
+from stiction.methods import Solver, Values, prepared, variables_of
+from stiction.model import Count, Names, Number, model
 from stiction.problem import PROFILES, Problem, refusals
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
@@ -81,9 +81,6 @@ class Experiment:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check("method", self.method, MethodObject)
-        if not isinstance(self.problem, Problem):
-            raise InputError(f"problem: must be a Problem, got {describe(self.problem)}")
         random, method = as_random_interface(self.random), self.method
         problems: list[str] = []
         try:

@@ -1,8 +1,8 @@
 """An ensemble of random interfaces: the public function, and the loop over its samples."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing
+from contextlib import ExitStack, closing
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,7 @@ from stiction.ensemble.dataset import FAILED, Gathered, GridAxis, distinct
 from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
-from stiction.ensemble.table import Table
-from stiction.errors import collect_warnings, warn_accuracy, warn_user
+from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
 from stiction.model import Count, Flag, Names, Number, Progress, Seconds, checked
 from stiction.problem import Problem
@@ -25,44 +24,6 @@ FEW, SHOWN = 4, 3
 """Warnings and failures that are told one by one."""
 HOPELESS = 16
 """Samples that fail, with none solved, before the whole ensemble is given up."""
-
-
-def compute(
-    points: Sequence[Experiment],
-    done: NDArray[np.bool_],
-    take: Callable[[list[Table]], None],
-    *,
-    first: int = 0,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    progress: Show = True,
-    time_limit: float | None = None,
-) -> None:
-    """Compute the samples of some points that are not done, (points, samples).
-
-    `take` gets tables as samples are solved, and an empty list now and then. When the seconds of
-    `time_limit` are over, the rest is left. Other options are those of `monte_carlo`. If no sample
-    can be solved, the error of one is raised.
-    """
-    if done.all():
-        return
-    check_fields(points)
-    if len(points) == 1:
-        points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
-    solved, lost, total = bool(done.any()), 0, int(done.size - done.sum())
-    label = " and ".join({one.method.label: None for one in distinct(points, "method")})
-    workers = usable_cores() if workers is None else workers
-    work = solve_spans(points, missing_spans(done, first), executor=executor, workers=workers)
-    with Meter(label, total, progress, time_limit=time_limit) as meter, closing(work):
-        for tables in work:
-            take(tables)
-            for table in tables:
-                meter.advance(table.count)
-                solved, lost = solved or table.sample.size > 0, lost + len(table.failures)
-                if not solved and lost >= min(HOPELESS, total):
-                    raise table.failures[0].exception()
-            if meter.over:
-                break
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
@@ -87,8 +48,11 @@ def gather(
     store: Store | None = None,
     retry: bool = False,
     others: NDArray[np.bool_] | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Show = True,
+    time_limit: float | None = None,
     pilot: bool = True,
-    **options: Any,
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or what is not stored of it.
 
@@ -103,31 +67,46 @@ def gather(
         Compute stored samples that failed again.
     others : (points, samples) array of bool, optional
         Samples that somebody else computes.
-    **options
-        See `compute`.
+    workers, executor, progress, time_limit, pilot
+        See `monte_carlo`.
     """
-    samples, first = ensemble.samples, ensemble.first
-    rows = Gathered(points, samples, first)
+    first = ensemble.first
+    rows = Gathered(points, ensemble.samples, first)
     if store is not None:
         store.load(rows.add)
     done = rows.done.copy() if retry else rows.dealt_with
     if others is not None:
         done |= others
-
-    def take(tables: list[Table]) -> None:
-        rows.add(tables)
-        if store is not None:
-            store.add(tables)
-
-    try:
-        compute(points, done, take, first=first, **options)
-    finally:  # also on Ctrl-C, and when workers are lost: what is done is kept
-        if store is not None:
-            store.close()
-    found = None if store is None else store.pilot()
+    spans, solved, lost = missing_spans(done, first), bool(done.any()), 0
+    if spans:
+        check_fields(points)
+        if len(points) == 1:
+            points[
+                0
+            ].prepare()  # here and not in a thread, so that it warns at the caller's line
+    total = int(done.size - done.sum())
+    label = " and ".join({one.method.label: None for one in distinct(points, "method")})
+    with ExitStack() as stack:
+        if store is not None:  # also on Ctrl-C, and when workers are lost: what is done is kept
+            stack.callback(store.close)
+        meter = stack.enter_context(Meter(label, total, progress, time_limit=time_limit))
+        work = solve_spans(points, spans, executor=executor, workers=workers or usable_cores())
+        for tables in stack.enter_context(closing(work)):
+            rows.add(tables)
+            if store is not None:
+                store.add(tables)
+            for table in tables:
+                meter.advance(table.count)
+                solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
+                if not solved and lost >= min(HOPELESS, total):
+                    failure = table.failures[0]
+                    raise (InputError if failure.input else RuntimeError)(str(failure))
+            if meter.over:
+                break
+    found = None if store is None else store.pilot
     if found is None and pilot:
-        show = options.get("progress", True) is True
-        found = pilot_attributes(points, samples, first, show=show)
+        show = progress is True
+        found = pilot_attributes(points, ensemble.samples, first, show=show)
         if store is not None:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)

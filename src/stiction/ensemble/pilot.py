@@ -49,45 +49,34 @@ def exact_counterpart(experiment: Experiment) -> Experiment | None:
     return Experiment(experiment.problem, experiment.random, method, seed=experiment.seed)
 
 
-def solved(experiment: Experiment, draws: Array, variable: str = "critical_stress") -> Array:
-    """Solve draws (samples, dimension) in threads; NaN where a sample cannot be solved."""
+def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pilot | None:
+    """Solve samples from `first` on by a method and by its exact counterpart, in threads.
 
-    def one(row: Array) -> float:
-        try:
-            return float(experiment.onset(experiment.profiles(row[None, :]))[variable][0])
-        except (InputError, RuntimeError, ArithmeticError):
-            return float("nan")
-
-    with ThreadPoolExecutor(usable_cores()) as pool:
-        # Each in the context of the caller, which collects warnings.
-        found = [pool.submit(copy_context().run, one, row) for row in draws]
-        return np.array([future.result() for future in found])
-
-
-def compare(
-    experiment: Experiment, draws: Array, variable: str = "critical_stress"
-) -> Pilot | None:
-    """Solve draws (samples, dimension) by a method and by its exact counterpart.
-
-    `variable` is the stress to compare, `critical_stress` or `first_instability`. The result is
-    None if there is no counterpart, or fewer than two samples are solved by both.
+    The result is None if there is no counterpart, or fewer than two samples are solved by both.
     """
     exact = exact_counterpart(experiment)
     if exact is None:
         return None
-    with collect_warnings():  # the ensemble itself warns
-        near, true = solved(experiment, draws, variable), solved(exact, draws, variable)
-    both = np.isfinite(near) & np.isfinite(true)
-    if both.sum() < 2:
-        return None
-    difference = (near - true)[both] / abs(float(true[both].mean()))
-    return Pilot(int(both.sum()), float(difference.mean()), float(difference.std(ddof=1)))
-
-
-def first_samples(experiment: Experiment, first: int = 0, most: int | None = None) -> Array:
-    """Return the draws of the samples that make a pilot, (samples, dimension)."""
     size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
-    return experiment.draws(experiment.seed, first, min(size, most or size))
+    draws = experiment.draws(experiment.seed, first, min(size, most))
+
+    def both(row: Array) -> list[float]:
+        try:
+            profiles = experiment.profiles(row[None, :])
+            solved = (one.onset(profiles)["critical_stress"] for one in (experiment, exact))
+            return [float(stress[0]) for stress in solved]
+        except (InputError, RuntimeError, ArithmeticError):
+            return [float("nan")] * 2
+
+    # The ensemble itself warns; each in the context of the caller, which collects warnings.
+    with collect_warnings(), ThreadPoolExecutor(usable_cores()) as pool:
+        tasks = [pool.submit(copy_context().run, both, row) for row in draws]
+        found = np.array([task.result() for task in tasks])
+    near, true = found[np.isfinite(found).all(axis=1)].T
+    if near.size < 2:
+        return None
+    difference = (near - true) / abs(float(true.mean()))
+    return Pilot(near.size, float(difference.mean()), float(difference.std(ddof=1)))
 
 
 def doubt(pilot: Pilot, where: str = "") -> str | None:
@@ -114,7 +103,7 @@ def pilot_attributes(
     found: list[Pilot] = []
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
-            pilot = compare(points[number], first_samples(points[number], first, samples))
+            pilot = compare(points[number], first, samples)
             found += [pilot] if pilot else []
             meter.advance()
     if not found:

@@ -1,29 +1,33 @@
 """The store: a folder of chunks that say what they hold.
 
-``study.json`` says which study it is, and ``chunks/`` holds the samples. A chunk is a table (see
-`stiction.ensemble.table`) of samples with a mark of their study; its name is a digest of its
-content. Chunks are written whole or not at all, and nothing lists them: so any number of processes
-may write to a folder at once, a run may be killed at any moment, and damage is found. Each writer
-joins its own small chunks as they become many.
+``study.json`` says which study it is, and ``chunks/`` holds the samples. A chunk is a table of
+samples with a mark of their study; its name is a digest of its content. Chunks are written whole or
+not at all, and nothing lists them: so any number of processes may write to a folder at once, a run
+may be killed at any moment, and damage is found. Each writer joins its own small chunks as they
+become many.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiction.ensemble.batches import versions
-from stiction.ensemble.table import Table, decode, digest, encode, joined
-from stiction.errors import StoreError, warn_user
-from stiction.files import PART, cannot, write_whole
+import numpy as np
 
-FORMAT = 4
+from stiction.ensemble.batches import versions
+from stiction.ensemble.table import Failure, Table, joined
+from stiction.errors import StoreError, warn_user
+from stiction.files import PART, UNREADABLE, cannot, write_whole
+
+FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 1.0
@@ -39,11 +43,12 @@ class Damaged(ValueError):
 
 
 class Chunk(NamedTuple):
-    """One file of samples; `versions` are those of the process that computed it."""
+    """One file of samples: its size, its table, and what computed it for which study."""
 
     bytes: int
-    versions: str
     table: Table
+    versions: str
+    study: str
 
 
 class Store:
@@ -63,11 +68,12 @@ class Store:
     """
 
     def __init__(self, path: Path, study: dict[str, Any]) -> None:
-        self.path, self.study, self._mark = path, study, mark_of(study)
+        self.path, self.study = path, study
+        self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
-        self._buffer: list[Table] = []
+        self._taken: list[Table] = []
         self._saved = time.monotonic()
-        self._small: list[str] = []
+        self._small: dict[str, Table] = {}
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
@@ -90,17 +96,15 @@ class Store:
             (path / CHUNKS).mkdir(exist_ok=True)
         except OSError as error:
             raise cannot("written", path, error) from error
-        store = cls(path, study)
-        before: dict[str, Any] = {}
+        store, before = cls(path, study), None
         try:
-            before = read_study(path)
+            before = read_json(path / STUDY)
+            refuse_another(path, study, before)
         except (FileNotFoundError, Damaged):
-            if sum(1 for _ in store.chunks()) or STUDY in others:
+            if list(store.chunks()) or STUDY in others:
                 store._warn(
                     f"{STUDY} is damaged or gone; it is made of the study that is given"
                 )
-        if before:
-            refuse_another(path, study, before)
         if before != study:
             _write_json(path / STUDY, study)
         return store
@@ -124,24 +128,23 @@ class Store:
             seen.update(new)
             for name in new:
                 try:
-                    chunk, mark = read_chunk(self.path / CHUNKS / name)
+                    chunk = read_chunk(self.path / CHUNKS / name)
                 except FileNotFoundError:  # joined meanwhile
                     continue
                 except Damaged as error:
                     self.damage[name] = str(error)
                     continue
-                if mark != self._mark:
+                if chunk.study != self._mark:
                     raise StoreError(f"{self.path}: {CHUNKS}/{name} belongs to another study")
                 yield chunk
 
     def _names(self) -> set[str]:
         try:
-            names = os.listdir(self.path / CHUNKS)
+            return set(filter(NAME.fullmatch, os.listdir(self.path / CHUNKS)))
         except FileNotFoundError:
             return set()
         except OSError as error:
             raise cannot("read", self.path / CHUNKS, error) from error
-        return {name for name in names if NAME.fullmatch(name)}
 
     def load(self, take: Callable[[list[Table]], None]) -> None:
         """Hand on all tables; delete damaged chunks, and warn of them and of other versions."""
@@ -161,9 +164,16 @@ class Store:
     def _warn(self, text: str) -> None:
         warn_user(f"{self.path}: {text}", UserWarning)
 
+    @property
+    def pilot(self) -> dict[str, Any] | None:
+        """What the pilot has found; None if there was none."""
+        with suppress(FileNotFoundError, Damaged):
+            return read_json(self.path / PILOT)
+        return None
+
     # -- writing -------------------------------------------------------------------------------
 
-    def add(self, tables: Sequence[Table]) -> None:
+    def add(self, tables: list[Table]) -> None:
         """Take tables, and store what was taken if a second has passed or it is large.
 
         Raises
@@ -171,10 +181,13 @@ class Store:
         StoreError
             If it cannot be written; what was stored before stays readable.
         """
-        self._buffer += tables
+        self._taken += tables
         late = time.monotonic() - self._saved >= SAVE_SECONDS
-        if late or sum(table.nbytes for table in self._buffer) >= SAVE_BYTES:
+        if late or sum(table.rows.nbytes for table in self._taken) >= SAVE_BYTES:
             self._save()
+            size = sum(table.rows.nbytes for table in self._small.values())
+            if len(self._small) >= MANY or size >= LARGE:
+                self._join()
 
     def close(self) -> None:
         """Store what was taken, and join the small chunks of this writer."""
@@ -182,102 +195,82 @@ class Store:
         self._join()
 
     def _save(self) -> None:
-        tables, self._buffer = joined(self._buffer), []
-        for table in tables:
-            self._write(table)
-        self._saved = time.monotonic()
-        if len(self._small) >= MANY:
-            self._join()
+        self._write(self._taken)
+        self._taken, self._saved = [], time.monotonic()
 
-    def _write(self, table: Table) -> str:
-        """Write a chunk, and return its name."""
-        data = encode(table, {"study": self._mark, "versions": versions()})
-        name = f"{digest(data)[:32]}.npz"
-        write_whole(self.path / CHUNKS / name, data)
-        if len(data) < LARGE:
-            self._small.append(name)
-        return name
+    def _write(self, tables: Iterable[Table]) -> None:
+        for table in joined(tables):
+            data = encode(table, self._mark)
+            name = f"{digest(data)}.npz"
+            write_whole(self.path / CHUNKS / name, data)
+            self._small[name] = table
 
     def _join(self) -> None:
         """Replace small chunks by larger ones; they go when the larger ones are whole."""
-        names, self._small = self._small, []
-        while names:
-            group: dict[str, Chunk] = {}
-            while names and sum(chunk.bytes for chunk in group.values()) < LARGE:
-                name = names.pop()
-                with suppress(
-                    FileNotFoundError, Damaged
-                ):  # damage is reported where it is read
-                    group[name] = read_chunk(self.path / CHUNKS / name)[0]
-            if len(group) < 2:
-                self._small += group
-                continue
-            try:
-                tables = joined(chunk.table for chunk in group.values())
-                written = {self._write(table) for table in tables}
-            except StoreError:  # the disk is full: the small ones stay, and nothing is lost
-                return
-            # Tables of other variables than all others come back under the name that they had.
-            for name in group.keys() - written:
-                with suppress(OSError):
-                    (self.path / CHUNKS / name).unlink()
+        if len(self._small) < 2:
+            return
+        small, self._small = self._small, {}
+        try:
+            self._write(small.values())
+        except StoreError:  # the disk is full: the small ones stay, and nothing is lost
+            return
+        # A table whose columns no other has comes back under the name that it had.
+        for name in small.keys() - self._small.keys():
+            with suppress(OSError):
+                (self.path / CHUNKS / name).unlink()
+        self._small = {
+            name: table for name, table in self._small.items() if table.rows.nbytes < LARGE
+        }
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store what the pilot has found."""
-        _write_json(self.path / PILOT, dict(attributes))
-
-    def pilot(self) -> dict[str, Any] | None:
-        """Return what the pilot has found; None if there was none."""
-        try:
-            return _read_json(self.path / PILOT)
-        except (FileNotFoundError, Damaged):
-            return None
+        _write_json(self.path / PILOT, attributes)
 
 
-def read_chunk(file: Path) -> tuple[Chunk, str]:
-    """Return a chunk and the mark of its study, or raise `Damaged` or an error of `_read`."""
+# -- files ---------------------------------------------------------------------------------------
+
+
+def digest(data: bytes) -> str:
+    """Return the first half of the SHA-256, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+def encode(table: Table, study: str) -> bytes:
+    """Return a table as the bytes of an .npz archive, with a few words about it as JSON."""
+    about = [study, versions(), table.seconds, table.failures]
+    text = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
+    file = io.BytesIO()
+    np.savez(file, about=text, rows=table.rows)
+    return file.getvalue()
+
+
+def read_chunk(file: Path) -> Chunk:
+    """Return a chunk, or raise `Damaged` or an error of `_read`."""
     data = _read(file)
-    if not file.name.startswith(digest(data)[:32]):
+    if file.stem != digest(data):
         raise Damaged("fails its checksum")
     try:
-        table, about = decode(data)
-    except ValueError as error:  # made by a program that names its files likewise
-        raise Damaged(str(error)) from None
-    return Chunk(len(data), str(about.get("versions")), table), str(about.get("study"))
-
-
-# -- which study it is ---------------------------------------------------------------------------
-
-
-def mark_of(study: Mapping[str, Any]) -> str:
-    """Return what all chunks of the same study share."""
-    return digest(json.dumps(_identity(study), sort_keys=True).encode())[:32]
-
-
-def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """What makes two studies the same run: all but the title and the number of samples."""
-    ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
-    kept = {key: value for key, value in study.items() if key != "title"}
-    return kept | {"ensemble": ensemble}
-
-
-def read_study(path: Path) -> dict[str, Any]:
-    """Return the study of a run in plain form, or raise `Damaged` or an error of `_read`."""
-    return _read_json(path / STUDY)
+        with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
+            study, made_by, seconds, failures = json.loads(archive["about"].tobytes())
+            table = Table(archive["rows"], tuple(Failure(*one) for one in failures), seconds)
+    except (*UNREADABLE, AttributeError, TypeError) as error:
+        # Made by a program that names its files likewise.
+        raise Damaged(f"cannot be read: {error}") from None
+    return Chunk(len(data), table, made_by, study)
 
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
     """Write JSON with the format and a digest, whole or not at all."""
     body = {"format": FORMAT, "content": content}
-    sealed = body | {"sha256": digest(json.dumps(body, sort_keys=True).encode())}
+    sealed = body | {"digest": digest(json.dumps(body, sort_keys=True).encode())}
     write_whole(file, json.dumps(sealed, indent=1).encode())
 
 
-def _read_json(file: Path) -> dict[str, Any]:
+def read_json(file: Path) -> dict[str, Any]:
+    """Return what `_write_json` wrote, or raise `Damaged` or an error of `_read`."""
     try:
         body = json.loads(_read(file))
-        said = body.pop("sha256")
-        if said != digest(json.dumps(body, sort_keys=True).encode()):
+        if body.pop("digest") != digest(json.dumps(body, sort_keys=True).encode()):
             raise ValueError
         if body["format"] == FORMAT:
             return dict(body["content"])
@@ -296,9 +289,25 @@ def _read(file: Path) -> bytes:
         raise cannot("read", file, error) from error
 
 
+# -- which study it is ---------------------------------------------------------------------------
+
+
+def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
+    """What makes two studies the same run: all but the title and the number of samples."""
+    ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
+    return {key: value for key, value in study.items() if key != "title"} | {
+        "ensemble": ensemble
+    }
+
+
 def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
     """Refuse a study that differs from the stored one in more than a growing number of samples."""
-    found = differences(_identity(here), _identity(there))
+    ours, theirs = flat(_identity(here)), flat(_identity(there))
+    found = [
+        f"{key}: {_shown(ours.get(key))} here, {_shown(theirs.get(key))} there"
+        for key in dict.fromkeys([*ours, *theirs])
+        if ours.get(key) != theirs.get(key)
+    ]
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     if now < before and not found:
         found = [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
@@ -309,18 +318,18 @@ def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]
         )
 
 
-def differences(here: Any, there: Any, path: str = "") -> list[str]:
-    """Return where two plain structures differ, one text each, with the path to the key."""
-    if isinstance(here, list) and isinstance(there, list):
-        here, there = dict(enumerate(here)), dict(enumerate(there))
-    if isinstance(here, Mapping) and isinstance(there, Mapping):
-        found = []
-        for key in dict.fromkeys([*here, *there]):
-            inner = f"{path}.{key}" if path else str(key)
-            found += differences(here.get(key), there.get(key), inner)
-        return found
-    if here == there:
-        return []
-    texts = ["nothing" if value is None else json.dumps(value) for value in (here, there)]
-    short = [text if len(text) <= 60 else f"{text[:57]}..." for text in texts]
-    return [f"{path}: {short[0]} here, {short[1]} there"]
+def flat(content: Any, path: str = "") -> dict[str, Any]:
+    """Return the numbers and texts in plain tables and lists by their paths."""
+    if isinstance(content, list):
+        content = dict(enumerate(content))
+    if not isinstance(content, Mapping) or not content:
+        return {path: content}
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        found |= flat(value, f"{path}.{key}" if path else str(key))
+    return found
+
+
+def _shown(value: Any) -> str:
+    text = "nothing" if value is None else json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

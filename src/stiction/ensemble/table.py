@@ -1,8 +1,5 @@
-"""Samples as rows of a table, and a table as the bytes of a file."""
+"""Samples as rows of a table."""
 
-import hashlib
-import io
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.errors import InputError
-from stiction.files import UNREADABLE
-from stiction.methods import Values
+POINT, NUMBER = "_point", "_sample"
+"""Names of the columns that hold the numbers of the point and of the sample."""
 
 
 class Failure(NamedTuple):
@@ -39,91 +35,52 @@ class Failure(NamedTuple):
         where = f" of point {self.point}" if self.point else ""
         return f"sample {self.sample}{where} (seed {self.seed}): {self.error}"
 
-    def exception(self) -> Exception:
-        """Return the error with which an ensemble ends if nothing but failures come of it."""
-        return InputError(str(self)) if self.input else RuntimeError(str(self))
-
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Samples of any points of a sweep, one row each.
+    """Samples of any points of a sweep.
 
     Attributes
     ----------
-    point, sample : (rows,) arrays
-    values : dict of arrays
-        One row for each of these samples.
+    rows : structured array
+        One row a sample: `POINT`, `NUMBER` and the variables of the method.
     failures : tuple of Failure
-        Samples that have no rows.
+        Samples that have no row.
     seconds : float
         Computing time.
     """
 
-    point: NDArray[np.int64]
-    sample: NDArray[np.int64]
-    values: Values
+    rows: NDArray[Any]
     failures: tuple[Failure, ...] = ()
     seconds: float = 0.0
 
     @property
     def count(self) -> int:
         """Samples dealt with, failed ones included."""
-        return self.sample.size + len(self.failures)
+        return self.rows.size + len(self.failures)
 
-    @property
-    def nbytes(self) -> int:
-        """Size of the values."""
-        return sum(int(array.nbytes) for array in self.values.values())
+
+def rows_of(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    """Return the values of consecutive samples of a point, the number of the first given."""
+    count = len(next(iter(values.values()), ()))
+    columns = {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
+    types = [(name, array.dtype, array.shape[1:]) for name, array in columns.items()]
+    rows = np.empty(count, dtype=types)
+    for name, array in columns.items():
+        rows[name] = array
+    return rows
 
 
 def joined(tables: Iterable[Table]) -> list[Table]:
-    """Join tables one below the other, into one table for each set and shape of variables."""
+    """Join tables one below the other, into one table for each set of columns."""
     groups: dict[Any, list[Table]] = {}
     for table in tables:
-        columns = table.values.items()
-        shape = tuple((name, array.dtype.str, array.shape[1:]) for name, array in columns)
-        groups.setdefault(shape, []).append(table)
+        groups.setdefault(table.rows.dtype, []).append(table)
     return [
         Table(
-            point=np.concatenate([table.point for table in group]),
-            sample=np.concatenate([table.sample for table in group]),
-            values={n: np.concatenate([t.values[n] for t in group]) for n in group[0].values},
-            failures=tuple(failure for table in group for failure in table.failures),
-            seconds=round(sum(table.seconds for table in group), 3),
+            np.concatenate([table.rows for table in group]),
+            tuple(failure for table in group for failure in table.failures),
+            round(sum(table.seconds for table in group), 3),
         )
         for group in groups.values()
     ]
-
-
-def encode(table: Table, about: Mapping[str, Any]) -> bytes:
-    """Return a table as the bytes of an .npz archive, with a few words about it as JSON."""
-    said = {**about, "seconds": table.seconds, "failures": table.failures}
-    text = np.frombuffer(json.dumps(said).encode(), dtype=np.uint8)
-    arrays: dict[str, Any] = {"about": text, "point": table.point, "sample": table.sample}
-    arrays |= {f"value/{name}": array for name, array in table.values.items()}
-    file = io.BytesIO()
-    np.savez(file, **arrays)
-    return file.getvalue()
-
-
-def decode(data: bytes) -> tuple[Table, dict[str, Any]]:
-    """Return the table and the words of `encode`; a ValueError if it is no such archive."""
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            about = json.loads(archive["about"].tobytes())
-            names = [key.removeprefix("value/") for key in archive.files if "/" in key]
-            table = Table(
-                point=archive["point"],
-                sample=archive["sample"],
-                values={name: archive[f"value/{name}"] for name in names},
-                failures=tuple(Failure(*item) for item in about["failures"]),
-                seconds=float(about["seconds"]),
-            )
-    except (*UNREADABLE, AttributeError, TypeError) as error:
-        raise ValueError(f"cannot be read: {error}") from None
-    return table, about
-
-
-def digest(data: bytes) -> str:
-    """Return the SHA-256 in hexadecimal."""
-    return hashlib.sha256(data).hexdigest()

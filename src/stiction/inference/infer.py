@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
-from stiction.ensemble.pilot import ON_A_LINE, compare, doubt
+from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, on_grid
 from stiction.inference.likelihood import Likelihood, Model, make_model
@@ -281,7 +281,7 @@ def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tup
     serious: list[str | None] = [_piled_up(model, u)]
     middle = model.prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(model.prior, middle, model.method)
-    if pilot := compare(experiment, experiment.draws(0, 0, ON_A_LINE)):
+    if pilot := compare(experiment):
         serious.append(doubt(pilot))
     if errors[worst] > TOLERABLE:
         samples = model.specimens[0].onsets.shape[1]

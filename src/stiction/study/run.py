@@ -162,7 +162,7 @@ class StoredRun:
         for name, text in self._store.damage.items():
             text = f"{self.path}: {name}: {text}; its samples are missing; run the study again"
             warn_user(text, UserWarning)
-        attributes = {**self.study.attributes, **(self._store.pilot() or {})}
+        attributes = {**self.study.attributes, **(self._store.pilot or {})}
         return rows.dataset(attributes, self.study.axes)
 
     def export(self, path: str | Path) -> None:

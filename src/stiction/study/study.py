@@ -21,7 +21,7 @@ from stiction.ensemble.dataset import GridAxis, variables_in
 from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import Damaged, Store, read_study
+from stiction.ensemble.store import STUDY, Damaged, Store, read_json
 from stiction.errors import InputError, StoreError, unknown_name
 from stiction.methods import methods
 from stiction.model import (
@@ -383,7 +383,7 @@ def open_run(path: Any) -> StoredRun:
     if not place.is_dir():
         raise StoreError(f"{place}: there is no run here; a run is a folder")
     try:
-        study = read_study(place)
+        study = read_json(place / STUDY)
     except FileNotFoundError:
         raise StoreError(f"{place}: holds no run") from None
     except Damaged as error:
