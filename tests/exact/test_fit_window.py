@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.inference.spectral_model import Grid
-from stiction.inference.spectrum_fit import spectrum_family
-from stiction.inference.whittle import make_observed
-from stiction.inference.window import make_window
+from stiction.inference.whittle import SpectrumFamily
+from stiction.inference.window import Window
 
 SPACING = 1e-4
 SPECTRUM = st.PowerLawSpectrum(1.5e-3, exponent=1.5, power_kept=0.999)
@@ -29,9 +27,8 @@ def test_expectation_of_a_line(degree, gap):
     count = 96
     measured = np.ones(count, dtype=bool)
     measured[gap] = False
-    window = make_window((count,), (SPACING,), measured, degree)
-    grid = Grid((count,), (SPACING,))
-    rho = grid.correlation(grid.power(SPECTRUM))
+    window = Window((SPACING,), measured, degree)
+    rho = window.correlation(window.power(SPECTRUM))
     lag = np.arange(count) * SPACING
     matrix = rho[np.abs(np.subtract.outer(np.arange(count), np.arange(count)))]
     expected = by_brute_force(window, matrix)
@@ -49,13 +46,12 @@ def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
     A rough spectrum falls as (k xi_0)^-2 there: twice the correlation length is a constant factor
     and nothing else, unless it moves the truncation, which then tells the correlation length.
     """
-    window = make_window((128,), (SPACING,), np.ones(128, dtype=bool), 0)
-    observed = make_observed(window, np.ones((1, 65)))
+    window = Window((SPACING,), np.ones(128, dtype=bool))
 
     def high(length, **given):
-        family = spectrum_family({"type": "exponential"} | given, 1.0, 0.0, (1e-4, 1.0))
+        family = SpectrumFamily("exponential", given, 1.0, 0.0, (1e-4, 1.0))
         model = family.model(np.log([1.0, length]), np.array([0.0, 1.0]))
-        return model.signal(observed)[20:-1]
+        return model.signal(window)[20:-1]
 
     with_default = high(6.4e-3) / high(3.2e-3)
     cut = high(6.4e-3, truncation=10.0) / high(3.2e-3, truncation=10.0)
@@ -67,10 +63,10 @@ def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
 @pytest.mark.parametrize("name", ["exponential", "power_law"])
 def test_a_spectrum_whose_end_is_not_given_is_whole(name):
     """What its usual truncation leaves out, 1 % of a rough one, would be taken for noise."""
-    family = spectrum_family({"type": name}, 1.0, 0.0, (1e-4, 1.0))
+    family = SpectrumFamily(name, {}, 1.0, 0.0, (1e-4, 1.0))
     model = family.model(np.log([1.0, 1e-3, 0.5])[: len(family.free)], np.array([0.0, 1.0]))
-    grid = Grid((512,), (SPACING,))
-    rho = grid.correlation(model.power(grid))[1:64]
+    window = Window((SPACING,), np.ones(512, dtype=bool))
+    rho = window.correlation(model.power(window))[1:64]
     exact = model.spectrum.untruncated_correlation(SPACING * np.arange(1, 64))
     np.testing.assert_allclose(rho, exact, atol=5e-4)
 
@@ -79,8 +75,8 @@ def test_power_above_the_sampling_wavenumber_is_folded_back():
     """A third of this spectrum's power lies above what its points resolve."""
     rough = st.ExponentialSpectrum(5e-4, power_kept=0.99)
     assert 1.0 - rough.power_within(np.pi / 1e-3) > 0.3
-    grid = Grid((64,), (1e-3,))
-    rho = grid.correlation(grid.power(rough))
+    window = Window((1e-3,), np.ones(64, dtype=bool))
+    rho = window.correlation(window.power(rough))
     assert rho[0] == pytest.approx(1.0)
     # What is folded more than six times is taken for white, and a sharp cut leaves ripples.
     np.testing.assert_allclose(rho[1:32], rough.correlation(1e-3 * np.arange(1, 32)), atol=2e-3)
@@ -88,8 +84,8 @@ def test_power_above_the_sampling_wavenumber_is_folded_back():
 
 def test_a_map_has_the_correlation_of_the_plane():
     spectrum = st.PowerLawSpectrum(1e-3, exponent=2.0, power_kept=0.99)
-    grid = Grid((48, 40), (1e-4, 1.2e-4))
-    rho = grid.correlation(grid.power(spectrum, 1.5))
+    window = Window((1e-4, 1.2e-4), np.ones((48, 40), dtype=bool))
+    rho = window.correlation(window.power(spectrum, 1.5))
     interface = st.Interface(length=(192 * 1e-4, 160 * 1.2e-4), nodes=(192, 160))
     field = st.RandomField(
         st.Beta(alpha=2.0, beta=2.0, low=0.0, high=1.0),
@@ -103,11 +99,12 @@ def test_a_map_has_the_correlation_of_the_plane():
 
 
 def test_simulated_records_have_the_expectation():
-    grid = Grid((128,), (SPACING,))
-    power = grid.power(SPECTRUM)
-    window = make_window((128,), (SPACING,), np.ones(128, dtype=bool), 1)
+    window = Window((SPACING,), np.ones(128, dtype=bool), 1)
+    power = window.power(SPECTRUM)
     rng = np.random.default_rng(0)
-    found = np.mean([window.periodogram(grid.sample(power, rng)) for _ in range(4000)], axis=0)
-    ratio = found[1:] / window.expectation(grid.correlation(power))[1:]
+    found = np.mean(
+        [window.periodogram(window.sample(power, rng)) for _ in range(4000)], axis=0
+    )
+    ratio = found[1:] / window.expectation(window.correlation(power))[1:]
     # Each is a mean of 4,000 exponential numbers: 1.6 %; the largest of 64 reaches 3.5 times that.
     assert np.abs(ratio - 1.0).max() < 0.06

@@ -177,6 +177,26 @@ def test_no_noise_found_is_not_no_noise():
     assert high > 3e4
 
 
+def test_less_than_no_noise_is_not_known_to_be_none():
+    """A truncated field has less at high wavenumbers than its family: an estimate far below zero."""
+    truncated = st.RandomField(
+        st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(2e-3, exponent=2.0, power_kept=0.99)
+    )
+    values = truncated.sample(st.Interface(length=0.18, nodes=900), seed=1)[0, :300]
+    values = values + 2e4 * np.random.default_rng(1).standard_normal(300)
+    options = QUICK | {"noise": True, "spectrum": {"type": "power_law", "exponent": 2.0}}
+    fit = st.fit_field(values, st.Interface(length=0.06, nodes=300), **options)
+    assert fit.interval["noise"][0] == fit.parameters["noise"] == 0.0
+    assert fit.interval["noise"][1] > 1e4
+
+
+def test_shapes_of_scipy_may_be_negative():
+    fit = st.fit_field(labelled(), **QUICK | {"marginal": "skewnorm"})
+    low, high = fit.interval["marginal.a"]
+    assert low < fit.parameters["marginal.a"] < high
+    assert low < 0.0
+
+
 def test_outliers_are_warned_of():
     values = VALUES.copy()
     values[7] = 2e7
@@ -225,11 +245,11 @@ def test_bounds_lie_outside_of_values_without_noise():
 def test_the_scale_of_a_uniform_marginal_spans_the_values():
     fit = st.fit_field(labelled(), **QUICK | {"marginal": "uniform"})
     least, most = VALUES.min(), VALUES.max()
-    limits = bootstrap._limits(fit._details.estimate, VALUES)
+    limits = bootstrap.limits_of(fit._estimate, VALUES)
     assert limits["marginal.loc"] == (-np.inf, least)
     assert limits["marginal.scale"] == (pytest.approx(most - least), np.inf)
     normal = st.fit_field(labelled(), **QUICK | {"marginal": "normal"})  # has no bounds
-    assert bootstrap._limits(normal._details.estimate, VALUES) == {}
+    assert bootstrap.limits_of(normal._estimate, VALUES) == {}
 
 
 @pytest.mark.parametrize(
@@ -244,16 +264,17 @@ def test_the_scale_of_a_uniform_marginal_spans_the_values():
     ],
 )
 def test_intervals_are_cut(interval, limits, cut):
-    assert bootstrap._cut(interval, limits, 2.5) == cut
+    assert bootstrap.cut(interval, limits, 2.5) == cut
 
 
 @pytest.mark.parametrize(("name", "side"), [("marginal.low", -1.0), ("marginal.high", 1.0)])
 def test_bounds_stay_on_their_side_of_the_mean(name, side):
     values = {"mean": 1.0, "marginal.low": 0.6, "marginal.high": 1.6}
-    at = bootstrap._scaled(name, values)
-    assert bootstrap._unscaled(name, at, values) == pytest.approx(values[name])
+    scale = bootstrap.Scale(name)
+    at = scale.to(values)
+    assert scale.back(at, values) == pytest.approx(values[name])
     for step in (-3.0, 3.0):
-        assert side * (bootstrap._unscaled(name, at + step, values) - values["mean"]) > 0.0
+        assert side * (scale.back(at + step, values) - values["mean"]) > 0.0
 
 
 def test_a_field_of_coefficients_says_so():

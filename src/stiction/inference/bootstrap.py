@@ -1,27 +1,165 @@
-"""Intervals by a parametric bootstrap: how fits to simulated records of a fitted field scatter."""
+"""Fits of a marginal, a spectrum and noise, and intervals from fits to simulated records."""
 
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.inference.estimate import Estimate, Setting, estimate, simulate
-from stiction.inference.spectrum_fit import RANGES as SEARCHED
+from stiction.inference.marginal_fit import Family, distance
+from stiction.inference.whittle import (
+    RANGES,
+    Model,
+    Observed,
+    SpectrumFamily,
+    Whittle,
+    hermite_shares,
+    observe,
+    origin,
+)
+from stiction.inference.window import Window
 from stiction.progress import Meter
+from stiction.random.mapping import from_normal
+from stiction.random.random_field import RandomField
 
+NEGLIGIBLE = 1e-4
+"""Share of noise that does not change a marginal."""
+LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
+"""In correlation lengths; every spectrum has its 1/e there."""
 PLACES = ("mean", "marginal.mean", "marginal.loc")
-"""Parameters that say where something is; all others live on a logarithm."""
+"""Parameters that state where something is."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
-"""On which side of the mean a bound lies; what lives on a logarithm is its distance from there."""
-RANGES = {"spectrum.exponent": SEARCHED["exponent"], "anisotropy": SEARCHED["anisotropy"]}
-"""Between which ends parameters are looked for, and intervals cut off."""
+"""On which side of the mean a bound lies."""
 SAME = 1e-3
 """As a share of an end of a range: how near to it an interval that tells nothing lies."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What is fitted to what: families, and a window for each record (equal ones are shared)."""
+
+    windows: tuple[Window, ...]
+    marginal: Family
+    spectrum: SpectrumFamily
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The result of one fit.
+
+    `distance` is Kolmogorov's, between values and marginal, and `roughness` the mean square of the
+    logarithm of periodogram over expectation, both averaged over bands. `noise` holds the variance
+    of the noise, negative where even less than none would suit better, and its standard error; 0
+    where the noise is known.
+    """
+
+    setting: Setting
+    marginal: Any
+    model: Model
+    distance: float
+    roughness: float
+    noise: tuple[float, float]
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """All that is estimated, and what follows from it, by name."""
+        spectrum = self.model.spectrum
+        lags = spectrum.correlation_length * LAGS
+        correlation = spectrum.untruncated_correlation(lags)
+        values = {
+            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
+            "mean": float(self.marginal.distribution.mean()),
+            "standard_deviation": float(self.marginal.distribution.std()),
+        }
+        own = self.setting.marginal.parameters(self.marginal)
+        values |= {f"marginal.{name}": value for name, value in own.items()}
+        free = self.setting.spectrum.of(self.model)
+        for name in ("correlation_length", "exponent"):
+            if name in free:
+                values[f"spectrum.{name}"] = free[name]
+        if "anisotropy" in free:
+            values["anisotropy"] = free["anisotropy"]
+        if "noise_share" in free:
+            values["noise"] = self.model.noise
+        return values
+
+    def field(self, quantity: str) -> RandomField:
+        """Return the field to simulate with."""
+        anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
+        of: Any = quantity if quantity == "friction_coefficient" else None
+        return RandomField(
+            self.marginal, self.model.spectrum, mean_mode=True, anisotropy=anisotropy, of=of
+        )
+
+    def simulate(self, rng: np.random.Generator) -> list[Array]:
+        """Simulate records with their noise: measured values (points,) of each."""
+        windows = self.setting.windows
+        power = {window: self.model.power(window) for window in dict.fromkeys(windows)}
+        rows = []
+        for window in windows:
+            z = window.sample(power[window], rng)
+            noise = self.model.noise * rng.standard_normal(z.size)
+            rows.append(window.without_trend(from_normal(self.marginal, z) + noise))
+        return rows
+
+
+def estimate(
+    rows: Sequence[Array], setting: Setting, start: Estimate | None = None
+) -> Estimate:
+    """Fit measured values (points,) of each record, without trend; from a start if there is one.
+
+    The marginal of noisy values is too wide. So the noise is found first, with the marginal of the
+    values as they are; then both are fitted again, the marginal to values less that noise.
+    """
+    family = setting.spectrum
+    values = np.concatenate(rows)
+    observed = observe(rows, setting.windows)
+    vector: Any = None
+    marginal, noise = None, family.noise or 0.0
+    if start is not None:
+        vector = family.vector(list(family.of(start.model).values()))
+        marginal, noise = start.marginal, start.model.noise
+    for _ in range(2):
+        marginal = setting.marginal.fit(values, noise, marginal)
+        likelihood = Whittle(family, hermite_shares(marginal), observed)
+        vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
+        model = family.model(vector, likelihood.shares)
+        if model.noise_share < 0.0:  # the best there can be is none
+            without = likelihood._replace(family=replace(family, noise=0.0))
+            model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
+        if abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
+            break
+        noise = model.noise
+    ratios = [
+        math.log((measured + one.floor) / (predicted + one.floor))
+        for one in observed
+        for _, measured, predicted in bands(one, model.expectation(one.window))
+    ]
+    return Estimate(
+        setting=setting,
+        marginal=marginal,
+        model=model,
+        distance=distance(marginal, setting.marginal.quiet(values, model.noise)),
+        roughness=float(np.mean(np.square(ratios))),
+        noise=(0.0, 0.0) if family.noise is not None else likelihood.noise_variance(vector),
+    )
+
+
+def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
+    """Return wavenumber (rad/m), periodogram and expectation averaged over bands, (bands, 3)."""
+    weights = one.window.weights
+    k = np.broadcast_to(np.sqrt(sum(v**2 for v in one.window.wave_vectors)), weights.shape)
+    kept = weights > 0.0
+    k = k[kept]
+    band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
+    sums = [np.bincount(band, weights=w) for w in (k, one.average[kept], expected[kept])]
+    means: Array = np.transpose(sums) / np.bincount(band)[:, None]
+    return means
 
 
 class Repetitions(NamedTuple):
@@ -31,10 +169,8 @@ class Repetitions(NamedTuple):
     fits: list[Estimate]
 
 
-def repeat(
-    found: Estimate, setting: Setting, count: int, seed: int, workers: int, meter: Meter
-) -> Repetitions:
-    """Fits to records simulated from a field, as many as the family can be fitted to.
+def repeat(found: Estimate, count: int, seed: int, workers: int, meter: Meter) -> Repetitions:
+    """Fit records simulated from a field, as many as the family can be fitted to.
 
     Repetition b depends on (seed, b) only.
     """
@@ -42,7 +178,7 @@ def repeat(
     def one(number: int) -> Estimate | None:
         rng = np.random.default_rng([seed, number])
         try:
-            again = estimate(simulate(found, setting, rng), setting, found)
+            again = estimate(found.simulate(rng), found.setting, found)
         except InputError:  # no member of the family fits: counted by its absence
             return None
         meter.advance()
@@ -53,83 +189,137 @@ def repeat(
     return Repetitions(found, [result for result in results if result is not None])
 
 
-def at_ends(around: Repetitions, setting: Setting, confidence: float) -> list[Estimate]:
-    """The field with its correlation length at either end of a first interval.
+def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
+    """Return the field with its correlation length at either end of a first interval.
 
     Records of short correlation lengths hold more of them, and errors are smaller and more alike.
     An estimate that is too short by chance therefore promises too much.
     """
-    found, family = around.truth, setting.spectrum
-    place = family.free.index("correlation_length")
+    found, family = around.truth, around.truth.setting.spectrum
+    values, place = family.of(found.model), family.free.index("correlation_length")
     moved = []
-    for end in _ends("spectrum.correlation_length", found, around, around, confidence):
-        vector = family.vector(found.model)
+    for end in Scale("spectrum.correlation_length").ends(found, around, around, confidence):
+        vector = family.vector(list(values.values()))
         vector[place] = np.clip(end, *family.limits[place])
-        model = family.model(vector, found.model.shares)
-        parameters = setting.parameters_of(found.marginal, model)
-        moved.append(replace(found, model=model, parameters=parameters))
+        moved.append(replace(found, model=family.model(vector, found.model.shares)))
     return moved
 
 
-def intervals(
-    repeated: Sequence[Repetitions], setting: Setting, confidence: float, values: Array
-) -> dict[str, tuple[float, float]]:
-    """Studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
+class Scale(NamedTuple):
+    """Where the error of a parameter is about normal: a logarithm, unless it is `linear`.
 
-    The error of any parameter is as wide as the root of the correlation length, of which a record
-    holds few, and that of a place, such as the mean, also as the field's standard deviation; a
-    repetition finds both anew. What still changes with the correlation length is met by taking the
-    error at an end of an interval from a field that belongs there, with a longer or a shorter
-    correlation (one step of a test inversion; Carpenter, 1999): the longer one at the upper end of
-    parameters whose estimates rise with that of the correlation length, and else at the lower.
+    Of bounds of a marginal it is the logarithm of the distance from the mean.
+    """
+
+    name: str
+    linear: bool = False
+
+    def _origin(self, values: Mapping[str, float]) -> float:
+        return values["mean"] if self.name in SIDES else origin(self.name)
+
+    def to(self, values: Mapping[str, float]) -> float:
+        """Return the parameter on this scale."""
+        value = values[self.name]
+        if self.linear:
+            return value
+        above = SIDES.get(self.name, 1.0) * (value - self._origin(values))
+        return math.log(max(above, 1e-300))
+
+    def back(self, scaled: float, values: Mapping[str, float]) -> float:
+        """Return a parameter from this scale."""
+        if self.linear:
+            return scaled
+        return self._origin(values) + SIDES.get(self.name, 1.0) * math.exp(scaled)
+
+    def of(self, one: Estimate) -> tuple[float, float]:
+        """Return an estimate on this scale, and what its error is proportional to."""
+        if self.name == "noise":  # its variance, which may be negative, and its own error
+            return one.noise
+        width = math.sqrt(one.parameters["efolding_length"])
+        if self.name in PLACES:
+            width *= one.parameters["standard_deviation"]
+        return self.to(one.parameters), width
+
+    def ends(
+        self, found: Estimate, shorter: Repetitions, longer: Repetitions, confidence: float
+    ) -> tuple[float, float]:
+        """Return an estimate less the quantiles of its error in units of its width.
+
+        Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default,
+        it lies further inside.
+        """
+        at, width = self.of(found)
+        tail = 0.5 * (1.0 - confidence)
+        highest = np.quantile(self._errors(shorter), 1.0 - tail, method="weibull")
+        lowest = np.quantile(self._errors(longer), tail, method="weibull")
+        return at - width * float(highest), at - width * float(lowest)
+
+    def _errors(self, repeated: Repetitions) -> list[float]:
+        truth = repeated.truth
+        true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
+        return [(at - true) / width for at, width in map(self.of, repeated.fits)]
+
+
+def intervals(
+    repeated: Sequence[Repetitions], confidence: float, values: Array
+) -> dict[str, tuple[float, float]]:
+    """Return studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
+
+    `repeated` are repetitions of the estimate, and of `at_ends`, shorter and longer. The error of
+    any parameter is as wide as the root of the correlation length, of which a record holds few, and
+    that of a place, such as the mean, also as the field's standard deviation; a repetition finds
+    both anew. What still changes with the correlation length is met by taking the error at an end
+    of an interval from a field that belongs there, with a longer or a shorter correlation (one step
+    of a test inversion; Carpenter, 1999): the longer one at the upper end of parameters whose
+    estimates rise with that of the correlation length, and else at the lower.
 
     Of the noise it is the variance that has an interval, with its own standard error, which follows
     the correlation length as it is, and as if it could be negative: estimates that end at zero
     would all have the same error, and an interval from them would hold nothing but zero. What is
-    below zero is cut off last. So is of other parameters what they cannot be, see `_limits`.
-
-    Parameters
-    ----------
-    repeated : sequence of Repetitions
-        From the estimate; then from fields of shorter and of longer correlation, see `at_ends`.
-    setting : Setting
-    confidence : float
-    values : (points,)
-        What was fitted, of all records.
+    below zero is cut off last. So is of other parameters what they cannot be, see `limits_of`.
     """
     around, *ends = repeated
     found, estimated = around.truth, around.truth.parameters
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
+        least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
+        scale = Scale(name, name in PLACES or (name not in SIDES and least < 0.0))
         shorter, longer = ends if ends and name != "noise" else (around, around)
-        own = [_scaled(name, one.parameters) for one in around.fits]
+        own = [scale.to(one.parameters) for one in around.fits]
         if np.cov(own, lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
-        both = _ends(name, found, shorter, longer, confidence)
+        both = scale.ends(found, shorter, longer, confidence)
         if name == "noise":
+            if both[1] <= 0.0:  # far below zero by chance: as wide as of an estimate of zero
+                both = both[0], both[1] - found.noise[0]
             low, high = (math.sqrt(max(end, 0.0)) for end in both)
         else:
-            low, high = sorted(_unscaled(name, end, estimated) for end in both)
+            low, high = sorted(scale.back(end, estimated) for end in both)
         result[name] = (low, high)
     noise = result["noise"][1] if "noise" in result else found.model.noise
-    for name, limits in _limits(found, setting.marginal.quiet(values, noise)).items():
-        result[name] = _cut(result[name], limits, estimated[name])
+    quiet = found.setting.marginal.quiet(values, noise)
+    for name, limits in limits_of(found, quiet).items():
+        result[name] = cut(result[name], limits, estimated[name])
     return result
 
 
-def _limits(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
-    """Between which ends parameters can lie, of those for which there is such a thing.
+def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
+    """Return the limits of parameters that have some: bounds of the marginal, ranges of the search.
 
     Values lie inside the bounds of their marginal; `quiet` are the values as they would be without
-    the greatest noise that they may carry. Errors of bounds, which have a long tail where the
-    values hardly show them, do not know of that, nor those of an exponent of its range.
+    the greatest noise that they may carry.
     """
     estimated = found.parameters
     bottom, top = (float(end) for end in found.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
     below, above = (-math.inf, least), (most, math.inf)
-    limits = RANGES | {"marginal.low": below, "marginal.high": above}
+    limits = {
+        "spectrum.exponent": RANGES["exponent"],
+        "anisotropy": RANGES["anisotropy"],
+        "marginal.low": below,
+        "marginal.high": above,
+    }
     loc, scale = estimated.get("marginal.loc"), estimated.get("marginal.scale")
     if loc in (bottom, top):  # else it is inside, such as a mean
         limits["marginal.loc"] = below if loc == bottom else above
@@ -138,12 +328,12 @@ def _limits(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
     return {name: limits[name] for name in limits if name in estimated}
 
 
-def _cut(
+def cut(
     interval: tuple[float, float], limits: tuple[float, float], at: float
 ) -> tuple[float, float]:
-    """An interval within limits; one that lies at a limit or beyond tells nothing, and is all.
+    """Cut an interval at limits; one that lies at a limit or beyond tells nothing, and is all.
 
-    Where there is no end, it reaches to the estimate.
+    Where there is no limit, it reaches to the estimate.
     """
     low, high = (min(max(end, limits[0]), limits[1]) for end in interval)
     near = SAME if np.isfinite(limits).all() else 0.0
@@ -151,55 +341,3 @@ def _cut(
         if math.isclose(low, end, rel_tol=near) and math.isclose(high, end, rel_tol=near):
             low, high = (end if math.isfinite(end) else at for end in limits)
     return low, high
-
-
-def _ends(
-    name: str, found: Estimate, shorter: Repetitions, longer: Repetitions, confidence: float
-) -> tuple[float, float]:
-    """An estimate, on its own scale, less the quantiles of its error in units of its width.
-
-    Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default, it
-    lies further inside.
-    """
-    at, width = _found(name, found)
-    tail = 0.5 * (1.0 - confidence)
-    highest = np.quantile(_errors(name, shorter), 1.0 - tail, method="weibull")
-    lowest = np.quantile(_errors(name, longer), tail, method="weibull")
-    return at - width * float(highest), at - width * float(lowest)
-
-
-def _errors(name: str, repeated: Repetitions) -> list[float]:
-    """Errors of a parameter on its own scale, in units of their widths."""
-    model = repeated.truth.model
-    truth = model.noise**2 if name == "noise" else _found(name, repeated.truth)[0]
-    return [(at - truth) / width for at, width in (_found(name, one) for one in repeated.fits)]
-
-
-def _found(name: str, one: Estimate) -> tuple[float, float]:
-    """An estimate on its own scale, and what its error is proportional to."""
-    if name == "noise":  # its variance, which may be negative, and its own error
-        return one.noise
-    width = math.sqrt(one.parameters["efolding_length"])
-    if name in PLACES:
-        width *= one.parameters["standard_deviation"]
-    return _scaled(name, one.parameters), width
-
-
-def _scaled(name: str, values: Mapping[str, float]) -> float:
-    """A parameter on the scale on which its error is about normal."""
-    if name in PLACES:
-        return values[name]
-    return math.log(max(SIDES.get(name, 1.0) * (values[name] - _origin(name, values)), 1e-300))
-
-
-def _unscaled(name: str, scaled: float, values: Mapping[str, float]) -> float:
-    if name in PLACES:
-        return scaled
-    return _origin(name, values) + SIDES.get(name, 1.0) * math.exp(scaled)
-
-
-def _origin(name: str, values: Mapping[str, float]) -> float:
-    """From where a logarithm counts."""
-    if name in SIDES:
-        return values["mean"]
-    return 0.5 if name.endswith("exponent") else 0.0

@@ -1,30 +1,35 @@
-"""A random field from measured profiles: the public function and its checks."""
+"""A random field from measured profiles, and how far it may be trusted."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
-from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.inference.between import scatter_between, variances_within
-from stiction.inference.bootstrap import Repetitions, at_ends, intervals, repeat
-from stiction.inference.estimate import Estimate, Setting, estimate, observe
-from stiction.inference.field_fit import Details, Doubt, FieldFit, Goodness
-from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
+from stiction.inference.bootstrap import (
+    Estimate,
+    Repetitions,
+    Setting,
+    at_ends,
+    estimate,
+    intervals,
+    repeat,
+)
+from stiction.inference.marginal_fit import families_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
-from stiction.inference.spectrum_fit import back, spectrum_family
-from stiction.inference.whittle import Observed
-from stiction.inference.window import Window, make_window
+from stiction.inference.whittle import RANGES, SpectrumFamily, spectrum_of
+from stiction.inference.window import Window
 from stiction.interface import Interface
-from stiction.model import Flag, Progress, Real, at_least, checked, is_finite
+from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
 from stiction.profiles import UNITS
 from stiction.progress import Meter
+from stiction.random.random_field import RandomField
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
@@ -32,21 +37,133 @@ ENOUGH_LENGTHS = 10.0
 FAR = 0.01
 """p-value below which a family does not suit."""
 AT_LIMIT = 1e-3
+"""As a share of a range: how near to an end of it an estimate is not determined."""
 FEWEST = 20
 """Repetitions that determine a tail of errors."""
 
 
-def _known_or_estimated(value: Any, info: ValidationInfo) -> bool | float:
-    """A number, or whether it is estimated."""
-    least = 0.0 if info.field_name == "noise" else 1e-300
-    if not (isinstance(value, bool) or (is_finite(value) and value >= least)):
-        number = "number >= 0" if info.field_name == "noise" else "positive number"
+def _known(value: Any, info: ValidationInfo) -> float | None:
+    """A number, that of `False`, or None, which is estimated."""
+    least, number, none = 0.0, "number >= 0", 0.0
+    if info.field_name == "anisotropy":
+        least, number, none = 1e-300, "positive number", 1.0
+    if isinstance(value, bool):
+        return None if value else none
+    if not (is_finite(value) and value >= least):
         raise ValueError(f"must be True, False or a {number}")
-    return value if isinstance(value, bool) else float(value)
+    return float(value)
 
 
-KnownOrEstimated = Annotated[bool | float, BeforeValidator(_known_or_estimated)]
+DEFAULT_TOO = Field(validate_default=True)
+Known = Annotated[Any, BeforeValidator(_known), DEFAULT_TOO]
+Marginals = Annotated[Any, BeforeValidator(families_of), DEFAULT_TOO]
+Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
 Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
+
+
+class Goodness(NamedTuple):
+    """How well a family describes the values at a point.
+
+    Attributes
+    ----------
+    marginal
+        The member that fits best.
+    distance : float
+        Largest difference of the distribution functions (Kolmogorov).
+    score : float
+        Log likelihood of as many independent values as the record holds correlation lengths, less
+        the number of parameters, and less that of the best family; differences below about 2 mean
+        nothing.
+    """
+
+    marginal: Any
+    distance: float
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class FieldFit:
+    """A random field fitted to measured profiles, and how far it may be trusted.
+
+    Attributes
+    ----------
+    field : RandomField
+        To simulate with, without the measurement noise; it has the mean mode.
+    parameters : dict of str to float
+        What was estimated, in SI: ``efolding_length`` (m), at which the correlation of z falls to
+        1/e; ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
+        the names that study files use; ``anisotropy``; ``noise``, the standard deviation of the
+        measurement noise; and ``between``, the coefficient of variation between specimens.
+    interval : dict of str to (float, float)
+        Of each of them, from the bootstrap; within what is searched, and of bounds of the marginal
+        outside the values.
+    confidence : float
+        Of the intervals.
+    repetitions : tuple of RandomField
+        The fits to records simulated from `field`: what another measurement might have given.
+    families : dict of str to Goodness
+        Of every family of marginals that was asked for.
+    p_values : dict of str to float
+        Shares of the repetitions that are as far from their own marginal, and spectrum, as the
+        data are from the fitted ones (Barnard's test); small where a family does not suit.
+    lengths_held : float
+        Correlation lengths (on a plane, areas) that the records hold together.
+    missing : (int, int)
+        Points without a value, which are left out, and all points.
+    doubts : tuple of str
+        Reasons not to trust it; empty if there are none.
+    """
+
+    field: RandomField
+    parameters: Mapping[str, float]
+    interval: Mapping[str, tuple[float, float]]
+    confidence: float
+    repetitions: tuple[RandomField, ...]
+    families: Mapping[str, Goodness]
+    p_values: Mapping[str, float]
+    lengths_held: float
+    missing: tuple[int, int]
+    quantity: str
+    doubts: tuple[str, ...]
+    _estimate: Estimate
+    _rows: Sequence[Array]
+
+    def __str__(self) -> str:
+        width = max(map(len, self.parameters))
+        marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
+        spectrum = self.field.spectrum.type.replace("_", " ")
+        lines = [
+            f"{marginal} marginal, {spectrum} spectrum from {self.lengths_held:.3g} correlation"
+            f" lengths, {100 * self.confidence:g} % intervals"
+        ]
+        if self.missing[0]:
+            lines.append("  {} of {} points are missing and left out".format(*self.missing))
+        for name, value in self.parameters.items():
+            if name == "mean" and "marginal.mean" in self.parameters:
+                continue  # the same number
+            low, high = self.interval[name]
+            suffix = _unit_of(name, UNITS[self.quantity])
+            least, most = RANGES.get(name.removeprefix("spectrum."), (-math.inf, math.inf))
+            if low <= least or high >= most:
+                suffix += f" (searched from {least:g} to {most:g})"
+            line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
+            lines.append(f"{line} {suffix.strip()}".rstrip())
+        lines.append(
+            f"  p-values: marginal {self.p_values['marginal']:.3g}, spectrum"
+            f" {self.p_values['spectrum']:.3g} ({len(self.repetitions)} repetitions)"
+        )
+        return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
+
+    __repr__ = __str__
+
+
+def _unit_of(name: str, unit: str) -> str:
+    """SI unit of a parameter of a field in `unit`; empty for pure numbers."""
+    last = name.rpartition(".")[2]
+    if last in ("correlation_length", "efolding_length"):
+        return "m"
+    stresses = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
+    return "" if last not in stresses or unit == "1" else unit
 
 
 @checked
@@ -54,17 +171,17 @@ def fit_field(
     profiles: Any,
     interface: Interface | None = None,
     *,
-    marginal: Any = MARGINALS,
-    spectrum: Any = "power_law",
+    marginal: Marginals = MARGINALS,
+    spectrum: Spectrum = "power_law",
     detrend: Literal[0, 1, 2, 3] = 0,
-    noise: KnownOrEstimated = True,
-    anisotropy: KnownOrEstimated = False,
+    noise: Known = True,
+    anisotropy: Known = False,
     between: Flag = False,
     quantity: str = "strength",
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
-    seed: at_least(0) = 0,  # type: ignore[valid-type]
-    workers: at_least(1) | None = None,  # type: ignore[valid-type]
+    seed: Number = 0,
+    workers: Count | None = None,
     progress: Progress = True,
 ) -> FieldFit:
     """Fit a random field to measured profiles, with an interval of every parameter.
@@ -78,9 +195,9 @@ def fit_field(
         (samples, nx, ny), in SI, have a value at each node of `interface`. Several profiles, also
         of different length, are of one field.
     interface : Interface, optional
-        Needed for arrays without coordinates. A warning says if it is too short, or its nodes too
-        coarse, for the fitted field.
-    marginal : str, dict or sequence of str
+        Needed for arrays without coordinates. A warning is issued if it is too short, or its nodes
+        too coarse, for the fitted field.
+    marginal : str, dict or sequence of them
         Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal' or any
         continuous distribution of `scipy.stats`. Of several the best is taken, and `families` in
         the result compares them. A table keeps parameters: ``{"type": "beta", "low": 0,
@@ -100,15 +217,15 @@ def fit_field(
         Whether records are of different specimens, each with a factor of its own: the coefficient
         of variation ``between`` of this factor is estimated, for `RandomInterface`.
     quantity : str
-        What was measured, for its unit: 'strength', 'normal_pressure', 'friction_coefficient',
-        ... A field of friction coefficients says so itself.
+        What was measured, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
+        The fitted field of friction coefficients has ``of="friction_coefficient"``.
     bootstrap : int
         Repetitions, at least 20: as many from the fitted field, and from fields with correlation
         lengths at either end of a first interval of it.
     confidence : float
         Of the intervals.
     seed : int
-        Of the repetitions, not negative.
+        Of the repetitions.
     workers : int, optional
         Threads; all cores by default. The numbers do not depend on it.
     progress : bool or callable
@@ -158,61 +275,150 @@ def fit_field(
     >>> bool(low < 1e-3 < high)
     True
     """
-    families, spectral = _families(marginal, spectrum, anisotropy, noise)
     if quantity not in UNITS:
         raise InputError(unknown_name("quantity", quantity, UNITS))
     records = records_of(profiles, interface, quantity)
-    if anisotropy is not False and records[0].values.ndim == 1:
+    if anisotropy != 1.0 and records[0].values.ndim == 1:
         raise InputError("anisotropy: is of maps; the profiles are lines, leave it out")
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
-    spectral = replace(spectral, lengths=(spacing, 2.0 * float(longest)))
-    windows = _windows(records, detrend)
-    rows = [
-        window.without_trend(record.values[record.measured])
-        for window, record in zip(windows, records, strict=True)
-    ]
+    name, fixed = spectrum
+    family = SpectrumFamily(name, fixed, anisotropy, noise, (spacing, 2.0 * float(longest)))
+    windows, rows = _windowed(records, detrend)
     levels = np.array([row.mean() for row in rows])
-    if between and (len(rows) < 2 or levels.min() <= 0.0):
-        raise InputError(
-            f"between: needs several records of positive mean, got {len(rows)} with means from"
-            f" {levels.min():g} to {levels.max():g}"
-        )
     if between:
+        if len(rows) < 2 or levels.min() <= 0.0:
+            raise InputError(
+                f"between: needs several records of positive mean, got {len(rows)} with means from"
+                f" {levels.min():g} to {levels.max():g}"
+            )
         rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
     options = (bootstrap, seed, usable_cores() if workers is None else workers)
-    fields = 3 if "correlation_length" in spectral.free else 1
+    fields = 3 if "correlation_length" in family.free else 1
     with Meter("fit_field", fields * bootstrap, progress) as meter:
-        settings = [Setting(windows, family, spectral) for family in families]
-        found, setting, compared = _best(settings, rows)
-        repeated = [repeat(found, setting, *options, meter)]
+        settings = [Setting(windows, one, family) for one in marginal]
+        found, compared = _best(settings, rows)
+        repeated = [repeat(found, *options, meter)]
         if fields == 3 and len(repeated[0].fits) >= FEWEST:
-            for field in at_ends(repeated[0], setting, confidence):
-                repeated.append(repeat(field, setting, *options, meter))
-    done, asked = sum(len(one.fits) for one in repeated), fields * bootstrap
-    if min(len(one.fits) for one in repeated) < FEWEST:
-        raise InputError(
-            f"marginal: {setting.marginal.name!r} could be fitted to only {done} of {asked}"
-            " repetitions; take another marginal"
-        )
-    fit = _result(repeated, setting, compared, records, rows, confidence, quantity)
+            for field in at_ends(repeated[0], confidence):
+                repeated.append(repeat(field, *options, meter))
+    fit = _result(repeated, compared, records, rows, confidence, quantity, fields * bootstrap)
     if between:
-        fit = _with_between(fit, levels, windows)
-    if done < asked:
-        fit = replace(fit, doubts=(*fit.doubts, Doubt("repetitions", done, asked)))
+        fit = _with_between(fit, levels)
     for doubt in fit.doubts:
-        warn_accuracy(str(doubt))
+        warn_accuracy(doubt)
     if interface is not None:
         fit.field.modes(interface)
         fit.field.warn_if_inaccurate(interface)
     return fit
 
 
-def _with_between(fit: FieldFit, levels: Array, windows: Sequence[Window]) -> FieldFit:
+def _windowed(records: Sequence[Record], degree: int) -> tuple[tuple[Window, ...], list[Array]]:
+    """A window for each record, which those of one geometry share, and values without trend."""
+    made: dict[Any, Window] = {}
+    windows, rows = [], []
+    for values, spacings in records:
+        measured = np.isfinite(values)
+        key = (values.shape, spacings, measured.tobytes())
+        if key not in made:
+            made[key] = Window(spacings, measured, degree)
+        windows.append(made[key])
+        rows.append(made[key].without_trend(values[measured]))
+    return tuple(windows), rows
+
+
+def _best(
+    settings: Sequence[Setting], rows: Sequence[Array]
+) -> tuple[Estimate, dict[str, Goodness]]:
+    """The family that describes the values best, and how well each does."""
+    values = np.concatenate(rows)
+    fitted: list[tuple[float, Estimate]] = []
+    problems: list[str] = []
+    for setting in settings:
+        try:
+            if setting.spectrum.noise == 0.0:
+                setting.marginal.check(values)
+            found = estimate(rows, setting)
+        except InputError as error:
+            problems += error.problems
+            continue
+        independent = min(_lengths_held(found), values.size)
+        score = independent * mean_log_likelihood(found.marginal, values, found.model.noise)
+        fitted.append((score - len(setting.marginal.parameters(found.marginal)), found))
+    if not fitted:
+        raise InputError(problems)
+    top, best = max(fitted, key=lambda one: one[0])
+    compared = {
+        found.setting.marginal.name: Goodness(found.marginal, found.distance, score - top)
+        for score, found in fitted
+    }
+    return best, compared
+
+
+def _lengths_held(found: Estimate) -> float:
+    """Correlation lengths, or on a plane areas, that the windows hold together."""
+    windows = found.setting.windows
+    area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
+    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
+    return area / (length if windows[0].measured.ndim == 1 else length * length * ratio)
+
+
+def _p_value(name: str, repeated: Repetitions) -> float:
+    """Of data that are a record of their model (Barnard's test; Davison and Hinkley, 1997)."""
+    own = getattr(repeated.truth, name)
+    return (sum(getattr(one, name) >= own for one in repeated.fits) + 1) / (
+        len(repeated.fits) + 1
+    )
+
+
+def _result(
+    repeated: Sequence[Repetitions],
+    compared: dict[str, Goodness],
+    records: Sequence[Record],
+    rows: Sequence[Array],
+    confidence: float,
+    quantity: str,
+    asked: int,
+) -> FieldFit:
+    found, fits = repeated[0]
+    done = sum(len(one.fits) for one in repeated)
+    if min(len(one.fits) for one in repeated) < FEWEST:
+        raise InputError(
+            f"marginal: {found.setting.marginal.name!r} could be fitted to only {done} of {asked}"
+            " repetitions; take another marginal"
+        )
+    p_values = {
+        "marginal": _p_value("distance", repeated[0]),
+        "spectrum": _p_value("roughness", repeated[0]),
+    }
+    doubts = _doubts(found, p_values)
+    if done < asked:
+        doubts.append(
+            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
+            " the others"
+        )
+    points = sum(record.values.size for record in records)
+    return FieldFit(
+        field=found.field(quantity),
+        parameters=found.parameters,
+        interval=intervals(repeated, confidence, np.concatenate(rows)),
+        confidence=confidence,
+        repetitions=tuple(one.field(quantity) for one in fits),
+        families=compared,
+        p_values=p_values,
+        lengths_held=_lengths_held(found),
+        missing=(points - sum(row.size for row in rows), points),
+        quantity=quantity,
+        doubts=tuple(doubts),
+        _estimate=found,
+        _rows=rows,
+    )
+
+
+def _with_between(fit: FieldFit, levels: Array) -> FieldFit:
     """Add the scatter between records, and what it adds to the interval of the mean."""
-    within = variances_within(fit.field, windows)
-    cv, interval, error = scatter_between(np.log(levels), within, fit.confidence)
-    width = float(student.ppf(0.5 + 0.5 * fit.confidence, levels.size - 1)) * error
+    within = variances_within(fit.field, fit._estimate.setting.windows)
+    cv, interval, width = scatter_between(np.log(levels), within, fit.confidence)
     parameters = {**fit.parameters, "between": cv}
     ends = {
         name: (parameters[name] * math.exp(-width), parameters[name] * math.exp(width))
@@ -224,136 +430,48 @@ def _with_between(fit: FieldFit, levels: Array, windows: Sequence[Window]) -> Fi
     )
 
 
-def _result(
-    repeated: Sequence[Repetitions],
-    setting: Setting,
-    compared: dict[str, Goodness],
-    records: Sequence[Record],
-    rows: Sequence[Array],
-    confidence: float,
-    quantity: str,
-) -> FieldFit:
-    found, fits = repeated[0]
-    values, observed = np.concatenate(rows), tuple(observe(rows, setting.windows))
-    p_values = {
-        "marginal": _p_value(found.distance, [one.distance for one in fits]),
-        "spectrum": _p_value(found.roughness, [one.roughness for one in fits]),
-    }
-    held = _lengths_held(found, setting.windows)
-    doubts = _doubts(found, setting, observed, held)
-    doubts += [Doubt(name, p, FAR) for name, p in p_values.items() if p <= FAR]
-    points = sum(record.values.size for record in records)
-    return FieldFit(
-        field=found.field(quantity),
-        parameters=found.parameters,
-        interval=intervals(repeated, setting, confidence, values),
-        confidence=confidence,
-        repetitions=tuple(one.field(quantity) for one in fits),
-        families=compared,
-        p_values=p_values,
-        lengths_held=held,
-        missing=(points - values.size, points),
-        quantity=quantity,
-        doubts=tuple(doubts),
-        _details=Details(values, found, setting, observed, tuple(fits)),
-    )
-
-
-def _families(
-    marginal: Any, spectrum: Any, anisotropy: bool | float, noise: bool | float
-) -> tuple[list[Family], Any]:
-    """The families to fit, or everything that is wrong with them."""
-    several = marginal if isinstance(marginal, list | tuple) else [marginal]
-    # True is estimated; False is none.
-    ratio = None if anisotropy is True else anisotropy or 1.0
-    deviation = None if noise is True else float(noise)
-    calls: list[Any] = [lambda one=one: family_of(one) for one in several]
-    calls.append(lambda: spectrum_family(spectrum, ratio, deviation, (0.0, 0.0)))
-    found, problems = [], [] if several else ["marginal: names no family"]
-    for call in calls:
-        try:
-            found.append(call())
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
-    return found[:-1], found[-1]
-
-
-def _windows(records: Sequence[Record], degree: int) -> tuple[Window, ...]:
-    """A window for each record; those of one geometry share it."""
-    made: dict[Any, Window] = {}
-    keys = []
-    for values, spacings in records:
-        measured = np.isfinite(values)
-        keys.append((values.shape, spacings, measured.tobytes()))
-        if keys[-1] not in made:
-            made[keys[-1]] = make_window(values.shape, spacings, measured, degree)
-    return tuple(made[key] for key in keys)
-
-
-def _best(
-    settings: Sequence[Setting], rows: Sequence[Array]
-) -> tuple[Estimate, Setting, dict[str, Goodness]]:
-    """The family that describes the values best, and how well each does."""
-    values = np.concatenate(rows)
-    fitted: list[tuple[float, Estimate, Setting]] = []
-    problems: list[str] = []
-    for setting in settings:
-        family = setting.marginal
-        try:
-            if setting.spectrum.noise == 0.0:
-                family.check(values)
-            found = estimate(rows, setting)
-        except InputError as error:
-            problems += error.problems
-            continue
-        independent = min(_lengths_held(found, setting.windows), values.size)
-        score = independent * mean_log_likelihood(found.marginal, values, found.model.noise)
-        fitted.append((score - len(family.parameters(found.marginal)), found, setting))
-    if not fitted:
-        raise InputError(problems)
-    top, best, chosen = max(fitted, key=lambda one: one[0])
-    compared = {
-        setting.marginal.name: Goodness(found.marginal, found.distance, score - top)
-        for score, found, setting in fitted
-    }
-    return best, chosen, compared
-
-
-def _lengths_held(found: Estimate, windows: Sequence[Window]) -> float:
-    """Correlation lengths, or on a plane areas, that windows hold together."""
-    area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
-    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
-    return area / (length if len(windows[0].shape) == 1 else length * length * ratio)
-
-
-def _p_value(own: float, others: Sequence[float]) -> float:
-    """Of data that are a record of their model (Barnard's test; Davison and Hinkley, 1997)."""
-    return (sum(one >= own for one in others) + 1) / (len(others) + 1)
-
-
-def _doubts(
-    found: Estimate, setting: Setting, observed: Sequence[Observed], held: float
-) -> list[Doubt]:
-    """What stands in the way of trusting a fit."""
+def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
+    """Reasons not to trust a fit."""
     doubts = []
+    held, noise = _lengths_held(found), found.model.noise
     if held < ENOUGH_LENGTHS:
-        doubts.append(Doubt("lengths_held", held, ENOUGH_LENGTHS))
-    left = max(_power_at_cutoff(found, one) for one in observed)
-    if left <= found.model.noise**2:
-        doubts.append(Doubt("noise", found.model.noise, math.sqrt(left)))
-    family = setting.spectrum
-    for name, at, limits in zip(
-        family.free, family.vector(found.model), family.limits, strict=True
-    ):
-        near = np.abs(limits - at) < AT_LIMIT * (limits[1] - limits[0])
-        if name in ("correlation_length", "exponent", "anisotropy") and near.any():
-            doubts.append(Doubt(name, back(name, at), back(name, limits[near.argmax()])))
+        doubts.append(
+            f"the records hold {held:.2g} correlation lengths, too few for intervals to be trusted:"
+            f" at least {ENOUGH_LENGTHS:g} are needed; measure a longer piece, or several"
+        )
+    left = max(_power_at_cutoff(found, one) for one in set(found.setting.windows))
+    if left <= noise**2:
+        doubts.append(
+            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
+            f" {math.sqrt(left):.3g} left: the correlation length rests on the family, not on the"
+            " data"
+        )
+    family = found.setting.spectrum
+    values = family.of(found.model)
+    sides = np.abs(family.limits - family.vector(list(values.values()))[:, None])
+    near = sides < AT_LIMIT * np.ptp(family.limits, axis=1, keepdims=True)
+    for (name, value), at_end in zip(values.items(), near, strict=True):
+        if name in ("correlation_length", "exponent", "anisotropy") and at_end.any():
+            doubts.append(
+                f"{name} {value:.3g} lies at the end of the range that is searched,"
+                f" {family.ranges[name][at_end.argmax()]:.3g}: the data do not determine it; give"
+                " it"
+            )
+    advice = {
+        "marginal": "the values are far from its family; compare families",
+        "spectrum": "the periodogram is far from its family; take another spectrum or a higher"
+        " detrend",
+    }
+    doubts += [
+        f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {advice[name]}, or look at"
+        " st.plot.fit"
+        for name, p in p_values.items()
+        if p <= FAR
+    ]
     return doubts
 
 
-def _power_at_cutoff(found: Estimate, observed: Observed) -> float:
+def _power_at_cutoff(found: Estimate, window: Window) -> float:
     """What is left of the field's power where it has fallen to a quarter, as the noise counts it.
 
     The noise is white: each ordinate expects its variance, the taper being normalised.
@@ -361,6 +479,6 @@ def _power_at_cutoff(found: Estimate, observed: Observed) -> float:
     model = found.model
     if model.noise_share <= 0.0:
         return math.inf
-    power = model.variance * (1.0 - model.noise_share) * model.signal(observed)
-    power = power[observed.weights > 0.0]
+    power = model.variance * (1.0 - model.noise_share) * model.signal(window)
+    power = power[window.weights > 0.0]
     return float(power[power >= 0.25 * power.max()].min())

@@ -7,9 +7,8 @@ correlated; the likelihood takes them for independent, which leaves the estimate
 composite likelihood) and its error to the bootstrap.
 """
 
-import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -53,8 +52,6 @@ class Kind(NamedTuple):
     scipys: Any
     distribution: Callable[..., Array]
     log_density: Callable[..., Array]
-    keeps: tuple[str, ...] = ("low",)
-    """Parameters that may be given."""
 
 
 def _positive(u: Array) -> Array:
@@ -90,14 +87,12 @@ KINDS = {
         scipy.stats.beta,
         lambda u, a, b: betainc(a, b, np.clip(u, 0.0, 1.0)),
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
-        ("low", "high"),
     ),
     "truncated_normal": Kind(
         TruncatedNormal,
         scipy.stats.truncnorm,
         lambda u, a, b: (ndtr(np.clip(u, a, b)) - ndtr(a)) / _between(a, b),
         lambda u, a, b: -0.5 * u * u - math.log(_between(a, b)),
-        ("low", "high"),
     ),
 }
 SCIPYS = {"normal": "norm"}
@@ -114,10 +109,10 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """A family of marginals, and which of its parameters the user has fixed."""
+    """A family of marginals, and those of its parameters that are fixed."""
 
     name: str
-    fixed: tuple[tuple[str, float], ...] = ()
+    fixed: dict[str, float]
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
         """Return the marginal of values (points,) that carry noise of a standard deviation.
@@ -160,13 +155,18 @@ class Family:
 
     def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Search:
         if self.name == "beta":
-            return _beta(values, quiet, noise, dict(self.fixed), start)
+            return _beta(values, quiet, noise, self.fixed, start)
+        low, high = self.bounds
+        mean, unit = float(quiet.mean()), float(quiet.std())
         if self.name == "truncated_normal":
-            return _truncated_normal(quiet, *self.bounds)
-        low = self.bounds[0]
+
+            def parameters(v: Array) -> tuple[float, ...]:
+                middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
+                return (low - middle) / width, (high - middle) / width, middle, width
+
+            return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
         if start is None:
-            mean = float(quiet.mean())
-            start = KINDS[self.name].made(mean=mean, cv=float(quiet.std()) / mean, low=low)
+            start = KINDS[self.name].made(mean=mean, cv=unit / mean, low=low)
         shape, _, scale = start.distribution.args
         shapes = (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)
         return Search(
@@ -182,21 +182,20 @@ class Family:
             a, b, low, width = parameters
             return Beta(alpha=a, beta=b, low=low, high=low + width)
         mean, variance = map(float, kind.scipys.stats(*parameters))
-        bounds = {"low": 0.0} | dict(self.fixed)
         # A cut normal distribution may tend to an exponential or uniform one: the widest is taken
         # that its moments still determine.
         for narrower in 0.97 ** np.arange(60):
             try:
-                return kind.made(mean=mean, cv=narrower * math.sqrt(variance) / mean, **bounds)
+                cv = narrower * math.sqrt(variance) / mean
+                return kind.made(mean=mean, cv=cv, **self.fixed)
             except InputError:
                 continue
         raise InputError(f"marginal: no {self.name!r} distribution resembles the values")
 
     def _by_scipy(self, values: Array) -> Any:
         family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
-        fixed = {
-            f"f{key}" if key in ("loc", "scale") else f"fix_{key}": v for key, v in self.fixed
-        }
+        places = {"loc": "floc", "scale": "fscale"}
+        fixed = {places.get(key, f"fix_{key}"): value for key, value in self.fixed.items()}
         try:
             return marginal_of(family(*family.fit(values, **fixed)))
         except Exception as error:  # every family of scipy has its own
@@ -214,22 +213,14 @@ class Family:
 
     def parameters(self, marginal: Any) -> dict[str, float]:
         """Return what was estimated, by name."""
-        if isinstance(marginal, ScipyMarginal):
-            found = dict(marginal.parameters)
-        else:
-            names = [
-                field.name for field in dataclasses.fields(marginal) if field.name != "type"
-            ]
-            found = {name: getattr(marginal, name) for name in names}
-        known = dict(self.fixed).keys() | (set() if self.name == "beta" else {"low"})
-        return {n: float(v) for n, v in found.items() if v is not None and n not in known}
+        own = vars(marginal) if not isinstance(marginal, ScipyMarginal) else marginal.parameters
+        known = {"type", "distribution", *self.fixed}
+        return {n: float(v) for n, v in dict(own).items() if v is not None and n not in known}
 
     @property
     def bounds(self) -> tuple[float, float]:
         """The support as far as it is known before anything is fitted."""
-        zero = {"low": 0.0} if self.name in KINDS and self.name != "beta" else {}
-        bounds = zero | dict(self.fixed)
-        return bounds.get("low", -math.inf), bounds.get("high", math.inf)
+        return self.fixed.get("low", -math.inf), self.fixed.get("high", math.inf)
 
     def check(self, values: Array) -> None:
         """Refuse values that the family cannot have."""
@@ -244,47 +235,58 @@ class Family:
             )
 
 
-def name_and_fixed(what: str, given: Any) -> tuple[str, dict[str, float]]:
-    """Name and given parameters of a family, from the name alone or a table {type, ...}."""
+def name_and_fixed(
+    given: Any, names: Iterable[str], parameters: Callable[[str], Iterable[str] | None]
+) -> tuple[str, dict[str, float]]:
+    """Return the name of a family and its given parameters, from a name or a table {type, ...}.
+
+    `names` are offered where a name is unknown, that is where it has no `parameters`.
+    """
     table = {"type": given} if isinstance(given, str) else given
     if not isinstance(table, Mapping):
         raise InputError(
-            f"{what}: must be a name, or a table with the parameters to keep, such as"
+            "must be a name, or a table with the parameters to keep, such as"
             f" {{'type': 'beta', 'low': 0.0}}, got {describe(given)}"
         )
     fixed = {str(key): value for key, value in table.items() if key != "type"}
-    wrong = [key for key, value in fixed.items() if not is_finite(value)]
-    if wrong:
-        raise InputError([f"{what}.{key}: must be a finite number" for key in wrong])
-    return str(table.get("type")), {key: float(value) for key, value in fixed.items()}
+    name = str(table.get("type"))
+    known = parameters(name)
+    if known is None:
+        raise InputError(unknown_name("type", name, names))
+    problems = [unknown_name(name, key, known) for key in fixed if key not in known]
+    problems += [
+        f"{key}: must be a finite number, got {describe(value)}"
+        for key, value in fixed.items()
+        if not is_finite(value)
+    ]
+    if problems:
+        raise InputError(problems)
+    return name, {key: float(value) for key, value in fixed.items()}
+
+
+def _parameters(name: str) -> Iterable[str] | None:
+    """What may be given of a family."""
+    if name in KINDS:
+        return ("low", "high") if name in ("beta", "truncated_normal") else ("low",)
+    family = getattr(scipy.stats, SCIPYS.get(name, name), None)
+    if not isinstance(family, scipy.stats.rv_continuous):
+        return None
+    return (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
 
 
 def family_of(given: Any) -> Family:
     """Return the family of a name, or of a table with some of its parameters."""
-    name, fixed = name_and_fixed("marginal", given)
-    if name in KINDS:
-        known = KINDS[name].keeps
-    else:
-        family = getattr(scipy.stats, SCIPYS.get(name, name), None)
-        if not isinstance(family, scipy.stats.rv_continuous):
-            raise InputError(unknown_name("marginal", name, [*KINDS, *SCIPYS, "uniform"]))
-        known = (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
-    problems = [
-        unknown_name(f"marginal.{name}", key, known) for key in fixed if key not in known
-    ]
-    if problems:
-        raise InputError(problems)
-    return Family(name, tuple(fixed.items()))
+    name, fixed = name_and_fixed(given, [*KINDS, *SCIPYS, "uniform"], _parameters)
+    zero = {"low": 0.0} if name in KINDS and name != "beta" else {}
+    return Family(name, zero | fixed)
 
 
-def _truncated_normal(quiet: Array, low: float, high: float) -> Search:
-    unit, mean = float(quiet.std()), float(quiet.mean())
-
-    def parameters(v: Array) -> tuple[float, ...]:
-        middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
-        return (low - middle) / width, (high - middle) / width, middle, width
-
-    return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
+def families_of(given: Any) -> list[Family]:
+    """Return the families of one such name or table, or of several."""
+    several = given if isinstance(given, list | tuple) else [given]
+    if not several:
+        raise InputError("must name a family")
+    return [family_of(one) for one in several]
 
 
 def _beta(
@@ -339,25 +341,25 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
         parts = math.ceil(2.0 * width / noise)
         reach = math.ceil(REACH * noise * parts / width)
         weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * width / parts / noise) ** 2)
+        weight /= weight.sum()
     outside = weight.size // 2
     at = edges[0] + width / parts * np.arange(-outside, BINS * parts + outside + 1)
 
     def probabilities(reached: Array) -> Array:
-        below = np.convolve(reached, weight / weight.sum(), "valid")[::parts]
-        return np.maximum(np.diff(below), LEAST)
+        return np.maximum(np.diff(np.convolve(reached, weight, "valid")[::parts]), LEAST)
 
     return counts, at, probabilities
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
-    """Of values in bins, marginal and noise together; the width of a bin is left out."""
+    """Compute that of values in bins, marginal and noise together, without the width of a bin."""
     counts, at, probabilities = _bins(values, noise)
     expected = probabilities(marginal.distribution.cdf(at))
     return float(counts @ np.log(expected) / values.size)
 
 
 def distance(marginal: Any, values: Array) -> float:
-    """Largest difference between the distribution function and that of the values (Kolmogorov)."""
-    return float(
-        scipy.stats.ks_1samp(values, marginal.distribution.cdf, method="asymp").statistic
-    )
+    """Compute Kolmogorov's distance: the largest difference of the distribution functions."""
+    expected = marginal.distribution.cdf(np.sort(values))
+    steps = np.arange(values.size + 1) / values.size
+    return float(max((steps[1:] - expected).max(), (expected - steps[:-1]).max()))

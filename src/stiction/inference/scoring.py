@@ -21,22 +21,12 @@ def climb(
     longest: float,
     settled: float,
 ) -> Array:
-    """Return the parameters of the greatest likelihood, from a start.
+    """Return the parameters of the greatest likelihood, from a start within limits.
 
-    Fisher scoring with the damping of Levenberg and Marquardt.
-
-    Parameters
-    ----------
-    at : (parameters,) array
-    limits : (parameters, 2) array
-    value_of : callable
-        From parameters to the log likelihood, and what its derivatives can be computed from.
-    derivatives : callable
-        From both to the score, (parameters,), and Fisher's information, (parameters, parameters).
-    longest : float
-        Most that a parameter moves in a step.
-    settled : float
-        Gain of log likelihood below which it ends.
+    Fisher scoring with the damping of Levenberg and Marquardt. `value_of` returns the log
+    likelihood and what its derivatives need; `derivatives` returns the score and Fisher's
+    information. No parameter moves by more than `longest` in a step, and a gain below `settled`
+    ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)

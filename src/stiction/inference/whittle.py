@@ -11,28 +11,64 @@ data. A floor of a thousandth of the highest power is therefore added to periodo
 alike. The score stays unbiased; what lies below the floor ceases to count.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter
 
 from stiction.arrays import Array
-from stiction.inference.spectral_model import Grid
+from stiction.inference.marginal_fit import name_and_fixed
+from stiction.inference.scoring import climb
 from stiction.inference.window import Window
+from stiction.model import keys_of
 from stiction.random.mapping import quantile_of_normal
+from stiction.random.spectra import (
+    ExponentialSpectrum,
+    PowerLawSpectrum,
+    SquaredExponentialSpectrum,
+)
 
+CLASSES: dict[str, Any] = {
+    "power_law": PowerLawSpectrum,
+    "squared_exponential": SquaredExponentialSpectrum,
+    "exponential": ExponentialSpectrum,
+}
+POWER_KEPT = {"power_law": 0.9997, "squared_exponential": 0.9997, "exponential": 0.99}
+RANGES = {
+    "variance": (1e-200, 1e200),
+    "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
+    "anisotropy": (0.05, 20.0),
+    # A negative share stands for less at high wavenumbers than the field alone would have, by
+    # chance; were it cut at zero, the errors of small noises could not be told.
+    "noise_share": (-0.5, 0.95),
+}
+"""Between which ends parameters are looked for; of noise, its share of the variance."""
+TRIED = {
+    "variance": [1.0],
+    "exponent": [1.0, 2.0, 4.0],
+    "anisotropy": [0.5, 1.0, 2.0],
+    "noise_share": [0.0, 0.01, 0.1, 0.4],
+}
+"""Where a search may begin."""
 FLOOR = 1e-3
 """Of the highest power, averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS = 10
 REACH, POINTS = 6.0, 121
+DIFFERENCE = 1e-4
+SETTLED = 1e-3
+"""Gain of log likelihood below which scoring ends; a standard error is worth a half."""
+LONGEST = 1.5
+"""Step, on the scale on which parameters are searched for."""
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Shares of the variance in the Hermite orders 0, 1, ..., which sum to 1.
+    """Return the shares of the variance in the Hermite orders 0, 1, ..., which sum to 1.
 
     As `stiction.random.mapping.hermite_coefficients`, with fewer points and orders: a hundredth of
     its cost and an error below 1e-4, the last order standing for all that are left out.
@@ -46,85 +82,43 @@ def hermite_shares(marginal: Any) -> Array:
     shares = np.zeros(ORDERS + 1)
     previous, current = np.zeros_like(z), np.ones_like(z)
     for order in range(1, ORDERS):
-        previous, current = (
-            current,
-            (z * current - np.sqrt(order - 1) * previous) / np.sqrt(order),
-        )
+        following = (z * current - np.sqrt(order - 1) * previous) / np.sqrt(order)
+        previous, current = current, following
         shares[order] = float(weight @ (value * current)) ** 2 / total
     shares[ORDERS] = max(1.0 - shares.sum(), 0.0)
     result: Array = shares / shares.sum()
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Periodograms of all records of one geometry.
-
-    Attributes
-    ----------
-    window : Window
-    grid : Grid
-    records : int
-    average : (*half) array
-        Of their periodograms.
-    weights : (*half) array
-        Of wave vectors: 1, a half where k and -k are both among them or k is its own opposite, 0
-        for the mean.
-    floor : float
-        Added to periodograms and expectations.
-    white : (*half) array
-        Expectation of a periodogram of white noise of unit variance.
-    """
+class Observed(NamedTuple):
+    """Periodograms of all records of one geometry: their number, their average, and its floor."""
 
     window: Window
-    grid: Grid
     records: int
     average: Array
-    weights: Array
     floor: float
-    white: Array
 
 
-def make_observed(window: Window, periodograms: Array) -> Observed:
-    """What is needed of periodograms (records, *half) in a window."""
-    average = periodograms.mean(axis=0)
-    smooth = uniform_filter(average, NEIGHBOURS, mode="nearest")
-    unit = np.zeros(window.padded)
-    unit[(0,) * unit.ndim] = 1.0
-    weights = np.ones(average.shape)
-    weights[..., 0] = 0.5
-    if window.shape[-1] % 2 == 0:
-        weights[..., -1] = 0.5
-    weights[(0,) * weights.ndim] = 0.0
-    return Observed(
-        window=window,
-        grid=Grid(window.shape, window.spacings),
-        records=len(periodograms),
-        average=average,
-        weights=weights,
-        floor=FLOOR * float(smooth.max()),
-        white=window.expectation(unit),
-    )
+def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
+    """Return the periodograms of measured values (points,), by geometry."""
+    powers: dict[Window, list[Array]] = {}
+    for row, window in zip(rows, windows, strict=True):
+        powers.setdefault(window, []).append(window.periodogram(row))
+    found = []
+    for window, own in powers.items():
+        average = np.stack(own).mean(axis=0)
+        highest = uniform_filter(average, NEIGHBOURS, mode="nearest").max()
+        found.append(Observed(window, len(own), average, FLOOR * float(highest)))
+    return found
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
-    """What a spectrum, a marginal and a share of noise predict of records.
+class Model(NamedTuple):
+    """What a spectrum, the Hermite shares of a marginal and noise predict of records.
 
-    Attributes
-    ----------
-    spectrum : PowerLawSpectrum, SquaredExponentialSpectrum or ExponentialSpectrum
-    anisotropy : float
-    noise_share : float
-        Of the variance of the values; negative only on the way to an estimate.
-    variance : float
-        Of the values, noise included.
-    shares : (orders,) array
-        See `hermite_shares`.
-    end_seen : bool
-        Whether the truncation of the spectrum is a property of the field, which records may show.
-        Otherwise it only makes simulation finite: at a multiple of 1/xi_0 it would, among the
-        wavenumbers of a record, tell the correlation length, and rule out a longer one.
+    `noise_share` is of `variance`, which is that of the values, noise included; it is negative only
+    on the way to an estimate. `end_seen` is whether the truncation of the spectrum is a property of
+    the field, which records may show. Otherwise it only makes simulation finite: at a multiple of
+    1/xi_0 it would, among the wavenumbers of a record, determine the correlation length.
     """
 
     spectrum: Any
@@ -132,40 +126,214 @@ class Model:
     noise_share: float
     variance: float
     shares: Array
-    end_seen: bool = True
+    end_seen: bool
 
     @property
     def noise(self) -> float:
         """Standard deviation of the measurement noise."""
         return math.sqrt(self.noise_share * self.variance)
 
-    def power(self, grid: Grid) -> Array:
-        """Variance of z in each mode of a grid."""
-        return grid.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
+    def power(self, window: Window) -> Array:
+        """Return the variance of z in each mode of a period of a window's grid."""
+        return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
 
-    def signal(self, observed: Observed) -> Array:
-        """Expectation of periodograms of values of unit variance without noise, (*half)."""
-        rho = observed.grid.correlation(self.power(observed.grid))
-        return observed.window.expectation(np.polynomial.polynomial.polyval(rho, self.shares))
+    def signal(self, window: Window) -> Array:
+        """Return the expected periodogram of values of unit variance without noise, (*half)."""
+        rho = window.correlation(self.power(window))
+        return window.expectation(np.polynomial.polynomial.polyval(rho, self.shares))
 
-    def expectation(self, observed: Observed) -> Array:
-        """Of periodograms, (*half)."""
-        return self.with_noise(self.signal(observed), observed)
-
-    def with_noise(self, signal: Array, observed: Observed) -> Array:
-        """The expectation of periodograms from that without noise."""
+    def expectation(self, window: Window, signal: Array | None = None) -> Array:
+        """Return the expected periodogram, (*half), from that without noise if it is there."""
+        signal = self.signal(window) if signal is None else signal
         share = self.noise_share
-        result: Array = self.variance * ((1.0 - share) * signal + share * observed.white)
+        result: Array = self.variance * ((1.0 - share) * signal + share * window.white)
         return result
 
 
-def loss(expected: Sequence[Array], observed: Sequence[Observed]) -> float:
-    """Minus the log likelihood; infinite where less than nothing is expected."""
-    value = 0.0
-    for one, e in zip(observed, expected, strict=True):
-        lifted = e + one.floor
-        if lifted.min() <= 0.0:
-            return math.inf
-        terms = np.log(lifted) + (one.average + one.floor) / lifted
-        value += one.records * float(np.sum(one.weights * terms))
-    return value
+def origin(name: str) -> float:
+    """Return where the logarithm begins on which the error of a parameter is about normal."""
+    return 0.5 if name.endswith("exponent") else 0.0
+
+
+def _scaled(name: str, value: float) -> float:
+    """A parameter on the scale on which it is searched for."""
+    return value if name == "noise_share" else math.log(value - origin(name))
+
+
+def _unscaled(name: str, value: float) -> float:
+    return value if name == "noise_share" else origin(name) + math.exp(value)
+
+
+def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
+    """Return the name of a family of spectra and the parameters to keep, checked."""
+
+    def parameters(name: str) -> list[str] | None:
+        return (
+            [key for key in keys_of(CLASSES[name]) if key != "type"]
+            if name in CLASSES
+            else None
+        )
+
+    name, fixed = name_and_fixed(given, CLASSES, parameters)
+    CLASSES[name](**({"correlation_length": 1.0} | fixed))
+    return name, fixed
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumFamily:
+    """A family of spectra with fixed parameters, and what else is estimated (None) with it.
+
+    `noise` is the standard deviation of the measurement noise, and `lengths` (m) are those between
+    which correlation lengths are looked for.
+    """
+
+    name: str
+    fixed: dict[str, float]
+    anisotropy: float | None
+    noise: float | None
+    lengths: tuple[float, float]
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """What is estimated, in the order of the vector of parameters."""
+        estimated = {
+            "variance": True,
+            "correlation_length": "correlation_length" not in self.fixed,
+            "exponent": self.name == "power_law" and "exponent" not in self.fixed,
+            "anisotropy": self.anisotropy is None,
+            "noise_share": self.noise is None,
+        }
+        return tuple(name for name, is_free in estimated.items() if is_free)
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Between which ends each of them is looked for."""
+        ranges = RANGES | {"correlation_length": self.lengths}
+        return {name: ranges[name] for name in self.free}
+
+    @cached_property
+    def limits(self) -> Array:
+        """The same on the scale of the search, (parameters, 2)."""
+        return np.transpose(
+            [self.vector(ends) for ends in zip(*self.ranges.values(), strict=True)]
+        )
+
+    def model(self, vector: Array, shares: Array) -> Model:
+        """Return the model of a vector of parameters."""
+        found = {n: _unscaled(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
+        variance = found.pop("variance")
+        anisotropy = found.pop("anisotropy", self.anisotropy or 1.0)
+        known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
+        noise = found.pop("noise_share", known)
+        options = self.fixed | found
+        end_given = not {"truncation", "power_kept"}.isdisjoint(options)
+        if not end_given:
+            options["power_kept"] = POWER_KEPT[self.name]
+        return Model(
+            CLASSES[self.name](**options), anisotropy, noise, variance, shares, end_given
+        )
+
+    def vector(self, values: Sequence[float]) -> Array:
+        """Return free parameters on the scale of the search."""
+        return np.array([_scaled(*one) for one in zip(self.free, values, strict=True)])
+
+    def of(self, model: Model) -> dict[str, float]:
+        """Return the free parameters of a model."""
+        owners = {name: model.spectrum for name in ("correlation_length", "exponent")}
+        return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
+
+
+class Whittle(NamedTuple):
+    """The likelihood of periodograms, in terms of the vector of a family."""
+
+    family: SpectrumFamily
+    shares: Array
+    observed: Sequence[Observed]
+
+    def loss(self, expected: Sequence[Array]) -> float:
+        """Return minus the log likelihood; infinite where less than nothing is expected."""
+        value = 0.0
+        for one, e in zip(self.observed, expected, strict=True):
+            lifted = e + one.floor
+            if lifted.min() <= 0.0:
+                return math.inf
+            terms = np.log(lifted) + (one.average + one.floor) / lifted
+            value += one.records * float(np.sum(one.window.weights * terms))
+        return value
+
+    def coarse(self) -> Array:
+        """Return the best of a grid of parameters, to begin with."""
+        lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
+        tried = TRIED | {"correlation_length": lengths}
+        windows = [one.window for one in self.observed]
+        power = sum(float(np.sum(one.window.weights * one.average)) for one in self.observed)
+        best, least = np.zeros(0), math.inf
+        for values in itertools.product(*[tried[name] for name in self.family.free]):
+            at = self.family.vector(values)
+            model = self.family.model(at, self.shares)
+            expected = [model.expectation(window) for window in windows]
+            pairs = zip(windows, expected, strict=True)
+            scale = power / sum(float(np.sum(window.weights * e)) for window, e in pairs)
+            value = self.loss([scale * e for e in expected])
+            if value < least:
+                best, least = at, value
+                best[0] = math.log(scale)
+        return best
+
+    def fit(self, start: Array) -> Array:
+        """Return the vector of the greatest likelihood, from a start."""
+        return climb(
+            start, self.family.limits, self.value, self.score, longest=LONGEST, settled=SETTLED
+        )
+
+    def value(self, at: Array) -> tuple[float, list[Array]]:
+        """Return the log likelihood, and the expected periodograms without noise."""
+        model = self.family.model(at, self.shares)
+        signals = [model.signal(one.window) for one in self.observed]
+        pairs = zip(self.observed, signals, strict=True)
+        return -self.loss([model.expectation(one.window, s) for one, s in pairs]), signals
+
+    def score(self, at: Array, signals: Sequence[Array]) -> tuple[Array, Array]:
+        """Return derivatives of the log likelihood, (parameters,), and Fisher's information.
+
+        With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d d^T.
+        """
+        family, limits = self.family, self.family.limits
+        model = family.model(at, self.shares)
+        moved = {}
+        for i, name in enumerate(family.free):
+            if name not in ("variance", "noise_share"):
+                aside = at.copy()
+                aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
+                moved[name] = family.model(aside, self.shares), aside[i] - at[i]
+        result, information = np.zeros(at.size), np.zeros((at.size, at.size))
+        for one, signal in zip(self.observed, signals, strict=True):
+            expected = model.expectation(one.window, signal)
+            # Of a known noise the share falls as the variance grows.
+            slopes = {
+                "variance": expected if family.noise is None else model.variance * signal,
+                "noise_share": model.variance * (one.window.white - signal),
+            }
+            scale = model.variance * (1.0 - model.noise_share)
+            for name, (other, step) in moved.items():
+                slopes[name] = scale * (other.signal(one.window) - signal) / step
+            lifted = expected + one.floor
+            d = np.stack([(slopes[name] / lifted).ravel() for name in family.free])
+            weight = one.records * one.window.weights.ravel()
+            result += d @ (weight * ((one.average - expected) / lifted).ravel())
+            information += (d * weight) @ d.T
+        return result, information
+
+    def noise_variance(self, at: Array) -> tuple[float, float]:
+        """Return the variance of the noise, which may be negative, and its standard error.
+
+        The information takes ordinates for independent, so that the error is somewhat too small;
+        what a bootstrap needs is that it grows and shrinks as the true one.
+        """
+        model = self.family.model(at, self.shares)
+        _, information = self.score(at, [model.signal(one.window) for one in self.observed])
+        slope = np.zeros(at.size)
+        slope[self.family.free.index("variance")] = model.noise_share * model.variance
+        slope[self.family.free.index("noise_share")] = model.variance
+        error = math.sqrt(float(slope @ np.linalg.pinv(information, hermitian=True) @ slope))
+        return model.noise_share * model.variance, error

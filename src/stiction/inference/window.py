@@ -12,7 +12,8 @@ and of Guillaumin, Sykulski, Olhede and Simons, 2022, here with the trend as wel
 """
 
 import itertools
-from dataclasses import dataclass
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,43 +25,66 @@ TAPERED = 0.5
 """Share of a record over which the cosine taper rises and falls."""
 EXACT = {1: 16, 2: 2}
 """Wave numbers up to which the trend is in the expectation; the taper hides it from higher ones."""
+ROOM = {1: 4, 2: 2}
+"""Period of the grid on which a correlation is computed, in lengths of the record."""
+EDGE = 0.2
+"""Share of the truncation over which a spectrum is faded out: a sharper end would be taken for a
+precise measure of the correlation length, which it is in simulations only."""
+LEFT_OUT = 1e-4
+"""Share of the variance above the end of a spectrum that is not truncated."""
+FOLDS = 6
+"""Multiples of the sampling wavenumber that are folded back one by one."""
+NEAR, FEW = 1, 65
+"""Of those multiples on a line the ones that need all wavenumbers, and how many the others do."""
 
 
-@dataclass(frozen=True, eq=False)
 class Window:
-    """Taper, gaps and trend of records of one geometry.
+    """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
-    Attributes
-    ----------
-    shape : tuple of int
-    spacings : tuple of float
-        m.
-    measured : (*shape) array of bool
-    basis : (points, terms) array
-        Orthonormal polynomials of the trend on the measured points.
-    taper : (*shape) array
-        h, zero in gaps; its squares sum to 1.
-    spread : (*padded) array
-        Autocorrelation of h at lags 0, 1, ..., n - 1, -n, ..., -1.
-    low : tuple of arrays of int
-        Wave numbers for which the trend counts.
-    exact : (low, lags) array
-        a_k of those.
+    Lags are 0, 1, ..., n - 1, -n, ..., -1 in each direction; (*half) is the shape of a real
+    transform. `basis` holds orthonormal polynomials of the trend, (points, terms), and `white` the
+    expected periodogram of white noise of unit variance. `weights` of wave vectors are 1, a half
+    where k and -k are both among them or k is its own opposite, and 0 for the mean.
     """
 
-    shape: tuple[int, ...]
-    spacings: tuple[float, ...]
-    measured: NDArray[np.bool_]
-    basis: Array
-    taper: Array
-    spread: Array
-    low: tuple[NDArray[np.int64], ...]
-    exact: Array
+    def __init__(
+        self, spacings: tuple[float, ...], measured: NDArray[np.bool_], degree: int = 0
+    ) -> None:
+        self.measured, self.spacings, self.shape = measured, spacings, measured.shape
+        room, exact = ROOM[measured.ndim], EXACT[measured.ndim]
+        self._period = tuple(fft.next_fast_len(room * n, real=True) for n in self.shape)
+        self._lags = np.ix_(
+            *[np.r_[:n, m - n : m] for n, m in zip(self.shape, self._period, strict=True)]
+        )
+        self.basis = _polynomials(measured, degree)
+        tapers = np.ix_(*map(_taper, self.shape))
+        self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
+        self.taper /= np.sqrt(np.sum(self.taper**2))
+        lags = tuple(2 * n for n in self.shape)
+        self._spread = fft.irfftn(np.abs(fft.rfftn(self.taper, lags)) ** 2, lags)
+        most = [min(exact, (n - 1) // 2) for n in self.shape]
+        numbers = [np.arange(-m, m + 1) for m in most]
+        numbers[-1] = np.arange(min(exact, self.shape[-1] // 2) + 1)
+        low = np.array(list(itertools.product(*numbers)))
+        self._low = tuple(low.T)
+        self._exact = np.stack([self._autocorrelation(wave) for wave in low])
+        unit = np.zeros(lags)
+        unit[(0,) * unit.ndim] = 1.0
+        self.white = self.expectation(unit)
+        self.weights = np.ones(self.white.shape)
+        self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
+        self.weights[(0,) * unit.ndim] = 0.0
 
-    @property
-    def padded(self) -> tuple[int, ...]:
-        """Shape of arrays over all lags, twice that of the record."""
-        return tuple(2 * n for n in self.shape)
+    def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
+        """a_k at all lags, flat."""
+        turns = [number * np.arange(n) / n for number, n in zip(wave, self.shape, strict=True)]
+        phase = 2.0 * np.pi * sum(np.ix_(*turns))
+        carried = (self.taper * np.exp(-1j * phase))[self.measured]
+        field = np.zeros(self.shape, dtype=np.complex128)
+        field[self.measured] = carried - self.basis @ (self.basis.T @ carried)
+        power = np.abs(fft.fftn(field, self._spread.shape)) ** 2
+        result: Array = fft.ifftn(power).real.ravel()
+        return result
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
@@ -70,49 +94,70 @@ class Window:
         return tuple(2.0 * np.pi * axis for axis in np.ix_(*axes))
 
     def without_trend(self, values: Array) -> Array:
-        """Measured values (points,) without their trend but with their mean."""
+        """Remove the trend of measured values (points,) but not their mean."""
         if self.basis.shape[1] == 1:
             return values
         result: Array = values - self.basis @ (self.basis.T @ values) + values.mean()
         return result
 
     def periodogram(self, values: Array) -> Array:
-        """|sum h (y - trend) exp(-i k x)|^2 of values (*shape) or of measured ones (points,)."""
-        known = values[self.measured] if values.shape == self.shape else values
+        """Return |sum h (y - trend) exp(-i k x)|^2 of measured values (points,), (*half)."""
         field = np.zeros(self.shape)
-        field[self.measured] = known - self.basis @ (self.basis.T @ known)
+        field[self.measured] = values - self.basis @ (self.basis.T @ values)
         result: Array = np.abs(fft.rfftn(self.taper * field)) ** 2
         return result
 
     def expectation(self, covariance: Array) -> Array:
-        """Of the periodogram, from the covariance at all lags, (*padded)."""
-        padded = fft.rfftn(self.spread * covariance).real
-        step = tuple(slice(None, None, 2) for _ in self.shape)
-        result = padded[step].copy()
-        result[self.low] = self.exact @ covariance.ravel()
+        """Return the expected periodogram, (*half), from the covariance at all lags."""
+        every_other = tuple(slice(None, None, 2) for _ in self.shape)
+        result = fft.rfftn(self._spread * covariance).real[every_other].copy()
+        result[self._low] = self._exact @ covariance.ravel()
         return result
 
+    def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
+        """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
 
-def make_window(
-    shape: tuple[int, ...],
-    spacings: tuple[float, ...],
-    measured: NDArray[np.bool_],
-    degree: int,
-) -> Window:
-    """The window of records of one shape, with gaps where nothing was measured."""
-    basis = _polynomials(measured, degree)
-    tapers = np.ix_(*[_taper(n) for n in shape])
-    taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
-    taper /= np.sqrt(np.sum(taper**2))
-    padded = tuple(2 * n for n in shape)
-    spread = fft.irfftn(np.abs(fft.rfftn(taper, padded)) ** 2, padded)
-    # Wave numbers of the half plane of a real transform.
-    most = [min(EXACT[len(shape)], (n - 1) // 2) for n in shape]
-    numbers = [np.arange(-m, m + 1) for m in most]
-    numbers[-1] = np.arange(min(EXACT[len(shape)], shape[-1] // 2) + 1)
-    low = np.array(list(itertools.product(*numbers)))
-    exact = np.stack([_autocorrelation(wave, taper, measured, basis) for wave in low])
-    return Window(shape, spacings, measured, basis, taper, spread, tuple(low.T), exact)
+        The spectrum fades out at its truncation; what lies above the sampling wavenumber is folded
+        back, and what lies above `FOLDS` times that, which is flat by then, evenly. With
+        `end_seen` false it is not truncated: what a truncation leaves out of a rough spectrum
+        would be taken for noise.
+        """
+        dimensions = len(self.shape)
+        stretch = (1.0, anisotropy)[:dimensions]
+        sampling = [a * 2.0 * math.pi / d for a, d in zip(stretch, self.spacings, strict=True)]
+        if end_seen:
+            cutoff = spectrum.cutoff(dimensions)
+        else:
+            cutoff = max(spectrum.quantile(1.0 - LEFT_OUT, dimensions), *sampling)
+        folds = [min(FOLDS, math.ceil(cutoff / s + 0.5)) for s in sampling]
+        end = min(cutoff, *(s * (f + 0.5) for s, f in zip(sampling, folds, strict=True)))
+        axes = [s * fft.fftfreq(n) for s, n in zip(sampling, self._period, strict=True)]
+        axes[-1] = sampling[-1] * fft.rfftfreq(self._period[-1])
+        folded = _folded_line if dimensions == 1 else _folded_plane
+        total = folded(spectrum, axes, folds, sampling, end)
+        missed = 0.0
+        if end < cutoff:
+            kept = [spectrum.power_within(k, dimensions) for k in (end, cutoff)]
+            missed = 1.0 - kept[0] / kept[1]
+        # Most modes of a real transform stand for two of a whole one.
+        all_modes = 2.0 * total.sum() - total[..., 0].sum()
+        if self._period[-1] % 2 == 0:
+            all_modes -= total[..., -1].sum()
+        total *= (1.0 - missed) / all_modes
+        total += missed / math.prod(self._period)
+        return total
+
+    def correlation(self, power: Array) -> Array:
+        """Return the correlation of z at all lags."""
+        whole: Array = fft.irfftn(power, self._period) * math.prod(self._period)
+        return whole[self._lags]
+
+    def sample(self, power: Array, rng: np.random.Generator) -> Array:
+        """Sample z at the points that were measured, (points,): a piece of a period."""
+        white = fft.rfftn(rng.standard_normal(self._period))
+        whole = fft.irfftn(white * np.sqrt(power * math.prod(self._period)), self._period)
+        result: Array = whole[tuple(slice(n) for n in self.shape)][self.measured]
+        return result
 
 
 def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
@@ -135,15 +180,38 @@ def _taper(n: int) -> Array:
     return result
 
 
-def _autocorrelation(
-    wave: NDArray[np.int64], taper: Array, measured: NDArray[np.bool_], basis: Array
+def _fade(k: Array, end: float) -> Array:
+    return np.clip((end - k) / (EDGE * end) + 0.5, 0.0, 1.0)
+
+
+def _folded_line(
+    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
-    """a_k at all lags, flat."""
-    turns = [number * np.arange(n) / n for number, n in zip(wave, taper.shape, strict=True)]
-    phase = 2.0 * np.pi * sum(np.ix_(*turns))
-    carried = (taper * np.exp(-1j * phase))[measured]
-    field = np.zeros(taper.shape, dtype=np.complex128)
-    field[measured] = carried - basis @ (basis.T @ carried)
-    padded = tuple(2 * n for n in taper.shape)
-    result: Array = fft.ifftn(np.abs(fft.fftn(field, padded)) ** 2).real.ravel()
-    return result
+    """The density at all wavenumbers that look alike on the grid, added up."""
+
+    def added(at: Array, multiples: Array) -> Array:
+        k = np.abs(at + multiples[:, None] * sampling[0])
+        found: Array = np.sum(spectrum.density(k) * _fade(k, end), axis=0)
+        return found
+
+    near = min(folds[0], NEAR)
+    line = added(axes[0], np.arange(-near, near + 1))
+    if folds[0] > near:  # smooth by then
+        far = np.arange(near + 1, folds[0] + 1)
+        few = np.linspace(0.0, axes[0][-1], FEW)
+        line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
+    return line
+
+
+def _folded_plane(
+    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: float
+) -> Array:
+    """The same on a plane."""
+    found = np.zeros((axes[0].size, axes[1].size))
+    for p in range(-folds[0], folds[0] + 1):
+        for q in range(-folds[1], folds[1] + 1):
+            kx, ky = axes[0] + p * sampling[0], axes[1] + q * sampling[1]
+            if math.hypot(np.abs(kx).min(), np.abs(ky).min()) <= (1.0 + EDGE) * end:
+                k = np.hypot(kx[:, None], ky[None, :])
+                found += spectrum.density(k, 2) * _fade(k, end)
+    return found

@@ -10,10 +10,10 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 from scipy import fft
 
-from stiction.inference.estimate import bands, simulate
-from stiction.inference.field_fit import FieldFit
+from stiction.inference.bootstrap import bands
+from stiction.inference.fit import FieldFit
 from stiction.inference.posterior import Posterior
-from stiction.inference.whittle import Observed
+from stiction.inference.whittle import Observed, observe
 from stiction.plot.axes import unit_for, with_unit
 from stiction.plot.style import (
     ACCENT,
@@ -51,14 +51,13 @@ def fit(found: FieldFit) -> Figure:
         (c) correlation, as the window leaves it; (d) spectrum. Shaded in (a) and (b): 90 % of the
         fits to records simulated from the fitted field; in (c) and (d): 90 % of such records.
     """
-    details = found._details
-    one = max(details.observed, key=lambda record: record.window.shape[0])
-    setting = replace(details.setting, windows=(one.window,) * one.records)
-    rng = np.random.default_rng(0)
+    estimate = found._estimate
+    windows = estimate.setting.windows
+    one = max(observe(found._rows, windows), key=lambda record: record.window.shape[0])
+    alike = replace(estimate.setting, windows=(one.window,) * one.records)
+    rng, simulator = np.random.default_rng(0), replace(estimate, setting=alike)
     simulated = [
-        np.mean(
-            [one.window.periodogram(r) for r in simulate(details.estimate, setting, rng)], 0
-        )
+        np.mean([one.window.periodogram(row) for row in simulator.simulate(rng)], axis=0)
         for _ in range(SHOWN)
     ]
     with paper_style():
@@ -74,16 +73,15 @@ def fit(found: FieldFit) -> Figure:
 
 
 def _histogram(axes: Axes, found: FieldFit) -> None:
-    details = found._details
-    values = details.values
+    values = np.concatenate(found._rows)
     factor, unit = unit_for(UNITS[found.quantity], values)
     counts, _, _ = axes.hist(
         values * factor, bins=40, density=True, color=PALE, label="measured"
     )
     at = np.linspace(values.min(), values.max(), 400)
-    spread = [one.marginal.distribution.pdf(at) for one in details.repeated[:SHOWN]]
+    spread = [one.marginal.distribution.pdf(at) for one in found.repetitions[:SHOWN]]
     _band(axes, at * factor, np.array(spread) / factor)
-    noisy = details.estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
+    noisy = found._estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
     name = "fitted, without the noise" if noisy else "fitted"
     density = found.field.marginal.distribution.pdf(at) / factor
     axes.plot(at * factor, density, color=color(1), label=name)
@@ -95,15 +93,13 @@ def _histogram(axes: Axes, found: FieldFit) -> None:
 
 
 def _quantiles(axes: Axes, found: FieldFit) -> None:
-    details = found._details
-    values = details.setting.marginal.quiet(details.values, details.estimate.model.noise)
+    estimate = found._estimate
+    values = estimate.setting.marginal.quiet(np.concatenate(found._rows), estimate.model.noise)
     factor, unit = unit_for(UNITS[found.quantity], values)
     share = (np.arange(200) + 0.5) / 200
     expected = found.field.marginal.distribution.ppf(share) * factor
-    spread = np.array(
-        [one.marginal.distribution.ppf(share) for one in details.repeated[:SHOWN]]
-    )
-    _band(axes, expected, spread * factor)
+    spread = [one.marginal.distribution.ppf(share) for one in found.repetitions[:SHOWN]]
+    _band(axes, expected, np.array(spread) * factor)
     ends = [expected[0], expected[-1]]
     axes.plot(ends, ends, color=color(1), linewidth=1.0)
     axes.plot(expected, np.quantile(values, share) * factor, ".", color=INK, markersize=3)
@@ -112,7 +108,7 @@ def _quantiles(axes: Axes, found: FieldFit) -> None:
 
 
 def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
-    model = found._details.estimate.model
+    model = found._estimate.model
     spacing = one.window.spacings[0]
     most = LAGS * model.spectrum.correlation_length
     count = int(np.clip(round(most / spacing), 12, one.window.shape[0] // 2))
@@ -128,7 +124,7 @@ def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Arr
     _band(axes, lag, np.array([correlation(power) for power in simulated]))
     measured = correlation(one.average)
     axes.plot(lag, measured, ".", color=INK, markersize=3, label="measured")
-    axes.plot(lag, correlation(model.expectation(one)), color=color(1), label="fitted")
+    axes.plot(lag, correlation(model.expectation(one.window)), color=color(1), label="fitted")
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
     axes.set_xlabel(with_unit("lag along x", unit))
     axes.set_ylabel("correlation in the window")
@@ -136,15 +132,15 @@ def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Arr
 
 
 def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
-    scale, unit = unit_for(UNITS[found.quantity], found._details.values)
-    model = found._details.estimate.model
+    scale, unit = unit_for(UNITS[found.quantity], np.concatenate(found._rows))
+    model = found._estimate.model
     factor = float(np.prod(one.window.spacings)) * scale**2
 
     def averaged(power: Array) -> Array:
         """Return wavenumbers of bands, and a periodogram averaged over them."""
         return bands(one, power, 4)[:, [0, 2]].T
 
-    k, expected = averaged(model.expectation(one))
+    k, expected = averaged(model.expectation(one.window))
     measured = averaged(one.average)[1]
     _band(
         axes,
