@@ -178,7 +178,7 @@ def test_no_noise_found_is_not_no_noise():
 
 
 def test_less_than_no_noise_is_not_known_to_be_none():
-    """A truncated field has less at high wavenumbers than its family: an estimate far below zero."""
+    """A truncated field has less at high wavenumbers than its family: far less than zero."""
     truncated = st.RandomField(
         st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(2e-3, exponent=2.0, power_kept=0.99)
     )
