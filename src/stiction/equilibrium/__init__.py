@@ -2,6 +2,6 @@
 
 Read `method`, `solver` (samples in, onsets out) and `follow` (the loop from one instability to the
 next). Two programmes find the instabilities: `dense` on lines, with `linear_program`, `windows`,
-`runaway`, `stable_path`, `jump` and, for long lines, `long_line`; `transforms` on planes, with
-`bracket`, `turning_point` and `relaxation`.
+`runaway`, `stable_path` and `jump`; `transforms` on planes, and where thousands of nodes of a line
+slip, with `bracket`, `turning_point` and `relaxation`.
 """

@@ -1,4 +1,7 @@
-"""The programme of lines: one dense factor, or conjugate gradients where the line is long."""
+"""The programme of lines, with one dense factor.
+
+Where very many nodes slip the factor is slower than the transforms of planes, which take over.
+"""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -18,13 +21,11 @@ from stiction.elasticity.linear import dot
 from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import (
-    OVERFULL,
     SOLVED,
     Solution,
     certificate,
     solve_program,
 )
-from stiction.equilibrium.long_line import LongLine, runs_away_alone
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import (
     ARRESTED,
@@ -57,6 +58,7 @@ from stiction.equilibrium.sample import (
     sample_of,
 )
 from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
+from stiction.equilibrium.transforms import Plane, plane_onset
 from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
 from stiction.errors import InputError
 from stiction.jit import jit, jit_inside
@@ -65,17 +67,17 @@ from stiction.problem import Sample as Samples
 
 LONGEST_RUN = 2048
 """Nodes up to which the quick test for arrest follows a run."""
-LONG_LINE = 4096
-"""Nodes from which on conjugate gradients may be faster."""
-MANY_NODES = 600
-"""Nodes weaker than the upper bound of the load from which on they are."""
-PATIENCE = 1000
-"""Iterations of conjugate gradients, all in all, after which the dense factor takes over."""
+MANY_NODES = 1500
+"""Nodes weaker than the upper bound of the load from which on transforms are faster."""
+GAP_OF_MANY = 3e-10
+"""Relative distance of the bounds by transforms."""
 MARGIN = 1.5
 """Safety on the length at which a rupture counts as unstoppable."""
 
 CORNER_REACHED = 3
 """Outcome of a sample in which a corner of the law is reached before the first instability."""
+CROWDED = 4
+"""Outcome of a sample that is left to transforms."""
 
 
 class Line(NamedTuple):
@@ -169,6 +171,12 @@ def solve_batch(
                 windows, start = others, -np.inf
         multiplier = first.multiplier[row]
         bound = window_bound(sample, windows, work[0], multiplier)
+        weak = 0
+        for i in range(n):
+            weak += excess[row, i] < bound * profile[i]
+        if weak > MANY_NODES:
+            first.table[row, OUTCOME] = CROWDED
+            continue
         # If it does not succeed, the certificate says so.
         slip[:] = 0.0
         load, _ = solve_program(
@@ -248,25 +256,39 @@ class LineProgram:
         a lower load, if one is known.
         """
         bound, multiplier = self.bound(sample)
-        long = self.nodes >= LONG_LINE
-        if long and np.count_nonzero(sample.excess < bound * sample.profile) > MANY_NODES:
-            found = LongLine(sample, self.line.stiffness, bound, multiplier, cap).run(PATIENCE)
-            if found.status == SOLVED:
+        if (
+            cap == np.inf
+            and np.count_nonzero(sample.excess < bound * sample.profile) > MANY_NODES
+        ):
+            found = self._by_transforms(sample, state)
+            if found is not None:
                 return found
-        # Also for samples on which conjugate gradients are slow: patches alike, or very wide.
         workspace = self._workspace(sample)
-        stiff, lowest = np.empty(self.nodes), multiplier.copy()
+        stiff = np.empty(self.nodes)
         start, slip = np.inf if self._is_usual(sample) else -np.inf, np.zeros(self.nodes)
         if state is not None:
             start, slip = state.load, state.slip.copy()
-        load, status = solve_program(sample, start, bound, cap, lowest, slip, stiff, workspace)
-        if status == SOLVED:
-            return Solution(load, slip, stiff, lowest)
-        if status == OVERFULL:
-            found = LongLine(sample, self.line.stiffness, bound, multiplier, cap).run()
-            if found.status == SOLVED:
-                return found
-        return None
+        load, status = solve_program(
+            sample, start, bound, cap, multiplier, slip, stiff, workspace
+        )
+        return Solution(load, slip, stiff, multiplier) if status == SOLVED else None
+
+    def _by_transforms(self, sample: Sample, state: State | None) -> Solution | None:
+        """Solve a programme in which many nodes slip; None if its bounds stay apart."""
+        plane = Plane((self.problem.interface.extent,), self.problem.effective_modulus, 0.0)
+        found = plane_onset(
+            plane, sample.excess, sample.profile, sample.rate, GAP_OF_MANY,
+            None if state is None else state.slip,
+        )  # fmt: skip
+        if not found.closed:
+            return None
+        # The multiplier was lifted everywhere to be feasible; nodes at rest have none.
+        multiplier = found.multiplier - found.multiplier.min()
+        multiplier[multiplier < 1e-9 * multiplier.max()] = 0.0
+        multiplier /= multiplier @ sample.profile
+        symbol = plane.symbol((self.nodes,))
+        stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
+        return Solution(found.lower, found.slip, stiff, multiplier)
 
     def _workspace(self, sample: Sample) -> Workspace:
         workspace = make_workspace(self.line.stiffness)
@@ -280,18 +302,16 @@ class LineProgram:
         is reached before; all others run away.
         """
         first = empty_first(rows.samples, 6, self.nodes)
-        if self.nodes < LONG_LINE:
-            rate = np.ascontiguousarray(rows.weakening_rate)
-            unusual = rate[np.any(rate != self.line.usual_rate, axis=1)]
-            solve_batch(
-                np.ascontiguousarray(rows.strength - rows.initial_stress),
-                np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-                np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
-                make_workspace(self.line.stiffness), np.empty((8, self.nodes)),
-            )  # fmt: skip
-        else:
-            for row in range(rows.samples):
-                self._solve_long(self.sample_of(rows, row), row, slips, first)
+        rate = np.ascontiguousarray(rows.weakening_rate)
+        unusual = rate[np.any(rate != self.line.usual_rate, axis=1)]
+        solve_batch(
+            np.ascontiguousarray(rows.strength - rows.initial_stress),
+            np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
+            np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
+            make_workspace(self.line.stiffness), np.empty((8, self.nodes)),
+        )  # fmt: skip
+        for row in map(int, np.flatnonzero(first.table[:, OUTCOME] == CROWDED)):
+            self._solve_crowded(self.sample_of(rows, row), row, slips, first)
         states: dict[int, State | None] = {}
         for row in map(int, np.flatnonzero(first.table[:, OUTCOME] != SLIDING)):
             states[row] = None
@@ -302,8 +322,8 @@ class LineProgram:
                 )  # fmt: skip
         return first, states
 
-    def _solve_long(self, sample: Sample, row: int, slips: bool, first: First) -> None:
-        """Solve the programme of one row of a long line."""
+    def _solve_crowded(self, sample: Sample, row: int, slips: bool, first: First) -> None:
+        """Solve the programme of a row in which many nodes slip."""
         found = self.programme(sample)
         if found is None:  # followed event by event instead
             first.table[row] = 0.0
@@ -371,10 +391,6 @@ class LineProgram:
                 self._stiffness_times(found.direction), np.empty((6, self.nodes)),
             )  # fmt: skip
         stiffness = self.line.stiffness
-        if outcome == UNDECIDED and runs_away_alone(
-            sample, stiffness, found.load, slip, found.direction, griffith
-        ):
-            outcome = SLIDING
         if outcome == UNDECIDED:
             spaces = make_workspace(stiffness), make_workspace(stiffness)
             outcome = jump(sample, found.load, slip, stiff, griffith, *spaces)

@@ -76,8 +76,8 @@ class Equilibrium:
         are fewer: a sequence, since stress and slip are carried on from one to the next. Their
         variables are those of `equilibrium_path`.
     gap : float
-        Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are always
-        solved to round-off.
+        Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are solved
+        to round-off; where thousands of nodes slip, to 1e-9.
 
     Notes
     -----

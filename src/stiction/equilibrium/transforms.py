@@ -1,5 +1,7 @@
 """The programme of planes, with transforms: a coarse grid first, then the turning point.
 
+Its onset serves long lines too.
+
 Between jumps the next instability is a linear programme with the present pieces of the friction
 law, as long as no node reaches a corner before it. Where one does, the path is followed in steps of
 the load by relaxation at fixed load.
@@ -51,50 +53,45 @@ ACCURACY = 1e-7
 
 
 class Plane(NamedTuple):
-    """Periods (m), G (Pa) and nu of a plane between two half-spaces."""
+    """Periods (m), G (Pa) and nu of a plane between two half-spaces; of a line G* and 0."""
 
-    lengths: tuple[float, float]
+    lengths: tuple[float, ...]
     shear_modulus: float
     poisson_ratio: float
 
-    def symbol(self, shape: tuple[int, int]) -> Array:
+    def symbol(self, shape: tuple[int, ...]) -> Array:
         """Return K(k) on a grid; see `stiffness_symbol`."""
         return _symbol(*self, shape)
 
 
 @functools.lru_cache(maxsize=16)
 def _symbol(
-    lengths: tuple[float, float], modulus: float, ratio: float, shape: tuple[int, int]
+    lengths: tuple[float, ...], modulus: float, ratio: float, shape: tuple[int, ...]
 ) -> Array:
     return stiffness_symbol(shape, lengths, modulus / (1.0 - ratio), modulus)
 
 
 def halved(fine: Array) -> Array:
-    """Return values on every other node, averaged with weights 1/4, 1/2, 1/4 along x and y."""
-    for axis in (0, 1):
-        even, odd = (
-            (slice(None),) * axis + (slice(0, None, 2),),
-            (slice(None),) * axis + (slice(1, None, 2),),
-        )
+    """Return values on every other node, averaged with weights 1/4, 1/2, 1/4 along each axis."""
+    for axis in range(fine.ndim):
+        even, odd = ((*(slice(None),) * axis, slice(first, None, 2)) for first in (0, 1))
         fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
     return fine
 
 
 def doubled(coarse: Array) -> Array:
-    """Return values interpolated linearly to twice the nodes along x and y."""
-    for axis in (0, 1):
+    """Return values interpolated linearly to twice the nodes along each axis."""
+    for axis in range(coarse.ndim):
         between = 0.5 * (coarse + np.roll(coarse, -1, axis))
-        both = np.stack((coarse, between), axis + 1)
-        coarse = both.reshape(
-            tuple(2 * n if a == axis else n for a, n in enumerate(coarse.shape))
-        )
+        shape = tuple(n * (1 + (a == axis)) for a, n in enumerate(coarse.shape))
+        coarse = np.stack((coarse, between), axis + 1).reshape(shape)
     return coarse
 
 
 class PlaneOnset(NamedTuple):
-    """Onset of one sample on a plane.
+    """Onset of one sample.
 
-    Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (nx, ny), that prove
+    Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (*shape), that prove
     them; whether they are as close as was asked for.
     """
 
@@ -131,20 +128,16 @@ def plane_onset(
 ) -> PlaneOnset:
     """Return the largest load with an equilibrium while no node has reached a corner of its law.
 
-    All fields are (nx, ny): peak strength less initial stress (Pa), load profile p > 0, weakening
-    rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a lower load to start from
-    instead of coarse grids. The bounds are to be closed to a relative gap.
+    All fields are (nx, ny), of a line (nodes,): peak strength less initial stress (Pa), load
+    profile p > 0, weakening rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a
+    lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
     """
     levels = [tuple(np.asarray(given, dtype=np.float64) for given in (excess, profile, rate))]
     while slip is None:
         shape = levels[-1][0].shape
-        largest = float(plane.symbol(shape).max())
-        odd = shape[0] % 2 or shape[1] % 2
-        if (
-            odd
-            or min(shape) < 2 * FEWEST
-            or 0.5 * largest < COARSEST * float(levels[-1][2].max())
-        ):
+        stiffest, weakest = float(plane.symbol(shape).max()), float(levels[-1][2].max())
+        odd = any(nodes % 2 for nodes in shape)
+        if odd or min(shape) < 2 * FEWEST or 0.5 * stiffest < COARSEST * weakest:
             break
         levels.append(tuple(map(halved, levels[-1])))
     coarse: Bracket | None = None

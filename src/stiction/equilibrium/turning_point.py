@@ -203,7 +203,7 @@ def close(
             break
         first = first or state
         moved = state.amplitude - first.amplitude
-        curvature = bend / state.amplitude
+        curvature = bend / max(state.amplitude, 1e-300)
         if moved:
             curvature = (state.slope_of_force - first.slope_of_force) / moved
         if curvature < 0.0:
