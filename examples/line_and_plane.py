@@ -223,7 +223,7 @@ def text(estimate: Estimate) -> str:
     return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
 
 
-def summarize(data: xr.Dataset) -> dict[str, list]:
+def summarise(data: xr.Dataset) -> dict[str, list]:
     """Estimates at each correlation length of one case."""
     rows: dict[str, list] = defaultdict(list)
     for i in range(data.sizes["ratio"]):
@@ -331,7 +331,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--figures", type=Path, default=Path("docs/images"))
     given = parser.parse_args(arguments)
     found = compute(given.runs, given.samples)
-    parts = {name: summarize(data) for name, data in found.items() if "fine" not in name}
+    parts = {name: summarise(data) for name, data in found.items() if "fine" not in name}
     effects = {
         kind: size_effect(found[f"{kind}, small"], found[f"{kind}, large"])
         for kind in ("line", "plane")

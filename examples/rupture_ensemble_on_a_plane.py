@@ -16,11 +16,11 @@ strength = st.RandomField(
 )
 random = {"seed": 1, "progress": False}
 rupture = st.Rupture(loading_rate=2e7, stop="onset")
-dear = st.monte_carlo(problem, strength, method=rupture, samples=8, **random)
-cheap = st.monte_carlo(problem, strength, method=st.Equilibrium(), samples=60, **random)
+ruptures = st.monte_carlo(problem, strength, method=rupture, samples=8, **random)
+onsets = st.monte_carlo(problem, strength, method=st.Equilibrium(), samples=60, **random)
 local = st.monte_carlo(problem, strength, method=st.LocalCriterion(), samples=2000, **random)
 mean = st.statistics.combined_mean(
-    *(found.first_instability.values for found in (dear, cheap, local))
+    *(found.first_instability.values for found in (ruptures, onsets, local))
 )
 print(f"ruptures alone: +- {mean.plain_error / 1e6:.4f} MPa")
 print(f"with equilibrium and the local criterion: {mean.estimate.value / 1e6:.4f} MPa", end=" ")

@@ -658,7 +658,7 @@ WHAT_IFS = {
     "correlation": "residual strength correlated with the strength",
     "uniform_dc": "uniform d_c instead of uniform weakening rate",
 }
-CHEAP = ("skewness", "exponent", "length")
+LOCAL_ONLY = ("skewness", "exponent", "length")
 """What-ifs by the local criterion, which afford many samples."""
 ARRESTS = {
     "wide_strength": ((1, 3),),
@@ -671,7 +671,7 @@ ARRESTS = {
 
 def what_if(run: Runner, name: str) -> xr.Dataset:
     """A study file of `what_if/`, its swept points stacked along 'point'."""
-    samples = run.size.trend if name in CHEAP else None
+    samples = run.size.trend if name in LOCAL_ONLY else None
     return stacked(run.what_if(name, samples))
 
 

@@ -56,7 +56,7 @@ class Method(Protocol):
     its `type` is then a ``Literal`` with a default.
     Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
     solver returned; `accepts`, of "barriers" and "overstress" (see `Problem.sample`); and
-    `first_stage`, the type of a cheaper method whose onsets lie close to its own, by which rare
+    `first_stage`, the type of a less expensive method whose onsets lie close to its own, by which rare
     failures are found first.
     """
 

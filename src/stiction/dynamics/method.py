@@ -176,7 +176,7 @@ class Rupture:
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
             return usual * (shape[0] / 1024) ** 2
-        # Steps as the longer side has nodes, each as dear as the plane has nodes.
+        # As many steps as the longer side has nodes, each in proportion to all nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
