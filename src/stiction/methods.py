@@ -56,8 +56,8 @@ class Method(Protocol):
     its `type` is then a ``Literal`` with a default.
     Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
     solver returned; `accepts`, of "barriers" and "overstress" (see `Problem.sample`); and
-    `first_stage`, the type of a less expensive method whose onsets lie close to its own, by which rare
-    failures are found first.
+    `first_stage`, the type of a faster method with similar onsets, by which rare failures are found
+    first.
     """
 
     @property
