@@ -11,7 +11,6 @@ from stiction import AccuracyWarning, InputError
 from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import Nodes
-from stiction.plot import film
 
 NODES, LENGTH = 256, 0.05
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -78,12 +77,6 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
     # Methods without waves say what they take.
     with pytest.raises(InputError, match="strength: must be finite; entry"):
         st.onset(PROBLEM, tau_p, method=st.LocalCriterion())
-
-
-def test_an_infinite_barrier_is_drawn_as_a_gap(tmp_path):
-    run = simulate(barred(np.inf), save=st.Save(["slip_rate", "shear_stress"], every=20))
-    st.plot.rupture(run).figure.savefig(tmp_path / "figure.png")
-    assert film(run, tmp_path / "film.gif", frames=2).exists()
 
 
 @pytest.mark.parametrize("height", [1e12, np.inf])
@@ -194,26 +187,6 @@ def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
     assert np.isnan(float(run["critical_load"]))
 
 
-def test_stop_is_an_option_of_studies(tmp_path):
-    st.Study(
-        problem=PROBLEM,
-        random=st.RandomField(
-            st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-            st.PowerLawSpectrum(correlation_length=3e-3),
-        ),
-        method=st.Rupture(loading_rate=1e7, stop="onset"),
-        ensemble=st.Ensemble(samples=2, seed=1),
-    ).to_toml(tmp_path / "study.toml")
-    assert 'stop = "onset"' in (tmp_path / "study.toml").read_text()
-    study = st.Study.from_toml(tmp_path / "study.toml")
-    assert study.method.stop == "onset"
-    found = st.monte_carlo(study.problem, study.random, method=study.method, samples=2, seed=1)
-    assert np.all(np.isnan(found.kinetic_stress))
-    assert np.all(found.critical_stress > 0.0)
-    with pytest.raises(InputError, match="stop"):
-        st.Rupture(loading_rate=1e7, stop="never")
-
-
 def test_a_stress_below_minus_the_strength_is_said():
     low = ([0.0, 0.08, 0.2, 0.3], [0.0, 7.62e5, -2e6, 2e6])
     with pytest.warns(AccuracyWarning, match="would slip in reverse"):
@@ -250,14 +223,3 @@ def test_poisson_ratios_that_waves_allow(plane, ratio):
     exact = float(st.onset(problem, TAU_P, method=st.Equilibrium()).critical_stress[0])
     found = st.onset(problem, TAU_P, method=dataclasses.replace(METHOD, loading_rate=1e5))
     assert float(found.critical_stress[0]) == pytest.approx(exact, rel=2e-5)
-
-
-def test_poisson_ratios_are_refused_with_the_reason_of_their_plane_state():
-    for plane, ratio, text in (
-        ("strain", 0.495, "nu <= 0.49 in plane strain"),
-        ("stress", -0.999, "nu >= -0.99 in plane stress"),
-    ):
-        solid = dataclasses.replace(SOLID, poisson_ratio=ratio, plane=plane)
-        friction = st.LinearWeakening(weakening_rate=1e9)
-        with pytest.raises(InputError, match=text):
-            METHOD.prepare(st.Problem(solid, PROBLEM.interface, friction))

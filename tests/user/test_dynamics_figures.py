@@ -44,12 +44,6 @@ def test_a_rupture_that_begins_at_once_is_drawn(simulated, tmp_path):
     assert film(at_once, tmp_path / "film.gif", frames=2).exists()
 
 
-def test_the_front_names_the_wave_speeds(simulated):
-    _, run = simulated
-    texts = {text.get_text() for text in st.plot.front(run).texts}
-    assert texts == {"$c_R$", "$c_s$", "$c_d$"}
-
-
 def test_film_moves(simulated, tmp_path):
     _, run = simulated
     path = film(run, tmp_path / "film.gif", frames=6)

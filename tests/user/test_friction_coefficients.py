@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refuses
 
 import stiction as st
 
@@ -30,20 +31,35 @@ def test_youngs_modulus_is_the_shear_modulus_in_other_words():
     assert problem.solid == solid
 
 
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3}, "and not both"),
-        (
-            {"youngs_modulus": -1e9, "poisson_ratio": 0.3},
-            "youngs_modulus: must be greater than 0",
-        ),
-        ({"youngs_modulus": 1e9}, "poisson_ratio: missing"),
-    ],
-)
-def test_contradicting_moduli_are_refused(given, text):
-    with pytest.raises(st.InputError, match=text):
-        st.Solid(**given, density=1200.0)
+MODULI = {
+    "and not both": {"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3},
+    "youngs_modulus: must be greater than 0": {"youngs_modulus": -1e9, "poisson_ratio": 0.3},
+    "poisson_ratio: missing": {"youngs_modulus": 1e9},
+}
+STRENGTH = st.RandomField(st.Lognormal(mean=1e6, cv=0.15), SPECTRUM)
+REFUSED = {
+    **{
+        words: lambda given=given: st.Solid(**given, density=1200.0)
+        for words, given in MODULI.items()
+    },
+    "need a normal pressure": lambda: st.monte_carlo(
+        joint(None), COEFFICIENT, method=LOCAL, samples=2
+    ),
+    "friction_coefficient: needs a normal pressure": lambda: st.failure_probability(
+        joint(None), STRENGTH, friction_coefficient=0.3, method=LOCAL
+    ),
+    "either stress ... or friction_coefficient": lambda: st.failure_probability(
+        joint(PRESSURE), STRENGTH, method=LOCAL
+    ),
+    "critical_slip: of = 'friction_coefficient'": lambda: st.RandomInterface(
+        strength=STRENGTH, critical_slip=COEFFICIENT
+    ),
+}
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_what_is_contradicting_or_missing_is_refused(words):
+    refuses(words, REFUSED[words])
 
 
 def test_coefficients_times_a_pressure_are_a_strength():
@@ -95,53 +111,3 @@ def test_failure_under_a_random_pressure_counts_each_samples_own():
     )  # fmt: skip
     # Both scatter: 0.05 by 7 % from 4,000 samples, the estimate by 10 %.
     assert found.probability == pytest.approx(0.05, rel=0.35)
-
-
-def test_a_design_stress_has_a_coefficient():
-    found = st.design_stress(
-        joint(PRESSURE), COEFFICIENT, probability=0.01, method=LOCAL, target_cv=0.3
-    )
-    assert found.friction_coefficient == pytest.approx(found.stress / PRESSURE)
-
-
-def test_what_lacks_a_pressure_is_refused():
-    with pytest.raises(st.InputError, match="need a normal pressure"):
-        st.monte_carlo(joint(None), COEFFICIENT, method=LOCAL, samples=2, seed=0)
-    strength = st.RandomField(st.Lognormal(mean=1e6, cv=0.15), SPECTRUM)
-    with pytest.raises(st.InputError, match="friction_coefficient: needs a normal pressure"):
-        st.failure_probability(joint(None), strength, friction_coefficient=0.3, method=LOCAL)
-    with pytest.raises(st.InputError, match="either stress .* or friction_coefficient"):
-        st.failure_probability(joint(PRESSURE), strength, method=LOCAL)
-    with pytest.raises(st.InputError, match="critical_slip: of = 'friction_coefficient'"):
-        st.RandomInterface(strength=strength, critical_slip=COEFFICIENT)
-
-
-def study_table():
-    return {
-        "problem": {
-            "solid": {"youngs_modulus": 2.6e9, "poisson_ratio": 0.3, "density": 1200.0},
-            "interface": {"length": 0.1, "nodes": 256},
-            "friction": {"type": "linear", "critical_slip": 4e-6, "residual_ratio": 0.3},
-            "load": {"normal_pressure": PRESSURE},
-        },
-        "random": {
-            "strength": {
-                "of": "friction_coefficient",
-                "marginal": {"type": "lognormal", "mean": 0.5, "cv": 0.15, "low": 0.3},
-                "spectrum": {"type": "power_law", "correlation_length": 2e-3},
-            }
-        },
-        "method": {"type": "equilibrium"},
-        "ensemble": {"samples": 2},
-    }
-
-
-def test_a_study_file_may_say_it_all():
-    result = st.Study.from_dict(study_table()).run()
-    assert float(result.friction_coefficient.min()) > 0.3
-
-
-RELIABILITY = [
-    "reliability", "study.toml", "--out", "out", "--smallest", "0.01", "--plain-samples", "0",
-    "--target-cv", "0.5",
-]  # fmt: skip

@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 import pydantic
 import pytest
+from refusals import refuses
 
 import stiction as st
 from stiction.load import LoadShape, distance, register
@@ -79,26 +80,22 @@ def test_events_are_those_of_the_path(tmp_path):
     np.testing.assert_array_equal(stored["event_moment"].values, kept)
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: st.GradientLoad(amplitude=1.0), "amplitude"),
-        (lambda: st.EdgeLoad(excess=-1.0, decay=0.01), "excess"),
-        (lambda: st.EdgeLoad(excess=1.0, decay=0.0), "decay"),
-        (lambda: st.Load(profile={"type": "egde", "excess": 1.0}), "did you mean 'edge'"),
-        (lambda: st.Load(profile={"type": "edge", "exces": 1.0, "decay": 0.01}), "exces"),
-        (lambda: st.Equilibrium(events=-1), "events"),
-    ],
-)
-def test_mistakes(make, text):
-    with pytest.raises(st.InputError, match=text):
-        make()
+MISTAKES = {
+    "amplitude": lambda: st.GradientLoad(amplitude=1.0),
+    "excess": lambda: st.EdgeLoad(excess=-1.0, decay=0.01),
+    "decay": lambda: st.EdgeLoad(excess=1.0, decay=0.0),
+    "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
+    "exces": lambda: st.Load(profile={"type": "edge", "exces": 1.0, "decay": 0.01}),
+    "events": lambda: st.Equilibrium(events=-1),
+    "load.profile": lambda: st.theory.nucleation_statistics(
+        loaded(st.EdgeLoad(excess=1.0, decay=0.01)), st.paper.strength(PLAIN)
+    ),
+}
 
 
-def test_statistics_want_a_uniform_load():
-    problem = loaded(st.EdgeLoad(excess=1.0, decay=0.01))
-    with pytest.raises(st.InputError, match=r"load\.profile"):
-        st.theory.nucleation_statistics(problem, st.paper.strength(PLAIN))
+@pytest.mark.parametrize("words", MISTAKES)
+def test_mistakes(words):
+    refuses(words, MISTAKES[words])
 
 
 @register

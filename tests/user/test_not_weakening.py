@@ -51,32 +51,19 @@ def test_nothing_but_barriers_and_constant_strength(solid):
         st.onset(problem, strength, method=st.Rupture(loading_rate=2e8), progress=False)
 
 
-def _of_residual(caught):
-    return [w for w in caught if "residual" in str(w.message)]
-
-
 @pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])
-def test_said_once(solid, what):
+def test_said_once(solid, make_strength, what):
     friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.7e6)
     problem = st.Problem(solid, st.Interface(length=0.1, nodes=512), friction)
-    field = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=0.01, exponent=4.0, truncation=2.5),
-    )
+    field, exact = make_strength(0.01 / problem.nucleation_length), {"method": st.Equilibrium()}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if what == "onset":
-            profile = field.profiles(
-                problem.interface, field.draws(problem.interface, 8, seed=1)
-            )
-            st.onset(problem, profile, method=st.Equilibrium(), progress=False)
+            st.onset(problem, field.sample(problem.interface, samples=8, seed=1), **exact)
         elif what == "monte_carlo":
-            st.monte_carlo(
-                problem, field, method=st.Equilibrium(), samples=40, seed=1, progress=False
-            )
+            st.monte_carlo(problem, field, samples=40, seed=1, **exact)
         else:
             st.failure_probability(
-                problem, field, 1e6, method=st.Equilibrium(), algorithm="plain",
-                max_evaluations=100, progress=False,
-            )  # fmt: skip
-    assert len(_of_residual(caught)) == 1
+                problem, field, 1e6, algorithm="plain", max_evaluations=100, **exact
+            )
+    assert sum("residual" in str(warning.message) for warning in caught) == 1

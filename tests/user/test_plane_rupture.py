@@ -1,7 +1,6 @@
 """Ruptures on planes as they are asked for: files, streams, commands, memory, units."""
 
 import functools
-import os
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from typer.testing import CliRunner
 
 import stiction as st
 from stiction.cli import app
-from stiction.dynamics.save import open_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
@@ -77,19 +75,6 @@ def problem_and_strength(path):
     return plan.problem, plan.profiles(plan.draws(plan.seed, 0, 1))
 
 
-def test_frames_streamed_to_disk_are_those_in_memory(path, tmp_path):
-    problem, strength = problem_and_strength(path)
-    options = {"method": st.Rupture(loading_rate=1e8), "progress": False}
-    whole = st.simulate_rupture(problem, strength, save=st.Save(every=30), **options)
-    save = st.Save(every=30, to=tmp_path / "frames")
-    assert "slip" not in st.simulate_rupture(problem, strength, save=save, **options)
-    frames = open_rupture(tmp_path / "frames")
-    for name in ("slip", "slip_rate", "shear_stress", "load", "step_time"):
-        assert np.array_equal(frames[name].values, whole[name].values)
-    assert frames.slip.dims == ("time", "x", "y")
-    assert np.array_equal(frames.y.values, problem.interface.coordinates["y"])
-
-
 def test_a_run_may_begin_from_an_equilibrium(path):
     problem, strength = problem_and_strength(path)
     along = st.equilibrium_path(problem, strength, loads=[7.5e5])
@@ -107,15 +92,6 @@ def test_a_run_may_begin_from_an_equilibrium(path):
         )
 
 
-def test_a_grid_without_room_in_memory_is_refused_before_it_begins(path, monkeypatch):
-    problem, strength = problem_and_strength(path)
-    real = os.sysconf
-    small = {"SC_PHYS_PAGES": 400}  # 1.6 MB
-    monkeypatch.setattr(os, "sysconf", lambda name: small.get(name, real(name)))
-    with pytest.raises(st.InputError, match=r"interface.nodes: this takes .* GiB of memory"):
-        st.onset(problem, strength, method=st.Rupture(loading_rate=1e8))
-
-
 def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
     problem, strength = problem_and_strength(path)
     with pytest.raises(st.InputError, match=r"time_step: .* above the stability limit"):
@@ -126,15 +102,3 @@ def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
             st.Problem(solid, problem.interface, problem.friction), strength,
             method=st.Rupture(loading_rate=1e8),
         )  # fmt: skip
-
-
-@pytest.mark.slow  # its kernels are compiled anew
-def test_other_friction_laws_slide_too(path):
-    problem, strength = problem_and_strength(path)
-    friction = st.ExponentialWeakening(weakening_rate=0.4e12, residual_strength=1e5)
-    found = st.onset(
-        st.Problem(problem.solid, problem.interface, friction), strength,
-        method=st.Rupture(loading_rate=1e9),
-    )  # fmt: skip
-    assert float(found.kinetic_stress[0]) == pytest.approx(1e5, rel=0.2)
-    assert 7e5 < float(found.critical_stress[0]) < 1e6

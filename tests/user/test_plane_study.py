@@ -51,16 +51,6 @@ def test_stored_run_is_that_in_memory(path, tmp_path):
     assert again.critical_load.item() == memory.critical_load.values[1, 4]
 
 
-def test_run_that_was_left_and_goes_on(path, tmp_path):
-    few = tmp_path / "few.toml"
-    few.write_text(tomli_w.dumps(STUDY | {"ensemble": STUDY["ensemble"] | {"samples": 11}}))
-    command("run", few, "--out", tmp_path / "run")
-    command("run", path, "--out", tmp_path / "run")
-    xr.testing.assert_equal(
-        st.Study.from_toml(path).run(progress=False), st.open_run(tmp_path / "run").dataset()
-    )
-
-
 def test_commands(path, tmp_path):
     run = tmp_path / "run"
     text = command("check", path)
@@ -79,45 +69,6 @@ def test_commands(path, tmp_path):
     xr.testing.assert_equal(xr.load_dataset(tmp_path / "run.nc"), stored)
     command("report", run)
     assert "30" in (run / "report.html").read_text()
-
-
-def test_profiles_from_files_and_labelled_arrays(path, tmp_path):
-    """Names decide, whatever the order; units are converted; what is elsewhere is refused."""
-    plan = st.Study.from_toml(path).experiments[0]
-    plane = plan.problem.interface
-    tau_p = plan.random.strength.sample(plane, seed=1)[0]
-    turned = xr.DataArray(
-        tau_p.T * 1e-6,
-        dims=("y", "x"),
-        coords={
-            "x": ("x", plane.x * 1e3, {"units": "mm"}),
-            "y": ("y", plane.coordinates["y"]),
-        },
-        attrs={"units": "MPa"},
-        name="strength",
-    )
-    plain, labelled = (
-        st.onset(plan.problem, given, method=st.LocalCriterion()) for given in (tau_p, turned)
-    )
-    # Conversion of units rounds.
-    np.testing.assert_allclose(plain.critical_load, labelled.critical_load, rtol=1e-14)
-    turned.to_netcdf(tmp_path / "strength.nc")
-    np.save(tmp_path / "strength.npy", tau_p)
-    np.save(tmp_path / "turned.npy", tau_p.T)
-    for name in ("strength.nc", "strength.npy"):
-        read = st.read_profile(tmp_path / name, interface=plane)
-        assert read.dims == ("x", "y")
-        np.testing.assert_allclose(read, tau_p, rtol=1e-14)
-    with pytest.raises(st.InputError, match="x and y have changed places"):
-        st.read_profile(tmp_path / "turned.npy", interface=plane)
-    with pytest.raises(st.InputError, match=r"call them 'x', .* and 'y'"):
-        st.onset(plan.problem, turned.rename(x="u"), method=st.LocalCriterion())
-    elsewhere = turned.assign_coords(y=2.0 * plane.coordinates["y"])
-    with pytest.raises(st.InputError, match="y reaches from 0 to"):
-        st.onset(plan.problem, elsewhere, method=st.LocalCriterion())
-    options = "--method", "local_criterion"
-    text = command("onset", path, "--strength", tmp_path / "strength.nc", *options)
-    assert f"{plain.critical_load.item():.8g}" in text
 
 
 def test_failing_profiles_are_drawn(path):

@@ -95,11 +95,6 @@ def test_harmless_forms_are_taken():
         st.monte_carlo(problem(), FIELD, method=method, samples=2.5)
 
 
-def test_a_family_of_distributions_needs_its_parameters():
-    with pytest.raises(st.InputError, match="a frozen continuous scipy.stats distribution"):
-        st.RandomField(scipy.stats.lognorm, SPECTRUM)
-
-
 def test_representations_fit_on_a_screen(tmp_path):
     system = problem(pressure=np.linspace(1e6, 2e6, NODES))
     assert len(repr(system)) < 600

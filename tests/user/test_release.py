@@ -71,9 +71,3 @@ def test_the_command_says_its_version():
     command = [sys.executable, "-m", "stiction", "--version"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == f"stiction {st.__version__}\n"
-
-
-def test_completion_can_be_installed():
-    command = [sys.executable, "-m", "stiction", "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "--install-completion" in done.stdout

@@ -1,6 +1,6 @@
 """The page about a run."""
 
-import pytest
+import dataclasses
 
 import stiction as st
 from stiction.report import Page, shown, write_report
@@ -31,19 +31,14 @@ def test_a_page_escapes_what_it_is_given():
 def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(tmp_path):
     plain = st.paper.problem(nodes=256)
     strength = st.paper.strength(plain, correlation_ratio=0.5)
+    lengths = [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}]
     for pressure in (None, 5e6):
-        load = st.Load(normal_pressure=pressure)
-        problem = st.Problem(plain.solid, plain.interface, plain.friction, load)
-        ensemble = st.Ensemble(samples=40)
-        sweep = (
-            [{"random.strength.spectrum.correlation_length": [1e-3, 2e-3]}] if pressure else []
-        )
         study = st.Study(
-            problem=problem,
+            problem=dataclasses.replace(plain, load=st.Load(normal_pressure=pressure)),
             random=strength,
             method=st.LocalCriterion(),
-            ensemble=ensemble,
-            sweep=sweep,
+            ensemble=st.Ensemble(samples=40),
+            sweep=lengths if pressure else [],
         )
         run = tmp_path / f"run-{pressure}"
         study.run(out=run)
@@ -52,14 +47,3 @@ def test_figures_of_a_run_show_coefficients_where_there_is_a_pressure(tmp_path):
         assert html.count("<img") == 1 + bool(pressure)
         assert ("Densities of the static friction coefficient" in html) == bool(pressure)
         assert "[problem.solid]" in html
-
-
-def test_a_run_without_samples_is_refused(tmp_path):
-    class Empty:
-        path = tmp_path
-
-        def status(self):
-            return type("Status", (), {"done": 0})
-
-    with pytest.raises(st.InputError, match="no sample is stored yet"):
-        write_report(Empty(), tmp_path / "report.html")
