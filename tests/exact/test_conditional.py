@@ -183,7 +183,7 @@ def test_a_scan_tells_of_the_factor_of_its_specimen():
         measured = truth * profile[:40] + noise * rng.standard_normal(40)
         given = FIELD.given(on_line(LINE.x[:40], measured), noise=noise)
         random = st.RandomInterface(strength=given, between={"strength": factor})
-        ((_, _, known),) = _conditioned(random, LINE)
+        ((_, known),) = _conditioned(random, LINE)
         u = known.specimen(np.random.default_rng(i).standard_normal(400))
         factors = from_normal(factor, u)
         ranks.append(np.mean(factors < truth))

@@ -304,13 +304,13 @@ class Conditioning:
         """Return the draws of the factor between specimens, conditioned."""
         return u if self.grid is None else np.interp(u, self.score, self.quantile)
 
-    def draws(self, draws: Array, u: Array | None = None) -> Array:
-        """Return conditioned draws of the fields, (samples, dimension), with u from `specimen`."""
-        data = self.data
-        if u is not None and self.grid is not None:
+    def draws(self, draws: Array) -> Array:
+        """Return conditioned draws (samples, dimension), a factor between specimens in the last."""
+        data, out = self.data, np.array(draws)
+        if self.grid is not None:
+            u = out[:, -1] = self.specimen(out[:, -1])
             data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
         share = 1.0 + self.values**2
-        out = np.array(draws)
         transposed = np.ascontiguousarray(self.right.T)
         offsets = np.ascontiguousarray(data * (self.values / share))
         condition(self.right, transposed, offsets, share**-0.5 - 1.0, out)

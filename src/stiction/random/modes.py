@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,7 @@ class Modes:
         return out.reshape(-1, *shape)
 
 
+@lru_cache(maxsize=256)
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:

@@ -99,7 +99,12 @@ class RandomField:
         There is none if the correlation length is too long for the interface; a line has no
         anisotropy.
         """
-        return _modes(self, interface)
+        if self.anisotropy is not None and not interface.is_plane:
+            raise InputError(
+                "anisotropy: is a ratio of correlation lengths along y and x, and a line has no y;"
+                f" got {self.anisotropy:g}, leave it out"
+            )
+        return make_modes(self.spectrum, self.mean_mode, self.anisotropy or 1.0, interface)
 
     @checked
     def draws(
@@ -121,7 +126,7 @@ class RandomField:
         (samples, dimension) array
             A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
-        modes = _modes(self, interface)
+        modes = self.modes(interface)
         check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
         block = block_of(len(interface.shape))
         return standard_normal(seed, stream, first, samples, modes.ranks, self.mean_mode, block)
@@ -129,7 +134,7 @@ class RandomField:
     @checked
     def gaussian(self, interface: Interface, draws: Numbers) -> Array:
         """Compute the Gaussian field z of given draws, (samples, *shape), of unit variance."""
-        modes = _modes(self, interface)
+        modes = self.modes(interface)
         if draws.ndim != 2 or draws.shape[1] != modes.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {modes.dimension}), got shape {draws.shape}"
@@ -205,7 +210,7 @@ class RandomField:
         return Measured(given, self.marginal, self._basis(interface, given.places), factor)
 
     def _basis(self, interface: Interface, places: Array) -> Array:
-        return basis(_modes(self, interface), self.mean_mode, interface.lengths, places)
+        return basis(self.modes(interface), self.mean_mode, interface.lengths, places)
 
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0,
@@ -273,7 +278,7 @@ class RandomField:
         AccuracyWarning
             If the tails of the marginal are too heavy for its correlation, with the error.
         """
-        modes = _modes(self, interface)
+        modes = self.modes(interface)
         # The field whose amplitudes are its own standard deviations.
         draws = np.zeros((1, modes.dimension))
         start = int(self.mean_mode)
@@ -320,16 +325,6 @@ class RandomField:
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = dataclasses.replace(self.spectrum, correlation_length=xi)
         return dataclasses.replace(self, spectrum=spectrum)
-
-
-@lru_cache(maxsize=256)
-def _modes(field: RandomField, interface: Interface) -> Modes:
-    if field.anisotropy is not None and not interface.is_plane:
-        raise InputError(
-            "anisotropy: is a ratio of correlation lengths along y and x, and a line has no y; got"
-            f" {field.anisotropy:g}, leave it out"
-        )
-    return make_modes(field.spectrum, field.mean_mode, field.anisotropy or 1.0, interface)
 
 
 @lru_cache(maxsize=16)

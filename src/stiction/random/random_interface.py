@@ -20,7 +20,7 @@ from stiction.random.conditioning import Conditioning
 from stiction.random.mapping import from_normal
 from stiction.random.marginals import AnyMarginal
 from stiction.random.random_field import RandomField
-from stiction.random.synthesis import block_of, standard_normal
+from stiction.random.synthesis import BLOCK, block_of, standard_normal
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
@@ -79,12 +79,12 @@ def lower_factor(matrix: Array) -> Array:
 
 
 class Stream(NamedTuple):
-    """The draws of one property, and where they stand in the vector of all draws of a sample.
+    """The draws of one property, or of a factor between specimens, among all draws of a sample.
 
     Attributes
     ----------
-    number : int
-        Of the stream of draws; that of a property never changes.
+    number, block : int
+        Number of the stream, which never changes, and samples that share a generator.
     ranks : array of int
         Modes drawn, by their `Modes.ranks`: those of the property and of all that it is
         correlated with.
@@ -97,10 +97,11 @@ class Stream(NamedTuple):
     """
 
     number: int
+    block: int
     ranks: NDArray[np.int64]
     mean_mode: bool
     columns: slice
-    own: slice | NDArray[np.int64]
+    own: slice | NDArray[np.int64] = slice(None)
 
 
 @model(kw_only=True)
@@ -220,13 +221,13 @@ class RandomInterface:
         return matrix
 
     @property
-    def _linked(self) -> Array:
+    def linked(self) -> Array:
         """Whether properties are correlated, directly or through others."""
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        return _fields_dimension(self, interface) + len(self.between or ())
+        return int(_layout(self, interface)[-1].columns.stop)
 
     @checked
     def draws(
@@ -239,40 +240,34 @@ class RandomInterface:
         Returns
         -------
         (samples, dimension) array
-            Those of each property side by side, in the order of `names`.
+            Those of each property side by side, in the order of `names`; then of `between`.
         """
         each = self.dimension(interface) + len(self.names) * interface.size
         check_memory("samples", 8.0 * samples * each)
-        block = block_of(len(interface.shape))
         parts = [
-            standard_normal(seed, one.number, first, samples, one.ranks, one.mean_mode, block)
-            for one in _layout(self, interface).values()
+            standard_normal(
+                seed, one.number, first, samples, one.ranks, one.mean_mode, one.block
+            )
+            for one in _layout(self, interface)
         ]
-        for name in self.between or ():
-            stream = BETWEEN + NAMES.index(name)
-            parts.append(standard_normal(seed, stream, first, samples, np.arange(0), True))
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
-        layout = _layout(self, interface)
-        last = _fields_dimension(self, interface)
-        specimen = dict(zip(self.between or (), draws[:, last:].T, strict=True))
-        for name, columns, known in _conditioned(self, interface):
-            u = known.specimen(specimen[name]) if name else None
-            if u is not None:
-                specimen[name] = u
+        for columns, known in _conditioned(self, interface):
             draws = draws.copy()
-            draws[:, columns] = known.draws(draws[:, columns], u)
-        independent = [draws[:, stream.columns] for stream in layout.values()]
-        found = {}
-        for name, row in zip(layout, lower_factor(self.matrix), strict=True):
+            draws[:, columns] = known.draws(draws[:, columns])
+        streams, found = _layout(self, interface), {}
+        independent = [draws[:, stream.columns] for stream in streams]
+        for name, stream, row in zip(
+            self.names, streams, lower_factor(self.matrix), strict=False
+        ):
             mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
-            own = np.ascontiguousarray(mixed[:, layout[name].own])
+            own = np.ascontiguousarray(mixed[:, stream.own])
             found[name] = self.properties[name].mapped(interface, own)
-        for name, u in specimen.items():
-            factor = from_normal(self.between[name], u)  # type: ignore[index]
-            found[name] *= factor.reshape(-1, *(1 for _ in interface.shape))
+        factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
+        for (name, marginal), u in factors:
+            found[name] *= from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))
         return found
 
     def profiles(
@@ -292,53 +287,46 @@ class RandomInterface:
         """Warn of fields that the grid or the interface cannot do justice to."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
-        for _, _, known in _conditioned(self, interface):
+        for _, known in _conditioned(self, interface):
             known.warn()
 
 
 @lru_cache(maxsize=256)
-def _layout(random: RandomInterface, interface: Interface) -> dict[str, Stream]:
-    """Draws of each property by name."""
-    properties = list(random.properties.values())
-    found, start = {}, 0
-    for (name, field), row in zip(random.properties.items(), random._linked, strict=True):
-        group = [properties[j] for j in np.flatnonzero(row)]
+def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
+    """Draws of each property, and of each factor between specimens."""
+    fields = list(random.properties.values())
+    found, start, block = [], 0, block_of(len(interface.shape))
+    for name, field, row in zip(random.names, fields, random.linked, strict=True):
+        group = [fields[j] for j in np.flatnonzero(row)]
         ranks = reduce(np.union1d, [one.modes(interface).ranks for one in group])
         mean_mode = any(one.mean_mode for one in group)
-        end = start + 2 * ranks.size + int(mean_mode)
+        columns = slice(start, start + 2 * ranks.size + int(mean_mode))
         own: slice | NDArray[np.int64] = slice(None)
         modes = field.modes(interface)
-        if modes.dimension < end - start:
+        if modes.dimension < columns.stop - start:
             places = np.searchsorted(ranks, modes.ranks)
             pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
             own = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
-        found[name] = Stream(NAMES.index(name), ranks, mean_mode, slice(start, end), own)
-        start = end
+        found.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, own))
+        start = columns.stop
+    for column, name in enumerate(random.between or (), start):
+        number, columns = BETWEEN + NAMES.index(name), slice(column, column + 1)
+        found.append(Stream(number, BLOCK, np.arange(0), True, columns))
     return found
-
-
-def _fields_dimension(random: RandomInterface, interface: Interface) -> int:
-    """Number of draws of a sample without those of factors between specimens."""
-    return max(stream.columns.stop for stream in _layout(random, interface).values())
 
 
 @lru_cache(maxsize=16)
 def _conditioned(
     random: RandomInterface, interface: Interface
-) -> list[tuple[str, NDArray[np.int64], Conditioning]]:
-    """What was measured, for each group of correlated properties.
+) -> list[tuple[NDArray[np.int64], Conditioning]]:
+    """What was measured, for each group of correlated properties, with the columns of its draws.
 
-    Each with the property whose factor between specimens it tells of ('' if none), and the columns
-    of the draws.
+    The last column is that of the factor between specimens that it tells of, if any.
     """
-    factor, names, between = lower_factor(random.matrix), random.names, random.between or {}
-    columns = [
-        np.arange(one.columns.start, one.columns.stop)
-        for one in _layout(random, interface).values()
-    ]
-    own = [one.own for one in _layout(random, interface).values()]
-    found = []
-    for group in np.unique(random._linked, axis=0):
+    streams, names, between = _layout(random, interface), random.names, random.between or {}
+    columns = [np.r_[stream.columns] for stream in streams]
+    factor, found = lower_factor(random.matrix), []
+    for group in np.unique(random.linked, axis=0):
         members = np.flatnonzero(group)
         known = [i for i in members if random.properties[names[i]].conditions is not None]
         factors = [names[i] for i in known if names[i] in between]
@@ -351,12 +339,13 @@ def _conditioned(
         measured = []
         for i in known:
             one = random.properties[names[i]].measured(interface, between.get(names[i]))
-            phi = np.zeros((len(one.phi), _fields_dimension(random, interface)))
+            phi = np.zeros((len(one.phi), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
-                phi[:, columns[j][own[i]]] = factor[i, j] * one.phi
+                phi[:, columns[j][streams[i].own]] = factor[i, j] * one.phi
             measured.append(one._replace(phi=phi[:, of_group]))
         if measured:
-            found.append(("".join(factors), of_group, Conditioning(measured)))
+            last = [columns[len(names) + list(between).index(name)] for name in factors]
+            found.append((np.concatenate([of_group, *last]), Conditioning(measured)))
     return found
 
 
