@@ -9,11 +9,12 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import Field, WithJsonSchema, WrapSerializer, WrapValidator, model_validator
+from pydantic import Field, model_validator
 
 from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.kinds import OneOf, from_table
 from stiction.model import (
     PROFILE_SCHEMA,
     OptionalProfile,
@@ -22,7 +23,6 @@ from stiction.model import (
     Real,
     is_unplaced,
     model,
-    to_plain,
 )
 
 Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
@@ -128,32 +128,14 @@ class EdgeLoad(LoadShape):
         return 1.0 + self.excess * np.exp(-distance(interface, self.edge) / self.decay)
 
 
-def _read(value: Any, handler: Any) -> Any:
+def _shape(value: Any) -> Any:
     if isinstance(value, LoadShape):
         return value
-    if not isinstance(value, dict) or "type" not in value:
-        return handler(value)
-    if value["type"] not in SHAPES:
-        raise InputError(unknown_name("type", str(value["type"]), SHAPES))
-    return SHAPES[value["type"]](**value)
+    table = isinstance(value, dict) and "type" in value
+    return from_table(SHAPES, value) if table else NotImplemented
 
 
-def _written(value: Any, handler: Any) -> Any:
-    return to_plain(value) if isinstance(value, LoadShape) else handler(value)
-
-
-_SCHEMA = {
-    "type": "object",
-    "description": "'gradient' with amplitude, centre; or 'edge' with excess, decay, edge",
-    "properties": {"type": {"type": "string"}},
-    "required": ["type"],
-}
-LoadProfile: TypeAlias = Annotated[
-    Profile,
-    WrapValidator(_read),
-    WrapSerializer(_written),
-    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, _SCHEMA]}),
-]
+LoadProfile: TypeAlias = Annotated[Profile, OneOf(SHAPES, _shape, PROFILE_SCHEMA)]
 
 
 @model

@@ -18,8 +18,8 @@ from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
 from stiction.errors import InputError, unknown_name
+from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, is_finite, model
-from stiction.random.kinds import OneOf, from_table
 
 
 class Marginal:
@@ -367,6 +367,7 @@ def _of_scipy(name: str, parameters: Mapping[str, Any]) -> Marginal:
     return ScipyMarginal(name, tuple((key, float(one)) for key, one in parameters.items()))
 
 
-_ALSO = "the name of a continuous scipy.stats distribution with its shapes, loc and scale"
-AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, _ALSO)]
+_OF_SCIPY = {"type": "string", "description": "name of a continuous scipy.stats distribution"}
+_ALSO = {"type": "object", "properties": {"type": _OF_SCIPY}}
+AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, [_ALSO])]
 """`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""

@@ -18,36 +18,20 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    PlainSerializer,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import Field, PlainSerializer, WithJsonSchema, model_validator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import betainc, betaincinv, gammainc, gammainccinv, gammaln, kve
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import Positive, _number, describe, model
-from stiction.random.kinds import OneOf, from_table
+from stiction.kinds import OneOf, from_table
+from stiction.model import Positive, Real, describe, model
 
-Share: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=0, lt=1)]
+Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 ACCURACY = 1e-12
 LARGEST_ERROR = 1e-6
 """Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
-
-
-def _length(value: float) -> float:
-    if not 1e-100 < value < 1e100:  # else its inverse or its square overflows
-        raise ValueError("must lie between 1e-100 and 1e+100 m")
-    return value
-
-
-Length: TypeAlias = Annotated[Positive, AfterValidator(_length)]
 
 
 class SpectralDensity:
@@ -101,10 +85,9 @@ def integrate(
     `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides
     which errors are small: 1e-12 of it, and of each part otherwise.
     """
-    options: dict[str, Any] = {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
+    options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
+    options |= {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
     options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
-    if lag > 0.0:
-        options |= {"weight": "cos", "wvar": lag}
     parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
     found, errors = np.array(parts).T
     size = min(power, float(np.abs(found).sum()))
@@ -113,8 +96,7 @@ def integrate(
             "function: its integral over wavenumbers does not settle; name the wavenumbers at which"
             " it jumps or peaks in break_points"
         )
-    result: Array = found
-    return result
+    return np.asarray(found)
 
 
 def moment(spectrum: SpectralDensity, order: int) -> Callable[[float], float]:
@@ -154,12 +136,17 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 class ScaledSpectrum(SpectralDensity):
     """Spectra known by one length: g depends on k times it only."""
 
-    correlation_length: Length
+    correlation_length: Positive
     truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Share | None = dataclasses.field(default=None, kw_only=True)
 
     @model_validator(mode="after")
-    def _truncated_once(self) -> Any:
+    def _consistent(self) -> Any:
+        if not 1e-100 < self.correlation_length < 1e100:  # else its inverse or square overflows
+            raise InputError(
+                "correlation_length: must lie between 1e-100 and 1e+100 m, got"
+                f" {self.correlation_length:g}"
+            )
         if self.truncation is not None and self.power_kept is not None:
             raise InputError("give truncation or power_kept, not both")
         return self
@@ -239,7 +226,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     1.0
     """
 
-    exponent: Annotated[float, BeforeValidator(_number), Field(ge=0.6, le=64.0)] = 4.0
+    exponent: Annotated[Real, Field(ge=0.6, le=64.0)] = 4.0
     type: Literal["power_law"] = "power_law"
 
     @property
@@ -253,16 +240,11 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return super().cutoff(dimensions)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        smoothness = self.exponent - 0.5
+        order = self.exponent - 0.5
         a = np.abs(np.asarray(lag, dtype=np.float64)) * self.scale
         with np.errstate(divide="ignore", invalid="ignore"):
-            log_value = (
-                (1.0 - smoothness) * math.log(2.0)
-                - gammaln(smoothness)
-                + smoothness * np.log(a)
-                + np.log(kve(smoothness, a))
-                - a
-            )
+            log_value = (1.0 - order) * math.log(2.0) - gammaln(order) + order * np.log(a)
+            log_value = log_value + np.log(kve(order, a)) - a
         # Where the Bessel function overflows, a is so small that the correlation is 1.
         return np.where(np.isfinite(log_value) & (a > 0.0), np.exp(log_value), 1.0)
 
@@ -303,14 +285,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
-    Parameters
-    ----------
-    correlation_length : float
-        xi_0, m: without truncation the correlation of z is 1/e there.
-    truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept;
-        0.99 of the power if neither is given, since every further nine takes ten times as
-        many modes.
+    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is kept if
+    nothing else is given, since every further nine takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"

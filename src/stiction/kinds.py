@@ -1,6 +1,7 @@
 """Fields of a model that hold one of several classes, told apart by `type` in a study file."""
 
-from collections.abc import Callable, Mapping
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import pydantic
@@ -14,30 +15,33 @@ class OneOf(NamedTuple):
     """Annotation of such a field.
 
     `kinds` are the classes by `type`: one that is added may be named in study files.
-    `convert` maps what was given to an object of one of them; `also` tells editors what
-    else a table may hold.
+    `convert` maps what was given to an object of one of them, or returns NotImplemented to
+    leave it to the annotated type; `also` are JSON schemas of what else the field may hold.
     """
 
     kinds: Mapping[str, Any]
     convert: Callable[[Any], Any]
-    also: str = ""
+    also: Sequence[Mapping[str, Any]] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        plain = core_schema.plain_serializer_function_ser_schema(_plain)
-        return core_schema.no_info_plain_validator_function(self.convert, serialization=plain)
+        def read(value: Any, inner: Any) -> Any:
+            found = self.convert(value)
+            return inner(value) if found is NotImplemented else found
+
+        own = handler(source)
+        plain = core_schema.wrap_serializer_function_ser_schema(_plain, schema=own)
+        return core_schema.no_info_wrap_validator_function(read, own, serialization=plain)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
         found = [pydantic.TypeAdapter(kind).json_schema() for kind in self.kinds.values()]
-        if self.also:
-            own = {"type": {"type": "string", "description": self.also}}
-            found.append({"type": "object", "properties": own})
-        return {
-            "anyOf": [one | {"required": [*one.get("required", ()), "type"]} for one in found]
-        }
+        found = [one | {"required": [*one.get("required", ()), "type"]} for one in found]
+        return {"anyOf": [*found, *self.also]}
 
 
-def _plain(value: Any) -> Any:
-    return value.plain() if hasattr(value, "plain") else to_plain(value)
+def _plain(value: Any, handler: Any) -> Any:
+    if hasattr(value, "plain"):
+        return value.plain()
+    return to_plain(value) if dataclasses.is_dataclass(value) else handler(value)
 
 
 def from_table(kinds: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
