@@ -180,12 +180,11 @@ class Problem:
                 f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
             )
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
-        rate = self.friction.weakening_rate
-        if rate is not None and not problems:
-            problems += self._too_few_nodes(float(np.max(rate)))
         if problems:
             raise InputError(problems)
+        rate = self.friction.weakening_rate
         if rate is not None:
+            self._check_resolution(float(np.max(rate)))
             self._warn_if_short(float(np.median(rate)))
         return self
 
@@ -231,10 +230,8 @@ class Problem:
                 UnitWarning,
             )
         elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
-            scale, value = self.friction.scale
-            rate = float(
-                self.friction.rate(np.array(strength - residual), scale, np.median(value))
-            )
+            (scale, value), drop = self.friction.scale, np.array(strength - residual)
+            rate = float(self.friction.rate(drop, scale, np.median(value)))
             self._warn_if_short(max(rate, 1e-300))
 
     @property
@@ -286,19 +283,23 @@ class Problem:
         lengths = zip(self.nucleation_lengths(steepest), self.interface.spacings, strict=True)
         return tuple(length / spacing for length, spacing in lengths)
 
-    def _too_few_nodes(self, highest_rate: float) -> list[str]:
-        resolution = min(self.nodes_in_nucleation_length(highest_rate))
-        if resolution >= FEWEST_NODES:
-            return []
-        shape = self.interface.shape
-        finer = [2.0 * np.ceil(0.5 * FEWEST_NODES * n / max(resolution, 1e-300)) for n in shape]
-        return [
-            f"interface.nodes: the nucleation length {self.nucleation_lengths(highest_rate)[0]:.3g}"
-            f" m spans {resolution:.2g} nodes; at least {FEWEST_NODES} are needed, that is"
-            f" interface.nodes >= {' x '.join(f'{n:.10g}' for n in finer)}, got"
-            f" {' x '.join(map(str, shape))}; if that is far, check the units of all lengths,"
-            " moduli and strengths"
-        ]
+    def _check_resolution(self, highest_rate: float) -> None:
+        resolution, shape = (
+            min(self.nodes_in_nucleation_length(highest_rate)),
+            self.interface.shape,
+        )
+        if resolution < FEWEST_NODES:
+            finer = 2.0 * np.ceil(
+                0.5 * FEWEST_NODES * np.array(shape) / max(resolution, 1e-300)
+            )
+            raise InputError(
+                "interface.nodes: the nucleation length"
+                f" {self.nucleation_lengths(highest_rate)[0]:.3g} m spans {resolution:.2g} nodes;"
+                f" at least {FEWEST_NODES} are needed, that is interface.nodes >="
+                f" {' x '.join(f'{n:.10g}' for n in finer)}, got"
+                f" {' x '.join(map(str, shape))}; if that is far, check the units of all lengths,"
+                " moduli and strengths"
+            )
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn if the nucleation length spans fewer than `enough` nodes; `cost`: the error."""
@@ -381,12 +382,9 @@ class Problem:
                     f"strength is not above residual_strength at {100.0 * constant.mean():.2g} %"
                     " of the nodes; these do not weaken: their strength stays as it is"
                 )
-        if too_few := self._too_few_nodes(steepest_rate(strength, residual, rates)):
-            raise InputError(too_few)
-        profile = np.array(
-            np.broadcast_to(self.load_profile, interface.shape), dtype=np.float64
-        )
-        return Sample(strength, residual, rates, initial, profile, pressure)
+        self._check_resolution(steepest_rate(strength, residual, rates))
+        load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
+        return Sample(strength, residual, rates, initial, load_shape, pressure)
 
     def _impossible(
         self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
