@@ -65,12 +65,12 @@ def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
 
 
 @contextmanager
-def prefixed(name: str) -> Iterator[None]:
+def prefixed(name: str, mark: str = ": ") -> Iterator[None]:
     """Let the mistakes that are found meanwhile begin with a name."""
     try:
         yield
     except InputError as error:
-        raise InputError([f"{name}: {text}" for text in error.problems]) from None
+        raise InputError([f"{name}{mark}{text}" for text in error.problems]) from None
 
 
 def warn_accuracy(message: str) -> None:

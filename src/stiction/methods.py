@@ -276,7 +276,7 @@ def onset(
     if refused := refusals(problem, method):
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
-    measured = None
+    measured: Any = True
     if not isinstance(profiles, Sample):
         profiles, measured = gather(problem, named_profiles(profiles), gaps)
     sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))

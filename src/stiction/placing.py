@@ -46,15 +46,15 @@ class Points(NamedTuple):
 
     values: Array
     places: dict[str, Array]
-    measured: Mask | None = None
+    measured: Any = True
 
 
 def place(
     points: Points, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
-) -> tuple[Array, Mask | None]:
-    """Put values on the nodes of an interface, (..., *shape), and say which were measured.
+) -> tuple[Array, Any]:
+    """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
 
-    The mask is False where there was no value, be it filled in or left out; it is None if nothing
+    The mask is False where there was no value, be it filled in or left out; it is True if nothing
     is missing.
     """
     values, places, measured = points
@@ -65,20 +65,18 @@ def place(
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
-    offsets = [_offset(dim, places[dim], interface) for dim in interface.dims]
-    between = None in offsets
+    offsets = {dim: _offset(dim, places[dim], interface) for dim in interface.dims}
+    between = None in offsets.values()
     if between and not interpolate:
         raise InputError(_elsewhere(points, offsets, interface, gaps))
     # Between the nodes, places differ if they are a millionth of the spacing apart.
-    shape = tuple(10**6 * n for n in interface.shape) if between else interface.shape
+    finer = 10**6 if between else 1
     index = []
-    for dim, n, length, offset in zip(
-        interface.dims, shape, interface.lengths, offsets, strict=True
-    ):
-        step = np.round(
-            places[dim] / (length / n) - (offset if offset and not between else 0.0)
-        )
-        index.append(np.mod(step, n).astype(np.int64))
+    for dim, n, length in zip(interface.dims, interface.shape, interface.lengths, strict=True):
+        offset = 0.0 if between else offsets[dim] or 0.0
+        step = np.round(places[dim] / (length / (finer * n)) - offset)
+        index.append(np.mod(step, finer * n).astype(np.int64))
+    shape = tuple(finer * n for n in interface.shape)
     node, first, twins = np.unique(
         np.ravel_multi_index(index, shape), return_index=True, return_inverse=True
     )
@@ -96,13 +94,12 @@ def place(
             f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
             f" {interface.spacing:.3g} m apart"
         )
-    if measured is not None:
-        measured = put(measured * 1.0) > 0.999
-    return close_gaps(put(values), measured, interface, gaps)
+    whole = np.all(measured) or put(measured * 1.0) > 0.999
+    return close_gaps(put(values), whole, interface, gaps)
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """What to say of a shape of a plane if its axes have changed places."""
+    """What to add to a message on the shape of a plane if its axes have changed places."""
     if len(shape) == 2 and given == shape[::-1]:
         return "; x and y have changed places: the first axis of a profile is x"
     return ""
@@ -151,22 +148,19 @@ def _offset(dim: str, x: Array, interface: Interface) -> float | None:
 
 
 def _elsewhere(
-    points: Points, offsets: list[float | None], interface: Interface, gaps: Gaps
+    points: Points, offsets: dict[str, float | None], interface: Interface, gaps: Gaps
 ) -> list[str]:
     """Why points cannot be put on the nodes as they are, and all that is to be decided."""
     problems = []
     advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
-    for dim, n, h, offset in zip(
-        interface.dims, interface.shape, interface.spacings, offsets, strict=True
-    ):
-        if offset is None:
+    for dim, n, h in zip(interface.dims, interface.shape, interface.spacings, strict=True):
+        if offsets[dim] is None:
             x = np.unique(points.places[dim])
-            step = np.ptp(x) / max(x.size - 1, 1)
             problems.append(
                 f"{dim} lies elsewhere than the {n} nodes {dim}_i = i L/n, which are {h:.6g} m"
-                f" apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m, {step:.6g} m apart;"
-                f" check the unit of {dim}, give values at the nodes, as np.linspace(0, L, n,"
-                f" endpoint=False) does{advice}"
+                f" apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m; check the unit of"
+                f" {dim}, give values at the nodes, as np.linspace(0, L, n, endpoint=False)"
+                f" does{advice}"
             )
     missing = int(np.isnan(points.values).sum())
     if missing and gaps == "refuse":
@@ -178,19 +172,20 @@ def _elsewhere(
 
 def _check_repeats(points: Points, twins: NDArray[np.int64], interface: Interface) -> None:
     """Refuse two points at one place, unless they have the same value a period apart."""
-    places = list(points.places.items())
+    periods = dict(zip(points.places, interface.lengths, strict=True))
     for i in np.flatnonzero(twins != np.arange(twins.size)):
         pair = [twins[i], i]
         one, other = np.moveaxis(points.values[..., pair], -1, 0)
-        periods = zip(interface.lengths, places, strict=True)
-        apart = max(np.ptp(x[pair]) / length for length, (_, x) in periods)
-        if apart < 0.5 or not np.array_equal(one, other, equal_nan=True):
-            where = [f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places]
+        same = np.array_equal(one, other, equal_nan=True)
+        apart = max(np.ptp(x[pair]) / periods[dim] for dim, x in points.places.items())
+        if apart < 0.5 or not same:
+            where = ", ".join(
+                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m"
+                for dim, x in points.places.items()
+            )
             raise InputError(
-                f"{', '.join(where)} are one place of an interface with the period"
-                f" {interface.length} m; keep one of the two values"
-                + OF_A_PLANE
-                * (not interface.is_plane)
+                f"{where} are one place of an interface with the period {interface.length} m; keep"
+                f" one of the two values{'' if interface.is_plane else OF_A_PLANE}"
             )
 
 
@@ -200,11 +195,11 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     margin = TOLERANCE * interface.spacing
     x = np.mod(x, length)
     order = np.argsort(x)
-    x, rows = x[order], values.reshape(-1, x.size)[:, order]
+    x = x[order]
     typical = float(np.median(np.diff(x))) if x.size > 1 else length
     widest = WIDE * max(typical, interface.spacing)
-    found = np.empty((rows.shape[0], nodes.size))
-    for row, target in zip(rows, found, strict=True):
+
+    def at_nodes(row: Array) -> Array:
         known = np.flatnonzero(~np.isnan(row))
         if known.size == 0:
             raise InputError("has no value at all")
@@ -214,14 +209,15 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
         interval = np.searchsorted(begin, nodes, side="right") - 1
         into = np.mod(nodes - begin[interval], length)
         inside = (into > margin) & (into < width[interval] - margin)
-        target[:] = np.interp(nodes, begin, row[known], period=length)
-        target[inside & is_gap[interval]] = np.nan
-    return found.reshape(*values.shape[:-1], nodes.size)
+        found = np.interp(nodes, begin, row[known], period=length)
+        return np.where(inside & is_gap[interval], np.nan, found)
+
+    return np.apply_along_axis(at_nodes, -1, values[..., order])
 
 
 def close_gaps(
-    values: Array, measured: Mask | None, interface: Interface, gaps: Gaps
-) -> tuple[Array, Mask | None]:
+    values: Array, measured: Any, interface: Interface, gaps: Gaps
+) -> tuple[Array, Any]:
     """Values (..., *shape) with NaN where nothing was measured, refused, left or filled."""
     missing = np.isnan(values)
     if not missing.any():
@@ -233,17 +229,14 @@ def close_gaps(
             f"must be finite: there {text}; give what was measured, make interface.length that of"
             f" the record, or fill gaps {how}, which the result then remembers: gaps='fill'"
         )
-    whole = ~missing if measured is None else ~missing & measured
-    if gaps == "skip":
-        return values, whole
-    filled = values.reshape(-1, *interface.shape).copy()
-    for one, hole in zip(filled, missing.reshape(filled.shape), strict=True):
-        if hole.all():
-            raise InputError("has no value at all")
-        if hole.any():
-            _fill(one, hole, interface.spacings)
-    warn_accuracy(f"there {text}; filled {how}")
-    return filled.reshape(values.shape), whole
+    if gaps == "fill":
+        filled = values.reshape(-1, *interface.shape).copy()
+        for row, hole in zip(filled, missing.reshape(filled.shape), strict=True):
+            if hole.any():
+                _fill(row, hole, interface.spacings)
+        values = filled.reshape(values.shape)
+        warn_accuracy(f"there {text}; filled {how}")
+    return values, ~missing & measured
 
 
 def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
@@ -254,49 +247,43 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import spsolve
 
-    number = np.full(hole.shape, -1)
-    number[hole] = np.arange(hole.sum())
-    places = np.nonzero(hole)
-    own = number[places]
-    rows, columns, entries = [own], [own], [np.zeros(own.size)]
-    right = np.zeros(own.size)
+    if hole.all():
+        raise InputError("has no value at all")
+    known, own = np.where(hole, 0.0, values), np.flatnonzero(hole)
+    nodes = np.arange(hole.size).reshape(hole.shape)
+    right, columns, entries = np.zeros(own.size), [own], [np.zeros(own.size)]
     for axis, spacing in enumerate(spacings):
         weight = (min(spacings) / spacing) ** 2
-        for step in (-1, 1):
-            beside = list(places)
-            beside[axis] = (places[axis] + step) % hole.shape[axis]
-            there = number[tuple(beside)]
-            known = there < 0
+        for step in (1, -1):
+            right += weight * np.roll(known, step, axis)[hole]
+            columns.append(np.roll(nodes, step, axis)[hole])
+            entries.append(np.full(own.size, -weight))
             entries[0] += weight
-            right[known] += weight * values[tuple(beside)][known]
-            rows.append(own[~known])
-            columns.append(there[~known])
-            entries.append(np.full(int((~known).sum()), -weight))
-    index = (np.concatenate(rows), np.concatenate(columns))
-    matrix = csr_array((np.concatenate(entries), index), shape=(own.size, own.size))
-    values[hole] = spsolve(matrix.tocsc(), right)
+    rows = np.tile(np.arange(own.size), len(columns))
+    index = (rows, np.concatenate(columns))
+    matrix = csr_array((np.concatenate(entries), index), shape=(own.size, hole.size))
+    values[hole] = spsolve(matrix.tocsc()[:, own], right)
 
 
 def gaps_of(missing: Mask, interface: Interface) -> list[tuple[float, float]]:
     """Return where nodes of a line lack a value: first and last, m; first > last across x = 0."""
+    x = interface.x
     if missing.all():
-        return [(0.0, float(interface.x[-1]))]
+        return [(0.0, float(x[-1]))]
     starts = np.flatnonzero(missing & ~np.roll(missing, 1))
     ends = np.flatnonzero(missing & ~np.roll(missing, -1))
     if ends.size and ends[0] < starts[0]:  # one begins before x = 0 and ends behind it
         ends = np.roll(ends, -1)
-    x = interface.x
-    return [(float(x[a]), float(x[b])) for a, b in zip(starts, ends, strict=True)]
+    return list(zip(x[starts].tolist(), x[ends].tolist(), strict=True))
 
 
 def describe_gaps(missing: Mask, interface: Interface) -> str:
-    """Say 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
+    """Return 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
     maps = missing.reshape(-1, *interface.shape)
-    gaps = maps.reshape(len(maps), -1).sum(axis=1)
-    row = int(np.argmax(gaps > 0))
-    count = f"{gaps[row]} of {interface.size} nodes"
+    row = int(np.argmax(maps.reshape(len(maps), -1).any(axis=1)))
+    count = f"{maps[row].sum()} of {interface.size} nodes"
     if len(maps) > 1:
-        count += f" of sample {row}; {(gaps > 0).sum()} of {len(maps)} samples have gaps"
+        count += f" of sample {row}"
     if interface.is_plane:
         first = interface.describe_node(int(np.argmax(maps[row])))
         return f"are no values (NaN) at {count}, the first at {first}"
@@ -308,9 +295,9 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
     return f"are no values (NaN) at x = {at}{more} ({count})"
 
 
-def with_gaps(problem: Any, result: xr.Dataset, measured: Mask | None) -> xr.Dataset:
-    """Return a result that says where its profiles have gaps, and which onsets lie in one."""
-    if measured is None:
+def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
+    """Return a result with the gaps of its profiles, and a mark of onsets that lie in one."""
+    if np.all(measured):
         return result
     interface = problem.interface
     position = result["critical_position"]
@@ -319,18 +306,14 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Mask | None) -> xr.Dat
     rate = problem.uniform_rate
     patch = interface.spacings if rate is None else problem.nucleation_lengths(rate)
     near = _missing_near(interface, places, measured, [0.5 * h for h in patch]) & ~inside
-    for where, what in (
-        (inside, "the onset at {} lies in"),
-        (near, "the critical patch at {} reaches into"),
-    ):
+    for where, what in ((inside, "the onset"), (near, "the critical patch")):
         if where.any():
-            first = places[int(np.argmax(where))]
-            at = ", ".join(
-                f"{d} = {v:.6g} m" for d, v in zip(interface.dims, first, strict=True)
-            )
+            first = zip(interface.dims, places[int(np.argmax(where))], strict=True)
+            at = ", ".join(f"{dim} = {place:.6g} m" for dim, place in first)
+            verb = "lies in" if where is inside else "reaches into"
             warn_accuracy(
-                f"{what.format(at)} a gap of the profile ({where.sum()} of {where.size} samples):"
-                " the strength there was filled in, not measured"
+                f"{what} at {at} {verb} a gap of the profile ({where.sum()} of {where.size}"
+                " samples): the strength there was filled in, not measured"
             )
     dims = tuple(dim for dim in position.dims if dim != "direction")
     attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
@@ -345,14 +328,13 @@ def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[f
     found = np.zeros(len(places), dtype=np.bool_)
     maps = np.broadcast_to(measured, (len(places), *interface.shape))
     for i in np.flatnonzero(np.isfinite(places).all(axis=1)):
-        missing = ~maps[i]
-        for axis, nodes in enumerate(interface.coordinates.values()):
-            length = interface.lengths[axis]
-            apart = np.abs(
-                np.mod(nodes - places[i, axis] + 0.5 * length, length) - 0.5 * length
-            )
-            missing = np.compress(apart < (1.0 - 1e-9) * reach[axis], missing, axis=axis)
-        found[i] = missing.any()
+        near = []
+        for place, length, nodes, most in zip(
+            places[i], interface.lengths, interface.coordinates.values(), reach, strict=True
+        ):
+            apart = np.abs(np.mod(nodes - place + 0.5 * length, length) - 0.5 * length)
+            near.append(apart < (1.0 - 1e-9) * most)
+        found[i] = not maps[i][np.ix_(*near)].all()
     return found
 
 

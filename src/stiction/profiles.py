@@ -17,7 +17,7 @@ import numpy as np
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.interface import Interface
 from stiction.model import FilePath, Flag, check, checked, describe, real_array
-from stiction.placing import OF_A_PLANE, Gaps, Mask, Points, close_gaps, place
+from stiction.placing import OF_A_PLANE, Gaps, Points, close_gaps, place
 from stiction.tables import load, read_npy
 from stiction.units import factor_to, is_in, parse
 
@@ -143,9 +143,9 @@ def read_profile(
         raise InputError("x, x_unit and interpolate: are options of profiles of a line")
     with prefixed(str(source) if isinstance(source, str | Path) else "source"):
         points = points_of(source, quantity, dims, x=x, value=value, unit=unit, x_unit=x_unit)
-        if points.values.ndim != (1 if points.places else len(dims)):
-            raise InputError(f"must hold one profile, got shape {points.values.shape}")
         values, places, measured = points
+        if values.ndim != (1 if places else len(dims)):
+            raise InputError(f"must hold one profile, got shape {values.shape}")
         if interface is not None:
             values, measured = place(points, interface, interpolate, gaps)
             places = interface.coordinates
@@ -155,15 +155,18 @@ def read_profile(
         dim: (dim, at, {"units": "m", "long_name": f"position along {dim}"})
         for dim, at in places.items()
     }
-    if measured is not None:
+    if not np.all(measured):
         coords[MEASURED] = (dims, measured, {"long_name": "measured, not filled in"})
     attributes = {"units": UNITS[quantity], "long_name": quantity.replace("_", " ")}
     array = xr.DataArray(values, coords, dims, name=quantity, attrs=attributes)
     return array.sortby("x") if interface is None and places else array
 
 
+# -- values in SI --------------------------------------------------------------------------------
+
+
 def is_labelled(value: Any) -> bool:
-    """Whether it is an xarray object, told without importing xarray."""
+    """Whether it is an xarray object, tested without importing xarray."""
     return hasattr(value, "dims") and hasattr(value, "coords")
 
 
@@ -172,11 +175,8 @@ def simplified(value: Any, quantity: str) -> Any:
     if is_labelled(value):
         plain = not value.dims and not hasattr(value, "data_vars")
         return _values(value, quantity, None, UNITS[quantity]) if plain else value
-    index = getattr(value, "index", None)
-    if (
-        hasattr(value, "to_xarray")
-        and getattr(getattr(index, "dtype", None), "kind", "") == "f"
-    ):
+    kind = getattr(getattr(getattr(value, "index", None), "dtype", None), "kind", "")
+    if kind == "f" and hasattr(value, "to_xarray"):
         return value.to_xarray()
     return _magnitude(value, UNITS[quantity])
 
@@ -194,26 +194,26 @@ def _magnitude(value: Any, si: str) -> Any:
 
 
 def _values(array: Any, what: str, given: str | None, si: str) -> Any:
-    """Values of a DataArray in SI, from the unit that the caller says and the source states."""
+    """Values of a DataArray in SI, by the unit that the caller gives and the source states."""
     stated = _unit_of(array)
-    try:
-        values = real_array(_magnitude(array.data, si))
+    with prefixed(what, " "):
+        try:
+            values = real_array(_magnitude(array.data, si))
+        except TypeError as error:
+            raise InputError(f"must be numbers; {error}") from None
         factor = factor_to(si, given or stated or si)
         known = given and stated and parse(stated)
         if known and not np.isclose(factor_to(si, str(stated)), factor, rtol=1e-12):
             raise InputError(f"is said to be in {given}, the source states {stated}")
-    except TypeError as error:
-        raise InputError(f"{what} must be numbers; {error}") from None
-    except InputError as error:
-        raise InputError([f"{what} {text}" for text in error.problems]) from None
     return values * factor
 
 
 def _unit_of(array: Any) -> str | None:
-    for key in ("units", "unit"):
-        if str(array.attrs.get(key, "")).strip():
-            return str(array.attrs[key]).strip()
-    return None
+    stated = (str(array.attrs.get(key, "")).strip() for key in ("units", "unit"))
+    return next(filter(None, stated), None)
+
+
+# -- which variable, and which coordinates -------------------------------------------------------
 
 
 def points_of(
@@ -226,32 +226,24 @@ def points_of(
     unit: str | None = None,
     x_unit: str | None = None,
 ) -> Points:
-    """Return what `source` says of a quantity, in SI, along the directions `dims`."""
+    """Return the values of a quantity in `source`, in SI, along the directions `dims`."""
     data: Any = load(Path(source), dims) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
-    if not hasattr(data, "data_vars"):
-        if value is not None and value != data.name:
-            raise InputError(
-                f"value: {describe(value)} is not the one variable here, {data.name!r}"
-            )
-    elif "row" in data.dims:
-        data, x = _of_table(data, quantity, dims, x, value), None
-    else:
-        if x in data.data_vars:
-            data = data.set_coords(x)
-        data = data[_variable(data, list(data.data_vars), quantity, value)]
+    if hasattr(data, "data_vars"):
+        data, x = _variable(data, quantity, dims, x, value)
+    elif value is not None and value != data.name:
+        raise InputError(f"value: {value!r} is not the one variable here, {data.name!r}")
     array = _along(data, dims, x)
     values = _values(array, quantity, unit, UNITS[quantity])
     if not {*dims, "row"} & set(array.dims):  # one value a sample
         return Points(values[:, np.newaxis], {})
-    measured = None
+    measured: Any = True
     if MEASURED in array.coords:
         mask = array.coords[MEASURED].broadcast_like(array).transpose(*array.dims)
         measured = mask.values.astype(bool)
-    units = {"x": x_unit}
     places = {
-        dim: _values(array[dim], dim, units.get(dim), "m")
+        dim: _values(array[dim], dim, x_unit if dim == "x" else None, "m")
         for dim in dims
         if dim in array.coords
     }
@@ -263,61 +255,64 @@ def points_of(
         grid = np.meshgrid(*places.values(), indexing="ij")
         places = {dim: at.ravel() for dim, at in zip(dims, grid, strict=True)}
         values = values.reshape(*values.shape[:-2], -1)
-        measured = None if measured is None else measured.reshape(values.shape)
+        measured = np.broadcast_to(measured, array.shape).reshape(values.shape)
     return Points(values, places, measured)
 
 
-def _of_table(data: Any, quantity: str, dims: tuple[str, ...], x: Column, value: Column) -> Any:
-    """The column that holds a quantity, with those that hold its places as coordinates."""
+def _variable(
+    data: Any, quantity: str, dims: tuple[str, ...], x: Column, value: Column
+) -> tuple[Any, Column]:
+    """The variable that holds a quantity, with its places as coordinates, and what x is called."""
     names = list(data.data_vars)
     if value is not None:
         value = _column(data, names, "value", value)
-    if len(dims) == 2:
-        at = {name.casefold(): name for name in names if name.casefold() in dims}
-        if len(at) < 2:
+    if "row" not in data.dims:
+        places = [name for name in names if _plain(name) in PLACES or name == x]
+    elif len(dims) == 2:
+        places = [name for name in names if name.casefold() in dims]
+        if len(places) < 2:
             raise InputError(
                 f"holds {_listed(data, names)}; a map as text has a line for each place, with"
                 " columns called 'x', 'y' and the value's; save a matrix (nx, ny) with np.save as"
                 " .npy"
             )
     else:
-        place = _place_column(data, names, quantity, x, value)
-        at = {} if place is None else {"x": place}
-        if place is None and value is None and len(names) > 2:
+        if x is None:
+            x = _place_column(data, names, quantity, value)
+        else:
+            x = _column(data, names, "x", x)
+        places = [] if x is None else [x]
+        if not places and value is None and len(names) > 2:
             raise InputError(_unclear(data, names, quantity))
-    places = {dim: ("row", data[name].values, data[name].attrs) for dim, name in at.items()}
-    left = [name for name in names if name not in at.values() or name == value]
-    return data[_variable(data, left, quantity, value)].assign_coords(places)
+    left = [name for name in names if name not in places or name == value]
+    array = data[_named(data, left, quantity, value)]
+    called = {name if len(dims) == 1 else name.casefold(): data[name] for name in places}
+    return array.assign_coords(
+        {name: (at.dims, at.data, at.attrs) for name, at in called.items()}
+    ), x
 
 
-def _place_column(
-    data: Any, names: list[str], quantity: str, x: Column, value: Column
-) -> str | None:
+def _place_column(data: Any, names: list[str], quantity: str, value: Column) -> str | None:
     """The column of a table that holds x; None if it has none."""
-    if x is not None:
-        return _column(data, names, "x", x)
     called = [name for name in names if _plain(name) in PLACES]
-    if len(called) == 1 and len(names) > 1:
-        return called[0]
-    rest = [name for name in names if name != value]
-    lengths = [name for name in rest if is_in(_unit_of(data[name]), "m")]
-    if len(lengths) == 1 and len(names) > 1 and UNITS[quantity] != "m":
-        return lengths[0]
+    lengths = [name for name in names if name != value and is_in(_unit_of(data[name]), "m")]
+    for found in (called, lengths if UNITS[quantity] != "m" else []):
+        if len(found) == 1 and len(names) > 1:
+            return found[0]
     known = value == names[0] or _plain(names[0]) in (quantity, *NAMES.get(quantity, ()))
     return names[0] if len(names) == 2 and not known else None
 
 
-def _variable(data: Any, names: list[str], quantity: str, value: Column) -> str:
+def _named(data: Any, names: list[str], quantity: str, value: Column) -> str:
     """The variable that was asked for, or the one that is plainly the quantity."""
     if value is not None:
         return _column(data, names, "value", value)
     if len(names) == 1 and _is_unnamed(data[names[0]]):
         return names[0]
     alone = ("value", "values") if len(names) == 1 else ()
-    plain = [_plain(name) for name in names]
-    for name in (quantity, *NAMES.get(quantity, ()), *alone):
-        if name in plain:
-            return names[plain.index(name)]
+    for called in (quantity, *NAMES.get(quantity, ()), *alone):
+        if found := [name for name in names if _plain(name) == called]:
+            return found[0]
     # Any number is dimensionless: for such a quantity a unit says nothing.
     si = UNITS[quantity]
     fitting = [name for name in names if si != "1" and is_in(_unit_of(data[name]), si)]
@@ -348,11 +343,8 @@ def _unclear(data: Any, names: list[str], quantity: str) -> str:
 
 
 def _listed(data: Any, names: list[str]) -> str:
-    shown = []
-    for name in names:
-        unit = _unit_of(data[name])
-        if not _is_unnamed(data[name]):
-            shown.append(f"{name!r} in {unit}" if unit else f"{name!r}")
+    units = {name: _unit_of(data[name]) for name in names if not _is_unnamed(data[name])}
+    shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
     return ", ".join(shown) or f"{len(names)} columns without names, as of a matrix"
 
 
@@ -366,7 +358,7 @@ def _plain(name: Any) -> str:
 
 def _along(array: Any, dims: tuple[str, ...], x: Column) -> Any:
     """The array over the sample, if there are several, and then 'x' ('x' and 'y'; 'row')."""
-    if len(dims) == 1 and "row" not in array.dims:
+    if len(dims) == 1:
         array = _with_x(array, x)
     names = [str(dim) for dim in array.dims]
     along = [dim for dim in (*dims, "row") if dim in names]
@@ -387,9 +379,9 @@ def _with_x(array: Any, x: Column) -> Any:
     names = [str(dim) for dim in array.dims]
     if {"x", "y"} <= set(names):
         raise InputError(f"holds values over x and y, not along a line{OF_A_PLANE}")
-    ordered = [str(name) for name in (*names, *array.coords) if name in array.coords]
-    wanted = [x] if x is not None else [name for name in ordered if _plain(name) in PLACES]
-    at = [name for name in ordered if name in wanted and array[name].ndim == 1]
+    along = [str(name) for name in array.coords if array[name].ndim == 1]
+    along.sort(key=lambda name: name not in names)  # those of dimensions first
+    at = [name for name in along if (_plain(name) in PLACES if x is None else name == x)]
     if x is not None and not at:
         raise InputError(unknown_name("x", str(x), [str(name) for name in array.coords]))
     called = [name for name in names if _plain(name) in PLACES]
@@ -412,6 +404,9 @@ def _with_x(array: Any, x: Column) -> Any:
     return array if place is None else array.assign_coords(x=("x", place.data, place.attrs))
 
 
+# -- what takes profiles -------------------------------------------------------------------------
+
+
 def at_nodes(
     name: str,
     value: Any,
@@ -419,11 +414,11 @@ def at_nodes(
     interface: Interface,
     gaps: Gaps = "refuse",
     interpolate: bool = False,
-) -> tuple[Any, Mask | None]:
+) -> tuple[Any, Any]:
     """Return what a caller gave for a quantity, with one value a node, and where it was measured.
 
     Numbers and plain arrays without gaps pass as they are, for whoever checks their shape; the mask
-    is None if nothing is missing.
+    is True if nothing is missing.
     """
     with prefixed(name):
         value = simplified(value, quantity)
@@ -432,38 +427,34 @@ def at_nodes(
             if not points.places and points.values.shape[1:] == (1,):  # one value a sample
                 if quantity == "strength":
                     raise InputError("has no dimension along the interface; call it 'x'")
-                return points.values, None
+                return points.values, True
             return place(points, interface, interpolate, gaps)
         if gaps != "refuse":
             with suppress(TypeError):  # no numbers: refused with everything else that is wrong
                 array = real_array(value)
                 if array.shape[-len(interface.shape) :] == interface.shape:
-                    return close_gaps(array, None, interface, gaps)
-    return value, None
+                    return close_gaps(array, True, interface, gaps)
+    return value, True
 
 
 def gather(
-    problem: Any, given: Mapping[str, Any], gaps: Gaps
-) -> tuple[dict[str, Any], Mask | None]:
+    problem: Any, given: Mapping[str, Any], gaps: Gaps = "refuse"
+) -> tuple[dict[str, Any], Any]:
     """Put what a caller gave on the nodes, and find where all of it was measured.
 
-    The mask has the shape (samples, *shape) or (1, *shape); it is None if nothing is missing.
+    The mask has the shape (samples, *shape) or (1, *shape); it is True if nothing is missing.
     """
     problems: list[str] = []
-    values: dict[str, Any] = {}
-    measured: Any = None
+    values = dict(given)
+    measured: Any = True
     for name, value in given.items():
-        values[name] = value
-        if value is None:
-            continue
-        try:
-            values[name], whole = at_nodes(name, value, name, problem.interface, gaps)
-        except InputError as error:
-            problems += error.problems
-            continue
-        if whole is not None:
-            whole = whole.reshape(-1, *problem.interface.shape)
-            measured = whole if measured is None else measured & whole
+        if value is not None:
+            try:
+                values[name], whole = at_nodes(name, value, name, problem.interface, gaps)
+                if not np.all(whole):
+                    measured = measured & whole.reshape(-1, *problem.interface.shape)
+            except InputError as error:
+                problems += error.problems
     if problems:
         raise InputError(problems)
     return values, measured
@@ -491,8 +482,7 @@ def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
     A dict has `file` and options of `read_profile`. What is returned is a DataArray in plain form,
     with options of `place` among its attributes, or the array of an .npy.
     """
-    table = given if isinstance(given, Mapping) else {"file": given}
-    table = {str(key): value for key, value in table.items()}
+    table = dict(given) if isinstance(given, Mapping) else {"file": given}
     if "file" not in table:  # what this function returned
         return table
     path = Path(folder) / check("file", table.pop("file"), FilePath)

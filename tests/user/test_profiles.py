@@ -449,3 +449,12 @@ def test_profiles_in_a_study_file(study, tmp_path):
 def test_profiles_of_a_study_file_that_are_refused(study, tmp_path, words, profile):
     study["problem"]["load"]["profile"] = profile
     refuses(words, lambda: st.Study.from_dict(study, folder=tmp_path))
+
+
+def test_a_variable_called_position_holds_the_places(tmp_path):
+    """In NetCDF files too, where it need not be a coordinate."""
+    position = ("point", X[::-1] * 1e3, {"units": "mm"})
+    data = xr.Dataset({"position": position, "strength": ("point", STRENGTH[::-1])})
+    data.to_netcdf(tmp_path / "p.nc")
+    for source in (data, tmp_path / "p.nc"):
+        np.testing.assert_array_equal(st.read_profile(source, interface=LINE), STRENGTH)

@@ -103,7 +103,7 @@ def simulate_rupture(
         raise InputError(refused)
     if (initial_slip is None) != (initial_load is None):
         raise InputError("initial_slip and initial_load: give both or neither")
-    given, measured = gather(problem, named_profiles(profiles), "refuse")
+    given, measured = gather(problem, named_profiles(profiles))
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")

@@ -58,8 +58,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     if is_labelled(values):
         dims = ("x", "y") if "y" in values.dims else ("x",)
         values, places, measured = points_of(values, quantity, dims)
-        if measured is not None:  # what was filled in is no measurement
-            values = np.where(measured, values, np.nan)
+        values = np.where(measured, values, np.nan)  # what was filled in is no measurement
     if not places:
         return _of_array(values, interface)
     index, spacings = [], []
