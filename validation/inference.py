@@ -18,7 +18,7 @@ import numpy as np
 import scipy.stats
 
 import stiction as st
-from stiction.inference.grid import on_grid
+from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, make_model
 from stiction.inference.onset_table import experiments_at, simulate
 from stiction.inference.prior import make_prior
@@ -113,7 +113,8 @@ def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None
                 variable=case.variable, meter=SILENT,
             )  # fmt: skip
             peaks.append(onsets[0] + case.error * rng.standard_normal(tests))
-        grid = on_grid(Likelihood(model, tuple(peaks)), SILENT, points)
+        likelihood = Likelihood(model, tuple(peaks)).__call__
+        grid = grid_of(likelihood, model.low, model.high, points=points)
         draws = grid.draws(DRAWS, i)
         found[i], means[i] = (draws < u).sum(axis=0), draws.mean(axis=0)
     return prior.names, found, truth, means

@@ -8,7 +8,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.inference.density import log_likelihoods, tabulate
-from stiction.inference.grid import on_grid
+from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, make_model
 from stiction.inference.onset_table import experiments_at, simulate
 from stiction.inference.prior import make_prior
@@ -288,7 +288,7 @@ def test_grid_against_a_sum_by_hand():
     density /= density.mean()
     held = density > 0.0
     information = np.mean(density[held] * np.log(density[held]))
-    grid = on_grid(likelihood, SILENT)
+    grid = grid_of(likelihood.__call__, model.low, model.high)
     # The midpoint rule on 512 cells of a smooth function within the zoomed box.
     assert grid.log_evidence == pytest.approx(evidence, abs=1e-3)
     assert grid.information(0) == pytest.approx(information, abs=1e-3)

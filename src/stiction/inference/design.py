@@ -1,7 +1,7 @@
 """Designs of tests: how much each is expected to tell, before any is made."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Names, Progress, at_least, check, checked, is_whole
 from stiction.problem import Problem
-from stiction.progress import SILENT, Meter
+from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.results import Variable, to_dataset
@@ -30,13 +30,6 @@ VARIABLES = {
     "standard_error": "standard error of the information, nats",
     "spread_left": "posterior over prior standard deviation, expected",
 }
-
-
-class Design(NamedTuple):
-    """One way to spend the tests: their number, by length (m), and which parameters are known."""
-
-    tests: dict[float | None, int]
-    known: tuple[str, ...]
 
 
 @checked
@@ -105,70 +98,68 @@ def design_of_tests(
     True
     """
     parameters = make_prior(problem, random, prior)
-    found = _designs(designs, parameters.names)
-    lengths = list(
-        dict.fromkeys(length for design in found.values() for length in design.tests)
-    )
+    plans = _plans(designs, parameters.names)
+    lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:
         simulated = make_model(
             parameters, method=method, lengths=lengths, error=load_cell_error, samples=samples,
             seed=seed, variable="critical_stress", meter=meter,
         )  # fmt: skip
-        meter.stage("simulated campaigns", repetitions * len(found))
+        meter.stage("simulated campaigns", repetitions * len(plans))
         rows = []
-        for design in found.values():
-            specimens = tuple(simulated.specimens[lengths.index(one)] for one in design.tests)
+        for tests, free in plans:
+            specimens = tuple(simulated.specimens[lengths.index(one)] for one in tests)
             own = simulated._replace(specimens=specimens)
-            rows.append(_expected(own, design, repetitions, seed, meter))
+            rows.append(_expected(own, list(tests.values()), free, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
     values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
     coordinates = {
-        "design": (np.array(list(found)), Variable("", "design of tests", ("design",))),
+        "design": (np.array(list(designs)), Variable("", "design of tests", ("design",))),
         "parameter": (np.array(parameters.names), Variable("", "parameter", ("parameter",))),
     }
     return to_dataset(values, variables, coordinates, {"repetitions": repetitions})
 
 
-def _designs(given: dict[str, Any], names: tuple[str, ...]) -> dict[str, Design]:
-    """The designs by name, or everything that is wrong with them."""
-    problems = [] if given else ["designs: are none"]
-    found = {}
-    for name, one in given.items():
+def _plans(
+    designs: dict[str, Any], names: tuple[str, ...]
+) -> list[tuple[dict[float | None, int], list[int]]]:
+    """Return numbers of tests by length, m, and the places of parameters that are not known."""
+    problems = [] if designs else ["designs: are none"]
+    plans = []
+    for name, one in designs.items():
         table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
-        tests = (
-            table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
-        )
+        given = table["tests"]
+        tests = dict(given) if isinstance(given, Mapping) else {None: given}
         known = check("known", table.get("known", ()), Names)
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             problems.append(
                 f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
             )
-        problems += [unknown_name(f"designs: {name}", str(key), ["tests", "known"])
-                     for key in table if key not in ("tests", "known")]  # fmt: skip
-        problems += [unknown_name(f"designs: {name}: known", k, names) for k in known
-                     if k not in names]  # fmt: skip
+        for path, found, valid in (
+            (f"designs: {name}", table, ("tests", "known")),
+            (f"designs: {name}: known", known, names),
+        ):
+            problems += [unknown_name(path, str(k), valid) for k in found if k not in valid]
         if set(known) >= set(names):
             problems.append(f"designs: {name}: known: every parameter would be known")
-        found[name] = Design(dict(tests), known)
+        plans.append((tests, [i for i, own in enumerate(names) if own not in known]))
     if problems:
         raise InputError(problems)
-    return found
+    return plans
 
 
-def _expected(model: Model, design: Design, repetitions: int, seed: int, meter: Meter) -> Array:
-    """Information, its standard error and the spread left, of every parameter, (3, parameters)."""
-    prior = model.prior
-    rng = np.random.default_rng([seed, 2])
-    free = [i for i, name in enumerate(prior.names) if name not in design.known]
-    gains = np.full((repetitions, prior.dimension), np.nan)
-    left = gains.copy()
+def _expected(
+    model: Model, tests: list[int], free: list[int], repetitions: int, seed: int, meter: Meter
+) -> Array:
+    """Return information, its standard error and the spread left, (3, parameters)."""
+    rng, dimension = np.random.default_rng([seed, 2]), model.prior.dimension
+    gains, left = np.full((2, repetitions, dimension), np.nan)
     for row in range(repetitions):
-        truth = rng.random(prior.dimension)
-        start = int(rng.integers(2**32))
+        truth, start = rng.random(dimension), int(rng.integers(2**32))
         peaks = tuple(
             predicted(model, number, np.tile(truth, (count, 1)), start + number)
-            for number, count in enumerate(design.tests.values())
+            for number, count in enumerate(tests)
         )
         likelihood = Likelihood(model, peaks)
 
@@ -179,10 +170,10 @@ def _expected(model: Model, design: Design, repetitions: int, seed: int, meter: 
             u[:, free] = v
             return likelihood(u, floor)
 
-        box = model.low[free], model.high[free], SILENT
+        box = model.low[free], model.high[free]
         # A posterior may fall between the points of a coarse grid.
-        grid = grid_of(given_what_is_known, *box, POINTS) or grid_of(
-            given_what_is_known, *box, 50 * POINTS
+        grid = grid_of(given_what_is_known, *box, points=POINTS) or grid_of(
+            given_what_is_known, *box, points=50 * POINTS
         )
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.inference.likelihood import Likelihood
-from stiction.progress import Meter
+from stiction.progress import SILENT, Meter
 
 Function = Callable[[Array, float], Array]
 """Logarithms at points (points, parameters); those below a floor may be -inf."""
@@ -48,30 +47,29 @@ class Grid:
     gain: float
 
     def centres(self, axis: int) -> Array:
-        """Of the cells along one parameter, as u."""
-        count = self.mass.shape[axis]
-        width = self.high[axis] - self.low[axis]
+        """Return the centres of the cells along one parameter, as u."""
+        count, width = self.mass.shape[axis], self.high[axis] - self.low[axis]
         result: Array = self.low[axis] + width * (np.arange(count) + 0.5) / count
         return result
 
     def marginal(self, axis: int) -> Array:
-        """Mass of the cells along one parameter."""
+        """Return the mass of the cells along one parameter."""
         return _along(self.mass, axis)
 
     def information(self, axis: int) -> float:
-        """Divergence of the marginal of one parameter from its prior, nats."""
+        """Return the divergence of the marginal of one parameter from its prior, nats."""
         mass = self.marginal(axis)
         prior = (self.high[axis] - self.low[axis]) / mass.size
         held = mass > 0.0
         return float(np.sum(mass[held] * np.log(mass[held] / prior)))
 
     def spread(self, axis: int) -> float:
-        """Standard deviation of one parameter, as u."""
+        """Return the standard deviation of one parameter, as u."""
         mass, centres = self.marginal(axis), self.centres(axis)
         return float(np.sqrt(mass @ (centres - mass @ centres) ** 2))
 
     def draws(self, count: int, seed: int) -> Array:
-        """Draws from the posterior as u, (count, parameters), uniform within the cells."""
+        """Draw from the posterior as u, (count, parameters), uniform within the cells."""
         rng = np.random.default_rng(seed)
         cells = rng.choice(self.mass.size, size=count, p=self.mass.ravel())
         places = np.stack(np.unravel_index(cells, self.mass.shape), axis=1)
@@ -86,7 +84,7 @@ def _along(mass: Array, axis: int) -> Array:
 
 
 def _evaluated(function: Function, low: Array, high: Array, along: int, meter: Meter) -> Array:
-    """The function at the centres of the cells of a box."""
+    """Evaluate the function at the centres of the cells of a box."""
     dimension = low.size
     steps = (np.arange(along) + 0.5) / along
     mesh = np.stack(np.meshgrid(*([steps] * dimension), indexing="ij"), axis=-1)
@@ -102,7 +100,7 @@ def _evaluated(function: Function, low: Array, high: Array, along: int, meter: M
 
 
 def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The box without the cells on either side that hold next to nothing."""
+    """Return the box without the cells on either side that hold next to nothing."""
     new_low, new_high = low.copy(), high.copy()
     for axis in range(mass.ndim):
         along = _along(mass, axis)
@@ -114,17 +112,10 @@ def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
     return new_low, new_high
 
 
-def on_grid(likelihood: Likelihood, meter: Meter, points: int = POINTS) -> Grid | None:
-    """The posterior of all parameters by sums over a grid; None if it is zero everywhere."""
-    return grid_of(
-        likelihood.__call__, likelihood.model.low, likelihood.model.high, meter, points
-    )
-
-
 def grid_of(
-    function: Function, low: Array, high: Array, meter: Meter, points: int
+    function: Function, low: Array, high: Array, meter: Meter = SILENT, points: int = POINTS
 ) -> Grid | None:
-    """A density, given by its logarithm and a floor, between two corners; None if it is zero.
+    """Return a density, given by its logarithm, between two corners; None if it is zero.
 
     The first grid covers all of it; each next one the box that holds all but a millionth of the
     last, until it no longer shrinks by a tenth in any direction. The midpoint rule converges

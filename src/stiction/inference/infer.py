@@ -4,13 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
-from stiction.inference.grid import Grid, on_grid
-from stiction.inference.likelihood import Likelihood, Model, make_model
+from stiction.inference.grid import Grid, grid_of
+from stiction.inference.likelihood import Likelihood, make_model
 from stiction.inference.onset_table import experiments_at
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.posterior import Posterior, monte_carlo_errors
@@ -132,8 +133,9 @@ def infer(
     """
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
-    known = problem.load.normal_pressure is not None
-    if measured.coefficients and not known and "normal_pressure" not in parameters.random.names:
+    pressed = problem.load.normal_pressure is not None
+    pressed = pressed or "normal_pressure" in parameters.random.names
+    if measured.coefficients and not pressed:
         raise InputError(
             "peaks: are coefficients of friction, which need a normal pressure: give"
             " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
@@ -145,47 +147,46 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
-    options: dict[str, Any] = {
-        "lengths": measured.lengths,
-        "error": error,
-        "seed": seed,
-        "variable": measured.variable,
-    }
-    with Meter("infer", show=progress) as options["meter"]:
+    options: dict[str, Any] = {"lengths": measured.lengths, "variable": measured.variable}
+    with Meter("infer", show=progress) as meter:
+        options |= {"error": error, "seed": seed, "meter": meter}
         (own,) = experiments_at(parameters, parameters.middle[None], method)
         own.problem.warn_of_units(own.mean("strength"))
         likelihood, grid = _located(parameters, method, measured, samples, options)
-        return _posterior(likelihood, grid, measured, seed, options["meter"])
+        return _posterior(likelihood, grid, measured, seed, meter)
 
 
 def _located(
     prior: Prior, method: Any, peaks: Peaks, samples: int | None, options: Mapping[str, Any]
 ) -> tuple[Likelihood, Grid]:
-    """The likelihood in a box of the prior that holds the posterior, and the posterior."""
-    low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
+    """Return the likelihood in a box of the prior that holds the posterior, and the posterior."""
+    zero, one = np.zeros(prior.dimension), np.ones(prior.dimension)
+    low, high = zero, one
     if method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle)):
         low, high = _first_box(prior, peaks, options)
     while True:
         model = make_model(prior, method=method, samples=samples, low=low, high=high, **options)
         likelihood = Likelihood(model, peaks.values)
         whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
-        if whole:
-            _check_reach(likelihood)
+        if whole and (refused := _out_of_reach(likelihood)[1]):
+            raise InputError(refused)
         options["meter"].stage("posterior")
-        grid = on_grid(likelihood, options["meter"])
+        grid = grid_of(likelihood.__call__, low, high, options["meter"])
         if grid is None and whole:
             raise InputError(
                 "peaks: no point of the prior can produce all of them; widen the prior, or give"
                 " the load-cell error if they are not exact"
             )
-        old = low, high
-        low, high = (0.0 * low, 0.0 * low + 1.0) if grid is None else grown(grid, low, high)
-        if grid is not None and np.array_equal(old, (low, high)):
+        if grid is None:
+            low, high = zero, one
+            continue
+        old, (low, high) = (low, high), grown(grid, low, high)
+        if np.array_equal(old, (low, high)):
             return likelihood, grid
 
 
 def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Corners, as u, between which the local criterion finds the posterior.
+    """Return corners, as u, between which the local criterion finds the posterior.
 
     All of the prior if it cannot produce the peaks: where nodes reach their residual strength
     before the onset, the other methods may.
@@ -193,10 +194,10 @@ def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[
     low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
     model = make_model(prior, method=LocalCriterion(), samples=None, **options)
     likelihood = Likelihood(model, peaks.values)
-    outside = _outside(likelihood)
-    if np.concatenate(outside).all():  # their unit is wrong, say
-        _check_reach(likelihood)
-    grid = None if np.concatenate(outside).any() else on_grid(likelihood, options["meter"])
+    outside, refused = _out_of_reach(likelihood)
+    if outside.all():  # their unit is wrong, say
+        raise InputError(refused)
+    grid = None if refused else grid_of(likelihood.__call__, low, high, options["meter"])
     if grid is None:
         return low, high
     for axis in range(prior.dimension):
@@ -208,33 +209,25 @@ def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[
     return low, high
 
 
-def _outside(likelihood: Likelihood) -> list[Any]:
-    """Which peaks of each specimen nothing in the prior can produce."""
-    reaches = [likelihood.model.reach(number) for number in range(len(likelihood.peaks))]
-    pairs = zip(likelihood.peaks, reaches, strict=True)
-    return [(peaks < low) | (peaks > high) for peaks, (low, high, _) in pairs]
-
-
-def _check_reach(likelihood: Likelihood) -> None:
-    """Refuse peaks that nothing in the prior can produce."""
-    problems = []
-    for number, (peaks, far) in enumerate(
-        zip(likelihood.peaks, _outside(likelihood), strict=True)
-    ):
+def _out_of_reach(likelihood: Likelihood) -> tuple[NDArray[np.bool_], list[str]]:
+    """Return which peaks nothing in the prior can produce, and the texts that refuse them."""
+    masks, texts = [], []
+    for number, peaks in enumerate(likelihood.peaks):
         low, high, places = likelihood.model.reach(number)
+        far = (peaks < low) | (peaks > high)
+        masks.append(far)
         for value in peaks[far][:1]:
-            side = "below" if value < low else "above"
-            problems.append(
+            texts.append(
                 f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
-                f" {side} all that the prior can produce, {low:g} to {high:g} ({places}); widen the"
-                " prior, check the unit, or leave out tests of another kind of specimen"
+                f" {'below' if value < low else 'above'} all that the prior can produce, {low:g} to"
+                f" {high:g} ({places}); widen the prior, check the unit, or leave out tests of"
+                " another kind of specimen"
             )
-    if problems:
-        raise InputError(problems)
+    return np.concatenate(masks), texts
 
 
 def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
-    """The box, wider by its width on each side where the posterior reaches its end."""
+    """Return the box, wider by its width on each side where the posterior reaches its end."""
     new_low, new_high = low.copy(), high.copy()
     for axis, width in enumerate(high - low):
         mass, centres = grid.marginal(axis), grid.centres(axis)
@@ -248,23 +241,18 @@ def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
 def _posterior(
     likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, meter: Meter
 ) -> Posterior:
-    model = likelihood.model
-    prior = model.prior
+    prior = likelihood.model.prior
     u = grid.draws(DRAWS, seed)
     meter.stage("Monte Carlo error")
-    errors = dict(
-        zip(prior.names, monte_carlo_errors(likelihood, u[::2]).tolist(), strict=True)
-    )
+    errors = monte_carlo_errors(likelihood, u[::2]).tolist()
     theta = prior.theta(u)
     posterior = Posterior(
-        names=prior.names,
+        peaks=peaks,
         draws={name: theta[:, i] for i, name in enumerate(prior.names)},
         information={name: grid.information(i) for i, name in enumerate(prior.names)},
         total_information=grid.gain,
         log_evidence=grid.log_evidence,
-        monte_carlo_error=errors,
-        method=model.method.label,
-        peaks=peaks,
+        monte_carlo_error=dict(zip(prior.names, errors, strict=True)),
         notes=_notes(likelihood, errors, u),
         likelihood=likelihood,
         u=u,
@@ -274,22 +262,22 @@ def _posterior(
     return posterior
 
 
-def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tuple[str, ...]:
-    """What limits the posterior; what is serious is a warning as well."""
+def _notes(likelihood: Likelihood, errors: Sequence[float], u: Array) -> tuple[str, ...]:
+    """Return what limits the posterior; what is serious is a warning as well."""
     model = likelihood.model
-    worst = max(errors, key=lambda name: errors[name])
-    serious: list[str | None] = [_piled_up(model, u)]
+    notes = _piled_up(model.prior, u)
     middle = model.prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(model.prior, middle, model.method)
-    if pilot := compare(experiment):
-        serious.append(doubt(pilot))
-    if errors[worst] > TOLERABLE:
+    pilot = compare(experiment)
+    if pilot and (text := doubt(pilot)):
+        notes.append(text)
+    if max(errors) > TOLERABLE:
+        worst = model.prior.names[np.argmax(errors)]
         samples = model.specimens[0].onsets.shape[1]
-        serious.append(
-            f"the mean of {worst} is uncertain by {errors[worst]:.0%} of its standard deviation"
+        notes.append(
+            f"the mean of {worst} is uncertain by {max(errors):.0%} of its standard deviation"
             f" because only {samples} samples were simulated at each point; give more samples"
         )
-    notes = [text for text in serious if text]
     for text in notes:
         warn_accuracy(text)
     if model.scaling.reason:
@@ -297,26 +285,26 @@ def _notes(likelihood: Likelihood, errors: Mapping[str, float], u: Array) -> tup
     return tuple(notes)
 
 
-def _piled_up(model: Model, u: Array) -> str:
-    """Where draws (draws, parameters) of the posterior pile up at an end of the prior, or nothing.
+def _piled_up(prior: Prior, u: Array) -> list[str]:
+    """Return where draws (draws, parameters) of the posterior pile up at an end of the prior.
 
     The box that was simulated needs no such look: it grew until it held the posterior.
     """
-    texts = []
-    for name, own, ends in zip(model.prior.names, u.T, model.prior.ends.T, strict=True):
-        for side, near, end in zip(
-            ("lower", "upper"), (own < EDGE, own > 1.0 - EDGE), ends, strict=True
-        ):
-            if near.mean() > PILED * EDGE:
-                texts.append(
-                    f"the {side} end of {name}, {end:g}, holds {near.mean():.0%} of it"
-                )
+    texts = [
+        f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of it"
+        for name, own, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
+        for side, near, end in (
+            ("lower", own < EDGE, ends[0]),
+            ("upper", own > 1.0 - EDGE, ends[1]),
+        )
+        if np.mean(near) > PILED * EDGE
+    ]
     if not texts:
-        return ""
-    return (
+        return []
+    return [
         f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within {EDGE:.0%} of"
         " the prior; where such an end is a guess, so is the result"
-    )
+    ]
 
 
 def _check_agreement(peaks: Peaks, predicted: Sequence[Array]) -> None:

@@ -20,7 +20,7 @@ from stiction.inference.onset_table import (
 )
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
-from stiction.progress import Meter
+from stiction.progress import SILENT, Meter
 from stiction.reliability.limit_state import LimitState, no_single_length
 
 BATCHES = 8
@@ -67,7 +67,7 @@ class Specimen(NamedTuple):
         return cls(onsets, local, bound, peaks, tabulate(peaks, bound))
 
     def without(self, batch: int) -> Densities:
-        """Densities from all samples but those of one batch."""
+        """Return the densities from all samples but those of one batch."""
 
         def kept(values: Array) -> Array:
             return values[:, np.arange(values.shape[1]) % BATCHES != batch]
@@ -110,48 +110,34 @@ class Model(NamedTuple):
         densities: Densities | None = None,
         floor: float = -np.inf,
     ) -> Array:
-        """Logarithm of the density of peaks of specimen `number` at points, (points, peaks)."""
+        """Return logarithms of the density of peaks of specimen `number`, (points, peaks)."""
         used = self.specimens[number].densities if densities is None else densities
         index, weight = corners(self.axes, theta)
         shift, stretch = map(np.ascontiguousarray, self.scaling.of(theta))
-        out = np.empty((theta.shape[0], peaks.size))
-        log_likelihoods(
-            index,
-            weight,
-            shift,
-            stretch,
-            self.error,
-            used,
-            np.ascontiguousarray(peaks),
-            floor,
-            out,
-        )
+        own, out = np.ascontiguousarray(peaks), np.empty((theta.shape[0], peaks.size))
+        log_likelihoods(index, weight, shift, stretch, self.error, used, own, floor, out)
         return out
 
     def reach(self, number: int) -> tuple[float, float, str]:
-        """Least and greatest peak of specimen `number` in the prior, and at which parameters."""
+        """Return the least and greatest peak of specimen `number`, and at which parameters."""
         own, keys = self.specimens[number], list(self.scaling.keys)
         spread = BEYOND * own.peaks.std(axis=1)
         lowest = np.maximum(own.peaks.min(axis=1) - spread, own.densities.bound)
         highest = own.peaks.max(axis=1) + spread
-        theta, least, most = [], [], []
-        for corner in itertools.product(
-            *self.prior.theta(np.stack([self.low, self.high])).T[keys]
-        ):
-            theta.append(nodes_of(self.axes, self.scaling.reference))
-            theta[-1][:, keys] = corner
-            shift, stretch = self.scaling.of(theta[-1])
-            least.append(shift + stretch * lowest - ERRORS * self.error)
-            most.append(shift + stretch * highest + ERRORS * self.error)
-        at = np.concatenate(theta)[[np.argmin(least), np.argmax(most)]]
-        ends = [
-            ", ".join(
-                f"{name} = {v:.6g}" for name, v in zip(self.prior.names, own, strict=True)
-            )
-            for own in at
+        nodes = nodes_of(self.axes, self.scaling.reference)
+        ends = self.prior.theta(np.stack([self.low, self.high])).T[keys]
+        points = np.concatenate([nodes] * 2 ** len(keys))
+        points[:, keys] = np.repeat(list(itertools.product(*ends)), len(nodes), axis=0)
+        shift, stretch = self.scaling.of(points)
+        least = shift + stretch * np.tile(lowest, 2 ** len(keys)) - ERRORS * self.error
+        most = shift + stretch * np.tile(highest, 2 ** len(keys)) + ERRORS * self.error
+        names = self.prior.names
+        texts = [
+            ", ".join(f"{name} = {v:.6g}" for name, v in zip(names, point, strict=True))
+            for point in points[[least.argmin(), most.argmax()]]
         ]
-        text = f"the lowest come from {ends[0]}, the highest come from {ends[1]}"
-        return float(np.min(least)), float(np.max(most)), text
+        text = f"the lowest come from {texts[0]}, the highest come from {texts[1]}"
+        return float(least.min()), float(most.max()), text
 
 
 def make_model(
@@ -163,25 +149,15 @@ def make_model(
     samples: int | None,
     seed: int,
     variable: str,
-    meter: Meter,
+    meter: Meter = SILENT,
     low: Array | None = None,
     high: Array | None = None,
 ) -> Model:
     """Simulate what the likelihood needs.
 
-    Parameters
-    ----------
-    prior : Prior
-    method : Method
-    lengths : sequence
-        Of the specimens, m; None for the problem's own.
-    error : float
-    samples : int, optional
-    seed : int
-    variable : {"critical_stress", "friction_coefficient"}
-    meter : Meter
-    low, high : (parameters,) arrays, optional
-        Corners (as u) of the part of the prior that matters; all of it if left out.
+    `lengths` are those of the specimens, m, None for the problem's own; `variable` is what peaks
+    are among the results of the method, with the standard `error` of the load cell. `low` and
+    `high` are corners, as u, of the part of the prior that matters; all of it if left out.
     """
     low = np.zeros(prior.dimension) if low is None else low
     high = np.ones(prior.dimension) if high is None else high
@@ -189,10 +165,9 @@ def make_model(
     axes = make_axes(prior, scaling, low, high)
     thetas = nodes_of(axes, scaling.reference)
     count = SAMPLES.get(method.type, FEW) if samples is None else samples
-    helped = (
-        method.type != "local_criterion" and no_single_length(*prior.at(prior.middle)) is None
-    )
-    more = max(count, SAMPLES["local_criterion"]) if helped else 0
+    more = 0
+    if method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle)):
+        more = max(count, SAMPLES["local_criterion"])
     meter.stage("simulated onsets", len(thetas) * len(lengths) * (count + more))
     specimens = []
     for number, length in enumerate(lengths):
@@ -202,7 +177,7 @@ def make_model(
         options: Any = {"seed": seed, "variable": variable, "meter": meter}
         options["first"] = number * SPECIMEN
         onsets, local = simulate(experiments, samples=count, **options), None
-        if helped:
+        if more:
             others = [own.by(LocalCriterion()) for own in experiments]
             local = simulate(others, samples=more, **options)
             # What `moved` saves outweighs what it adds from a correlation of 0.63 on.
@@ -215,7 +190,7 @@ def make_model(
 
 
 def least_peak(experiment: Experiment, variable: str) -> float:
-    """Least possible peak; -inf where none is known."""
+    """Return the least possible peak; -inf where none is known."""
     bound = LimitState(experiment).bounds[0]
     if variable != "friction_coefficient":
         return bound
@@ -224,7 +199,7 @@ def least_peak(experiment: Experiment, variable: str) -> float:
 
 
 def moved(few: Array, many: Array) -> Array:
-    """Many onsets by the local criterion, (points, many), moved to where a few by the method are.
+    """Move many onsets by the local criterion, (points, many), to where a few by the method are.
 
     The same samples by both methods differ little, and so do their quantiles: the difference of
     the quantiles of the few is added to the many.
@@ -243,7 +218,7 @@ class Likelihood(NamedTuple):
     peaks: tuple[Array, ...]
 
     def each(self, u: Array, floor: float = -np.inf) -> Array:
-        """Logarithm of the likelihood of each test at points u (points, parameters)."""
+        """Return the logarithm of the likelihood of each test at points u (points, parameters)."""
         theta = self.model.prior.theta(u)
         found = [
             self.model.log_densities(number, theta, peaks, floor=floor)
@@ -252,7 +227,7 @@ class Likelihood(NamedTuple):
         return np.concatenate(found, axis=1)
 
     def __call__(self, u: Array, floor: float = -np.inf) -> Array:
-        """Logarithm of the likelihood at points u (points, parameters).
+        """Return the logarithm of the likelihood at points u (points, parameters).
 
         -inf outside the box that was simulated, and, for speed, where it is below `floor`.
         """
@@ -265,7 +240,7 @@ class Likelihood(NamedTuple):
         return result
 
     def without(self, u: Array, batch: int) -> Array:
-        """The same from all simulated samples but those of one batch."""
+        """Return the same from all simulated samples but those of one batch."""
         theta = self.model.prior.theta(u)
         result = np.zeros(u.shape[0])
         for number, peaks in enumerate(self.peaks):

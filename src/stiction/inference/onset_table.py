@@ -16,7 +16,7 @@ from stiction.errors import InputError
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling
 from stiction.interface import Interface
-from stiction.progress import Meter
+from stiction.progress import SILENT, Meter
 from stiction.random.synthesis import BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
@@ -51,13 +51,7 @@ class Axis(NamedTuple):
 
 
 def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[Axis, ...]:
-    """Place the nodes of the parameters that need simulation between two corners, as u.
-
-    Raises
-    ------
-    InputError
-        If there are too many such parameters.
-    """
+    """Place the nodes of the parameters that need simulation between two corners, as u."""
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in NODES:
         names = ", ".join(prior.names[i] for i in simulated)
@@ -65,14 +59,12 @@ def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[
             f"prior: {len(simulated)} parameters would have to be simulated on a grid, {names}; at"
             f" most {max(NODES)} are possible: give the best known a value"
         )
-    ends = prior.theta(np.array([low, high]))
     axes = []
-    for i in simulated:
-        first, last = ends[:, i]
+    for i, (first, last) in enumerate(prior.theta(np.array([low, high])).T):
         log = bool(first > 0.0 and last >= LOG * first)
         space = np.geomspace if log else np.linspace
         axes.append(Axis(i, space(first, last, NODES[len(simulated)]), log))
-    return tuple(axes)
+    return tuple(axes[i] for i in simulated)
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
@@ -99,35 +91,26 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
     return index, weight
 
 
-def _with_length(problem: Any, length: float) -> Any:
-    """The problem of a specimen of another length, m, with the same distance of nodes."""
-    own = problem.interface
-    if own.is_plane:
-        raise InputError("peaks: lengths of specimens are of lines; the interface is a plane")
-    if np.isclose(length, own.extent, rtol=1e-9):
-        return problem
-    nodes = 2 * max(4, round(0.5 * length / own.spacing))
-    return replace(problem, interface=Interface(length, nodes))
-
-
 def experiments_at(
     prior: Prior, thetas: Array, method: Any, length: float | None = None
 ) -> list[Experiment]:
-    """The experiments at points (points, parameters), on specimens of a length, m.
+    """Return the experiments at points (points, parameters), on specimens of a length, m.
 
-    Raises
-    ------
-    InputError
-        If the method cannot take one of them, with its parameters.
+    The distance of nodes is that of the problem.
     """
     found = []
     for theta in thetas:
         problem, random = prior.at(theta)
-        try:
-            problem = problem if length is None else _with_length(problem, length)
+        own = problem.interface
+        with prior.named(theta):
+            if length is not None and own.is_plane:
+                raise InputError(
+                    "peaks: lengths of specimens are of lines; the interface is a plane"
+                )
+            if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
+                nodes = 2 * max(4, round(0.5 * length / own.spacing))
+                problem = replace(problem, interface=Interface(length, nodes))
             found.append(Experiment(problem, random, method))
-        except InputError as error:
-            raise prior.named(error, theta) from None
     return found
 
 
@@ -138,9 +121,9 @@ def simulate(
     first: int,
     seed: int,
     variable: str,
-    meter: Meter,
+    meter: Meter = SILENT,
 ) -> Array:
-    """Onsets of samples first, ... of some experiments, (experiments, samples).
+    """Return onsets of samples first, ... of some experiments, (experiments, samples).
 
     Sample i has the same draws in each of them.
     """

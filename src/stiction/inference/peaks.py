@@ -1,9 +1,8 @@
 """Measured peaks: validated, in SI units, one array for each kind of specimen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, prefixed
 from stiction.model import FilePath, Numbers, check, describe, is_finite
 from stiction.tables import read_table
-from stiction.units import factor_to
+from stiction.units import factor_to, is_in
 
 FEWEST = 3
 """Peaks in all; of two numbers, one may be a mistake."""
@@ -19,8 +18,7 @@ PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH = ("length", "specimen")
 
 
-@dataclass(frozen=True, eq=False)
-class Peaks:
+class Peaks(NamedTuple):
     """Peaks of repeated tests, by the length of the specimens.
 
     Attributes
@@ -36,11 +34,6 @@ class Peaks:
     lengths: tuple[float | None, ...]
     values: tuple[Array, ...]
     coefficients: bool
-
-    @property
-    def count(self) -> int:
-        """Number of peaks in all."""
-        return sum(values.size for values in self.values)
 
     @property
     def variable(self) -> str:
@@ -65,7 +58,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     """
     if isinstance(peaks, Peaks):
         return peaks
-    factor, coefficients = _unit(unit)
+    factor = _factor(unit)
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
@@ -90,29 +83,22 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             " st.design_of_tests"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
-    return Peaks(lengths, tuple(values), coefficients)
+    return Peaks(lengths, tuple(values), is_in(unit, "1"))
 
 
-def _unit(unit: Any) -> tuple[float, bool]:
-    """Factor to SI, and whether the unit is that of a pure number."""
+def _factor(unit: str) -> float:
+    """Return the factor from a unit of stress, or of a pure number, to SI."""
     try:
-        return factor_to("1", unit), True
-    except InputError:
-        pass
-    try:
-        return factor_to("Pa", unit), False
+        return factor_to("1" if is_in(unit, "1") else "Pa", unit)
     except InputError as error:
         raise InputError(
-            [
-                f"unit: {text}; divide a force by the area of the interface, or by the normal force"
-                " for a coefficient of friction (unit = '1')"
-                for text in error.problems
-            ]
+            f"unit: {error}; divide a force by the area of the interface, or by the normal force"
+            " for a coefficient of friction (unit = '1')"
         ) from None
 
 
 def _values(name: str, given: Any, unit: str) -> Array:
-    """Peaks of one kind of specimen, in `unit`."""
+    """Return the peaks of one kind of specimen, in `unit`."""
     ragged = isinstance(given, list | tuple) and any(np.ndim(one) for one in given)
     values = (
         np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
@@ -128,13 +114,10 @@ def _values(name: str, given: Any, unit: str) -> Array:
             f"{name}: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
             " tests that gave no peak"
         )
-    stated = getattr(given, "attrs", {}).get("units")
-    if stated is None:
-        return values
-    (own, coefficients), (asked, expected) = _unit(str(stated)), _unit(unit)
-    if coefficients != expected:
+    stated = str(getattr(given, "attrs", {}).get("units", unit))
+    if is_in(stated, "1") != is_in(unit, "1"):
         raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
-    return values * (own / asked)
+    return values * (_factor(stated) / _factor(unit))
 
 
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
@@ -207,7 +190,7 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
 
 
 def _column(names: Sequence[str], kinds: tuple[str, ...]) -> str | None:
-    """The one column whose name begins with one of some words."""
+    """Return the one column whose name begins with one of some words."""
     words = [(name, name.lower().split()) for name in names]
     found = [name for name, word in words if word and word[0].strip("_:.") in kinds]
     if len(found) > 1:

@@ -13,12 +13,13 @@ from stiction.inference.density import to_v
 from stiction.inference.likelihood import BATCHES, Likelihood, Model
 from stiction.inference.onset_table import corners
 from stiction.inference.peaks import Peaks
+from stiction.inference.prior import Prior
 from stiction.model import Numbers, check, describe
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Posterior:
     """Posterior of the parameters, together with their prior.
 
@@ -46,21 +47,30 @@ class Posterior:
         What limits the result.
     """
 
-    names: tuple[str, ...]
+    peaks: Peaks
     draws: Mapping[str, Array]
     information: Mapping[str, float]
     total_information: float
     log_evidence: float
     monte_carlo_error: Mapping[str, float]
-    method: str
-    peaks: Peaks
     notes: tuple[str, ...]
     likelihood: Likelihood = field(repr=False)
     u: Array = field(repr=False)
     seed: int = 0
 
     @property
-    def _prior(self) -> Any:
+    def names(self) -> tuple[str, ...]:
+        """The keys of the prior."""
+        return tuple(self.draws)
+
+    @property
+    def method(self) -> str:
+        """By what the onset was found."""
+        return str(self.likelihood.model.method.label)
+
+    @property
+    def prior(self) -> Prior:
+        """The prior: `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
         return self.likelihood.model.prior
 
     def mean(self, name: str) -> float:
@@ -86,9 +96,7 @@ class Posterior:
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and what is random at one draw, to compute with."""
-        theta = np.array([self.draws[name][draw] for name in self.names])
-        found: tuple[Problem, RandomInterface] = self._prior.at(theta)
-        return found
+        return self.prior.at(np.array([own[draw] for own in self.draws.values()]))
 
     def prior_transform(self, u: Any) -> Array:
         """Return the parameters at points u of the unit cube, in which the prior is uniform.
@@ -98,8 +106,7 @@ class Posterior:
         u : (parameters,) or (points, parameters) array
         """
         given = self._points("u", u)
-        found: Array = self._prior.theta(np.atleast_2d(given)).reshape(given.shape)
-        return found
+        return self.prior.theta(np.atleast_2d(given)).reshape(given.shape)
 
     def log_likelihood(self, theta: Any) -> Array | float:
         """Return the logarithm of the likelihood of all peaks.
@@ -115,7 +122,7 @@ class Posterior:
             -inf outside the prior.
         """
         given = self._points("theta", theta)
-        found = self.likelihood(self._prior.u(np.atleast_2d(given)))
+        found = self.likelihood(self.prior.u(np.atleast_2d(given)))
         return float(found[0]) if given.ndim == 1 else found
 
     def _points(self, name: str, given: Any) -> Array:
@@ -149,26 +156,25 @@ class Posterior:
             raise InputError(
                 "to_arviz: needs the package arviz; pip install 'stiction[inference]'"
             ) from None
-        before = self._prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
-        more = [
-            np.repeat(one[:, None], own.size, axis=1)
-            for one, own in zip(self.predicted, self.peaks.values, strict=True)
-        ]
+        before = self.prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
+        measured = np.concatenate(self.peaks.values)
+        sizes = [own.size for own in self.peaks.values]
+        predicted = np.repeat(np.stack(self.predicted, axis=1), sizes, axis=1)
         name = "friction_coefficient" if self.peaks.coefficients else "peak"
         return arviz.from_dict(
             posterior={key: own[None] for key, own in self.draws.items()},
             prior={key: before[None, :, i] for i, key in enumerate(self.names)},
             log_likelihood={name: self.likelihood.each(self.u)[None]},
-            posterior_predictive={name: np.concatenate(more, axis=1)[None]},
-            observed_data={name: np.concatenate(self.peaks.values)},
-            coords={"test": np.arange(self.peaks.count)},
+            posterior_predictive={name: predicted[None]},
+            observed_data={name: measured},
+            coords={"test": np.arange(measured.size)},
             dims={name: ["test"]},
         )
 
     def __str__(self) -> str:
         width = max(map(len, self.names))
         lines = [f"{self.peaks}; onset by {self.method}"]
-        prior = self._prior.theta(np.repeat([[0.05], [0.95]], len(self.names), axis=1)).T
+        prior = self.prior.theta(np.repeat([[0.05], [0.95]], len(self.names), axis=1)).T
         for name, before in zip(self.names, prior, strict=True):
             low, high = self.interval(name)
             lines.append(
@@ -180,7 +186,7 @@ class Posterior:
 
 
 def predicted(model: Model, number: int, u: Array, seed: int) -> Array:
-    """A peak of specimen `number` at each of some points u (points, parameters)."""
+    """Draw a peak of specimen `number` at each of some points u (points, parameters)."""
     rng = np.random.default_rng([seed, 1])
     theta = model.prior.theta(u)
     shift, stretch = model.scaling.of(theta)
@@ -204,7 +210,7 @@ def predicted(model: Model, number: int, u: Array, seed: int) -> Array:
 
 
 def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
-    """Standard error of the posterior means over their standard deviations, (parameters,).
+    """Return standard errors of the posterior means over their standard deviations, (parameters,).
 
     Jackknife over batches of the simulated samples: the posterior without each is the one at hand,
     weighted.

@@ -1,7 +1,8 @@
 """The prior: which parameters are not known, and what is thought of each before the tests."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,7 +11,7 @@ import scipy.stats
 
 from stiction.arrays import Array
 from stiction.ensemble.dotted_keys import with_values
-from stiction.errors import InputError
+from stiction.errors import InputError, prefixed
 from stiction.model import describe, is_finite
 from stiction.problem import Problem
 from stiction.random.random_field import RandomField
@@ -25,16 +26,9 @@ MOST = 8
 class Prior:
     """Independent priors of some parameters of a problem and of what is random on it.
 
-    Points are known by `u`, numbers in [0, 1], one for each parameter: the prior is uniform in
-    them. All functions here take (points, parameters) arrays.
-
-    Attributes
-    ----------
-    problem : Problem
-    random : RandomInterface
-        With values for all that is known; those of unknown parameters are replaced.
-    distributions : dict
-        Frozen `scipy.stats` distributions by the keys that the user gave.
+    Frozen `scipy.stats` distributions by the keys that the user gave. Points are given by `u`, one
+    number in [0, 1] for each parameter: the prior is uniform in them. Arrays have shape (points,
+    parameters). The values that `problem` and `random` hold for these parameters are replaced.
     """
 
     problem: Problem
@@ -43,7 +37,7 @@ class Prior:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The keys, in order."""
+        """Keys of the parameters, in order."""
         return tuple(self.distributions)
 
     @property
@@ -53,7 +47,7 @@ class Prior:
 
     @property
     def middle(self) -> Array:
-        """The medians, (parameters,)."""
+        """Medians, (parameters,)."""
         return self.theta(np.full((1, self.dimension), 0.5))[0]
 
     @property
@@ -62,7 +56,7 @@ class Prior:
         return self.theta(np.repeat([[0.0], [1.0]], self.dimension, axis=1))
 
     def theta(self, u: Array) -> Array:
-        """Parameters at `u`, by the inverse distribution functions."""
+        """Return the parameters at `u`, by the inverse distribution functions."""
         result = np.empty_like(u)
         for i, distribution in enumerate(self.distributions.values()):
             low, high = _tails(distribution)
@@ -70,7 +64,7 @@ class Prior:
         return result
 
     def u(self, theta: Array) -> Array:
-        """The inverse of `theta`; outside [0, 1] is outside the prior."""
+        """Return the inverse of `theta`; outside [0, 1] is outside the prior."""
         result = np.empty_like(theta)
         for i, distribution in enumerate(self.distributions.values()):
             low, high = _tails(distribution)
@@ -79,36 +73,31 @@ class Prior:
         return np.where((theta < low) | (theta > high), -1.0, result)
 
     def at(self, theta: Array) -> tuple[Problem, RandomInterface]:
-        """The problem and what is random at one point (parameters,).
-
-        Raises
-        ------
-        InputError
-            If there is none with these parameters; the message says at which.
-        """
-        try:
+        """Return the problem and what is random at one point (parameters,)."""
+        with self.named(theta):
             return with_parameters(self.problem, self.random, self.names, theta)
-        except InputError as error:
-            raise self.named(error, theta) from None
 
-    def named(self, error: InputError, theta: Array) -> InputError:
-        """The same error, with the point (parameters,) at which it occurred."""
+    @contextmanager
+    def named(self, theta: Array) -> Iterator[None]:
+        """Let mistakes that are found meanwhile begin with the point (parameters,)."""
         pairs = zip(self.names, theta, strict=True)
-        text = ", ".join(f"{name} = {value:.4g}" for name, value in pairs)
-        return InputError([f"prior: at {text}: {problem}" for problem in error.problems])
+        with prefixed("prior: at " + ", ".join(f"{name} = {v:.4g}" for name, v in pairs)):
+            yield
 
 
 def with_parameters(
     problem: Problem, random: RandomInterface, names: Sequence[str], values: Array
 ) -> tuple[Problem, RandomInterface]:
-    """The problem and what is random with some parameters replaced, by the keys of a prior."""
-    parts: dict[str, Any] = {"problem": problem, "random": random}
+    """Return both with some parameters replaced, by the keys of a prior."""
     replaced: dict[str, dict[str, float]] = {"problem": {}, "random": {}}
     for name, value in zip(names, values, strict=True):
         part, _, key = full_key(name).partition(".")
         replaced[part][key] = float(value)
-    found = (with_values(parts[p], own) if own else parts[p] for p, own in replaced.items())
-    return tuple(found)
+    own, others = replaced["problem"], replaced["random"]
+    return (
+        with_values(problem, own) if own else problem,
+        with_values(random, others) if others else random,
+    )
 
 
 def _tails(distribution: Any) -> tuple[float, float]:
@@ -117,7 +106,7 @@ def _tails(distribution: Any) -> tuple[float, float]:
 
 
 def full_key(key: str) -> str:
-    """A key as in a sweep: those of the strength may be given without where they stand."""
+    """Return a key as in a sweep: those of the strength may be given without where they stand."""
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key
@@ -129,7 +118,7 @@ def full_key(key: str) -> str:
 
 
 def distribution_of(key: str, value: Any) -> Any:
-    """A frozen distribution from one, from two ends, or from a table {low, high, spacing}."""
+    """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}."""
     if isinstance(getattr(value, "dist", None), scipy.stats.rv_continuous):
         return value
     table: dict[str, Any] = {"spacing": "linear"}
@@ -138,10 +127,9 @@ def distribution_of(key: str, value: Any) -> Any:
     elif isinstance(value, list | tuple) and len(value) == 2:
         table |= {"low": value[0], "high": value[1]}
     low, high, spacing = (table.get(name, np.nan) for name in ("low", "high", "spacing"))
-    known = (
-        len(table) == 3 and spacing in ("linear", "log") and is_finite(low) and is_finite(high)
-    )
-    if not known or not low < high or (spacing == "log" and low <= 0.0):
+    known = len(table) == 3 and spacing in ("linear", "log")
+    known = known and is_finite(low) and is_finite(high) and low < high
+    if not known or (spacing == "log" and low <= 0.0):
         raise InputError(
             f"prior: {key}: must be a frozen continuous scipy.stats distribution such as"
             " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
@@ -154,7 +142,7 @@ def distribution_of(key: str, value: Any) -> Any:
 
 
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
-    """The prior of these arguments, or one `InputError` with all that is wrong with them."""
+    """Return the prior of these arguments, or raise one `InputError` with all that is wrong."""
     if not isinstance(given, Mapping) or not 0 < len(given) <= MOST:
         raise InputError(
             f"prior: must map 1 to {MOST} parameters to distributions or ranges, such as"

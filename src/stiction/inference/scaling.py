@@ -93,23 +93,19 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
         return _none(middle, f"the parameters of the marginal shift it, and {why}")
     stretches /= scale
     shifts -= location * stretches
-    return Scaling(keys, middle, _unit(problem, field, variable) * shifts, stretches)
+    pressure = problem.load.normal_pressure
+    mean = 1.0 if pressure is None else float(np.mean(pressure))
+    factor = 1.0 if field.of is None else mean
+    factor = factor / mean if variable == "friction_coefficient" else factor
+    return Scaling(keys, middle, factor * shifts, stretches)
 
 
 def _none(middle: Array, reason: str) -> Scaling:
     return Scaling((), middle, np.zeros(1), np.ones(1), reason)
 
 
-def _unit(problem: Any, field: Any, variable: str) -> float:
-    """Peaks in their unit over strength in the unit of its field."""
-    pressure = problem.load.normal_pressure
-    mean = 1.0 if pressure is None else float(np.mean(pressure))
-    factor = 1.0 if field.of is None else mean
-    return factor / mean if variable == "friction_coefficient" else factor
-
-
 def _no_scaling(prior: Prior, problem: Any, random: Any, method: Any) -> str:
-    """Why no parameter scales the onset, or nothing."""
+    """Return why no parameter scales the onset, or nothing."""
     friction, load = problem.friction, problem.load
     if method.type not in ("local_criterion", "equilibrium"):
         return f"the onset by {method.label} does not scale with the strength"

@@ -8,6 +8,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
+from stiction.inference.onset_table import simulate
 from stiction.inference.prior import with_parameters
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
@@ -73,35 +74,30 @@ def simulator(
     """
     interface = as_random_interface(random)
 
-    def simulate(theta: Any, *, first: int = 0) -> Array:
+    def simulated(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
         first = check("first", first, at_least(0))
-        changed = with_parameters(problem, interface, parameters, _values(theta, parameters))
-        experiment = Experiment(*changed, method)
-        peaks: Array = np.concatenate(
-            [
-                experiment.results(seed, start, count)["critical_stress"]
-                for start, count in experiment.batches(
-                    first, samples, max(256, experiment.batch)
+        if isinstance(theta, Mapping):
+            if set(theta) != set(parameters):
+                given = describe(list(theta))
+                raise InputError(
+                    f"theta: must have the keys {', '.join(parameters)}, got {given}"
                 )
-            ]
+            theta = [theta[name] for name in parameters]
+        values = check("theta", theta, Numbers)
+        if values.shape != (len(parameters),) or not np.isfinite(values).all():
+            raise InputError(
+                f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
+                f" {describe(theta)}"
+            )
+        experiment = Experiment(
+            *with_parameters(problem, interface, parameters, values), method
+        )
+        (peaks,) = simulate(
+            [experiment], samples=samples, first=first, seed=seed, variable="critical_stress"
         )
         errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)
-        return peaks + load_cell_error * errors
+        found: Array = peaks + load_cell_error * errors
+        return found
 
-    return simulate
-
-
-def _values(theta: Any, names: tuple[str, ...]) -> Array:
-    """Parameters in the order of their names."""
-    if isinstance(theta, Mapping):
-        if set(theta) != set(names):
-            given = describe(list(theta))
-            raise InputError(f"theta: must have the keys {', '.join(names)}, got {given}")
-        theta = [theta[name] for name in names]
-    values = check("theta", theta, Numbers)
-    if values.shape != (len(names),) or not np.isfinite(values).all():
-        raise InputError(
-            f"theta: must be {len(names)} finite numbers, {', '.join(names)}, got {describe(theta)}"
-        )
-    return values
+    return simulated

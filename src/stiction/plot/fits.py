@@ -183,8 +183,7 @@ def posterior(found: Posterior) -> Figure:
     names = found.names
     count = len(names)
     size = max(2.0 * count, 4.0)
-    prior = found.likelihood.model.prior
-    drawn = prior.theta(np.random.default_rng(0).random((20_000, prior.dimension)))
+    drawn = found.prior.theta(np.random.default_rng(0).random((20_000, count)))
     before, after, labels = [], [], []
     for values, name in zip(drawn.T, names, strict=True):
         factor, unit = _unit_of(name, values)
