@@ -8,8 +8,6 @@ which means something on any machine. Times are processor times of one core. To 
 of the package, run the same case with each of them on PYTHONPATH, one after the other.
 """
 
-from __future__ import annotations
-
 import os
 import statistics
 import subprocess

@@ -9,8 +9,6 @@ of 3 km in its middle, which breaks at once. When does the rupture arrive where?
     python examples/community_benchmark.py --convergence      200, 150 and 100 m beside each other
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import NamedTuple

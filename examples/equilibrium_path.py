@@ -6,8 +6,6 @@ share that each node has in the critical load.
 Run: python examples/equilibrium_path.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -5,8 +5,6 @@ error of 20 kPa, and its failure probability computed given the scan.
 Run: python examples/inspection.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Computes everything of docs/line-and-plane.md and draws its figures:
 Runs are stored in the folder RUNS, figures go to --figures (docs/images).
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 from collections import defaultdict

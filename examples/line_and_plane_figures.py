@@ -1,7 +1,5 @@
 """The figures of docs/line-and-plane.md; `line_and_plane.py` computes what they show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Run it with ``python examples/pictures.py [folder]``; it takes about half a minute.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ negative, and steady once everything rests.
 Run: python validation/energy.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -8,8 +8,6 @@ in 100; of 100 records the count itself scatters by 3.
         [--out FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

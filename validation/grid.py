@@ -5,8 +5,6 @@ mean stress has fallen by 5 % of the mean of tau_p - tau_r after its peak, and c
 Run: python validation/grid.py
 """
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

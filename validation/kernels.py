@@ -4,8 +4,6 @@ Prints the pairs needed at each tolerance and Poisson's ratio, and draws kernel 
 Run: python validation/kernels.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -5,8 +5,6 @@ history, and with a history cut off at |k| c_s t = 100, as tables of the kernel 
 Run: python validation/memory.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -5,8 +5,6 @@ vanishes with it.
 Run: python validation/onset.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 import warnings
 from pathlib import Path

@@ -6,8 +6,6 @@ Andrews 1976: in an unbounded medium below S of about 1.77).
 Run: python validation/rupture_speed.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Slip a_0 cos(kx), held in equilibrium and let go: a = a_0 (1 - D0/D)/s in Laplac
 Run: python validation/waves.py [folder for the figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
