@@ -427,7 +427,7 @@ def onset(
 
     from stiction.methods import methods
     from stiction.methods import onset as find
-    from stiction.study.export import columns
+    from stiction.study.export import table_of
     from stiction.study.study import read_setup
 
     setup = read_setup(study)
@@ -445,7 +445,7 @@ def onset(
             given = own is not None and own.type == name
             one = own if given else methods()[name](**options)
             with Meter(f"onset by {name}"):
-                found = columns(find(problem, profile, method=one))
+                found = table_of(find(problem, profile, method=one))
             rows[name] = {key: v[0] for key, v in found.items() if key.startswith(ONSET)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
             refused.append(f"{name} does not apply: {error}")

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.study.export import SUFFIXES, columns, export
+from stiction.study.export import SUFFIXES, export, table_of
 
 
 @pytest.fixture(scope="module")
@@ -74,5 +74,5 @@ def test_missing_samples_are_nan_and_nothing_is_left_half_written(tmp_path):
     export(result, tmp_path / "out.csv")
     text = (tmp_path / "out.csv").read_text().splitlines()
     assert text == ["sample (1),critical_stress (Pa)", "0,1.5", "1,nan"]
-    assert list(columns(result)) == ["sample (1)", "critical_stress (Pa)"]
+    assert list(table_of(result)) == ["sample (1)", "critical_stress (Pa)"]
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]

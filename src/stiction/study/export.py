@@ -5,12 +5,9 @@ import os
 import shutil
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from stiction.errors import InputError, warn_accuracy
 from stiction.files import cannot, write_whole
@@ -49,7 +46,7 @@ def export(result: xr.Dataset, path: Path) -> None:
     if path.suffix == ".nc":
         write_result(result, path)
         return
-    frame = pd.DataFrame(columns(result))
+    frame = table_of(result)
     # Numbers are written as the shortest text that reads back to the same bits.
     write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
 
@@ -71,37 +68,27 @@ def write_result(result: xr.Dataset, path: Path) -> None:
     )
 
 
-def columns(result: xr.Dataset) -> dict[str, NDArray[Any]]:
+def table_of(result: xr.Dataset) -> pd.DataFrame:
     """Return one column a variable, one row a sample at each point of the sweep.
 
-    Parameters
-    ----------
-    result : Dataset
-
-    Returns
-    -------
-    dict of (rows,) arrays
-        By ``name (unit)``: what is swept, the sample number, what was found.
+    Columns are named ``name (unit)``: what is swept, the sample number, what was found.
     """
-    named = {str(name): variable for name, variable in result.data_vars.items()}
-    narrow = {name: v for name, v in named.items() if not {"x", "y"} & set(v.dims)}
-    wide = sorted(named.keys() - narrow.keys())
+    wide = sorted(str(n) for n, v in result.data_vars.items() if {"x", "y"} & set(v.dims))
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: profiles along the interface do not fit into a table of samples"
             " and are left out; .nc holds them"
         )
-    for name, v in list(narrow.items()):
-        if DIRECTION in v.dims:  # a column for each component
-            del narrow[name]
-            narrow |= {f"{name}_{c.item()}": v.sel({DIRECTION: c}) for c in v[DIRECTION]}
-    dims = tuple(dict.fromkeys(dim for v in narrow.values() for dim in v.dims))
-    sizes = {dim: result.sizes[dim] for dim in dims}
-    along = {
-        str(name): v.variable for name, v in result.coords.items() if set(v.dims) <= set(dims)
-    }
-    table = {}
-    for name, variable in (*along.items(), *((n, v.variable) for n, v in narrow.items())):
-        full = variable.set_dims(sizes).transpose(*dims)
-        table[f"{name} ({variable.attrs.get('units', '1')})"] = np.asarray(full.values).ravel()
-    return table
+    narrow = result.drop_vars(wide)
+    for name, values in narrow.data_vars.items():
+        if DIRECTION in values.dims:  # a column for each component
+            parts = {
+                f"{name}_{c.item()}": values.sel({DIRECTION: c}) for c in values[DIRECTION]
+            }
+            narrow = narrow.drop_vars([name]).assign(parts)
+    narrow = narrow.drop_dims(["x", "y", DIRECTION], errors="ignore")
+    dims = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
+    names = dict.fromkeys([*narrow.coords, *dims, *narrow.data_vars])
+    units = {name: narrow[name].attrs.get("units", "1") for name in names}
+    frame = narrow.to_dataframe(dim_order=dims).reset_index()[list(names)]
+    return frame.rename(columns={name: f"{name} ({unit})" for name, unit in units.items()})

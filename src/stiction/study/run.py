@@ -1,6 +1,5 @@
 """Runs on disk: parts of a study for several jobs, and what is stored read back."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,17 +22,17 @@ FEWEST_BLOCKS = 8
 
 
 class Part(NamedTuple):
-    """Part `number` (from 1) of `of`: the samples that one of several jobs computes.
-
-    Blocks of consecutive samples are dealt out in turn, through all points of a sweep, so that
-    parts are alike even where points are not.
-    """
+    """Part `number` (from 1) of `of`: the samples that one of several jobs computes."""
 
     number: int
     of: int
 
     def mask(self, points: int, samples: int) -> NDArray[np.bool_]:
-        """Return which samples it has, (points, samples)."""
+        """Return which samples it has, (points, samples).
+
+        Blocks of consecutive samples are dealt out in turn, through all points of a sweep, so that
+        parts are alike even where points are not.
+        """
         total = points * samples
         block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * self.of)))
         mine: NDArray[np.bool_] = np.arange(total) // block % self.of == self.number - 1
@@ -43,19 +42,16 @@ class Part(NamedTuple):
 def as_part(value: Any) -> Part:
     """Return a part from a pair of numbers or a text such as '3/100'."""
     pair: Any = value
-    if isinstance(value, str) and re.fullmatch(r"\d{1,9}/\d{1,9}", value):
-        pair = tuple(int(number) for number in value.split("/"))
-    if not (
-        isinstance(pair, tuple | list)
-        and len(pair) == 2
-        and all(is_whole(number, 1) for number in pair)
-        and pair[0] <= pair[1]
-    ):
-        raise InputError(
-            "part: must be which part of how many, such as 3/100 (in Python also (3, 100)), from"
-            f" 1/100 to 100/100; got {describe(value)}"
-        )
-    return Part(int(pair[0]), int(pair[1]))
+    if isinstance(value, str):
+        pair = [int(text) if text.isdecimal() else text for text in value.split("/")]
+    if isinstance(pair, tuple | list) and len(pair) == 2 and all(is_whole(n, 1) for n in pair):
+        part = Part(*map(int, pair))
+        if part.number <= part.of:
+            return part
+    raise InputError(
+        "part: must be which part of how many, such as 3/100 (in Python also (3, 100)), from"
+        f" 1/100 to 100/100; got {describe(value)}"
+    )
 
 
 @dataclass(frozen=True)
@@ -112,10 +108,6 @@ class StoredRun:
         each = f"{points} points of " if points > 1 else ""
         return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
 
-    def _rows(self, only: Sequence[str] | None) -> Gathered:
-        ensemble = self.study.ensemble
-        return Gathered(self.study.experiments, ensemble.samples, ensemble.first, only)
-
     def status(self) -> Status:
         """Return how far it is, after a comparison of everything with its digests.
 
@@ -124,23 +116,17 @@ class StoredRun:
         StoreError
             If something is there and cannot be read.
         """
-        rows, count, size, seconds = self._rows(()), 0, 0, 0.0
-        versions: dict[str, None] = {}
-        for chunk in self._store.chunks():
-            rows.add([chunk.table])
-            count, size = count + 1, size + chunk.bytes
-            seconds += chunk.table.seconds
-            versions[chunk.versions] = None
+        rows, chunks = self._read(only=())
         return Status(
             samples=rows.done.size,
             done=int(rows.done.sum()),
             done_by_point=rows.done.sum(axis=1),
             failures=tuple(rows.failed),
             damaged=tuple(f"{name}: {text}" for name, text in self._store.damage.items()),
-            chunks=count,
-            bytes=size,
-            seconds=seconds,
-            versions=tuple(versions),
+            chunks=len(chunks),
+            bytes=sum(size for size, _, _ in chunks),
+            seconds=sum(seconds for _, seconds, _ in chunks),
+            versions=tuple(dict.fromkeys(versions for _, _, versions in chunks)),
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
@@ -156,14 +142,24 @@ class StoredRun:
         UserWarning
             If something is damaged.
         """
-        rows = self._rows(only)
-        for chunk in self._store.chunks():
-            rows.add([chunk.table])
+        rows, _ = self._read(only)
         for name, text in self._store.damage.items():
             text = f"{self.path}: {name}: {text}; its samples are missing; run the study again"
             warn_user(text, UserWarning)
-        attributes = {**self.study.attributes, **(self._store.pilot or {})}
-        return rows.dataset(attributes, self.study.axes)
+        return rows.dataset(
+            {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
+        )
+
+    def _read(
+        self, only: Sequence[str] | None
+    ) -> tuple[Gathered, list[tuple[int, float, str]]]:
+        """Everything that is stored; and of each chunk its bytes, seconds and versions."""
+        ensemble, chunks = self.study.ensemble, []
+        rows = Gathered(self.study.experiments, ensemble.samples, ensemble.first, only)
+        for chunk in self._store.chunks():
+            rows.add([chunk.table])
+            chunks.append((chunk.bytes, chunk.table.seconds, chunk.versions))
+        return rows, chunks
 
     def export(self, path: str | Path) -> None:
         """Write `dataset` as the suffix says (.nc or .csv), whole or not at all.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import operator
+import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import pydantic
 import tomli_w
@@ -22,7 +24,7 @@ from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import STUDY, Damaged, Store, read_json
-from stiction.errors import InputError, StoreError, unknown_name
+from stiction.errors import InputError, StoreError
 from stiction.methods import methods
 from stiction.model import (
     Count,
@@ -38,11 +40,19 @@ from stiction.model import (
     to_plain,
 )
 from stiction.problem import Problem
+from stiction.profiles import profile_in_file
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import StoredRun, as_part
-from stiction.study.study_file import completed, read_sweep, read_toml, reading
-from stiction.study.sweep import Point, Sweep, grid_axes, name_point, points_of
+from stiction.study.sweep import (
+    Point,
+    Sweep,
+    grid_axes,
+    name_point,
+    with_first_values,
+)
+
+T = TypeVar("T")
 
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
@@ -127,7 +137,12 @@ class Study:
     @property
     def points(self) -> list[Point]:
         """The points of the sweep, in order; one without values if nothing is swept."""
-        return points_of(self.sweep)
+        keys = [key for axis in self.sweep for key in axis.keys]
+        steps = itertools.product(*(axis.steps for axis in self.sweep))
+        return [
+            Point(number, dict(zip(keys, itertools.chain(*one), strict=True)))
+            for number, one in enumerate(steps)
+        ]
 
     @cached_property
     def experiments(self) -> list[Experiment]:
@@ -162,7 +177,15 @@ class Study:
         if problems and not self.sweep:
             raise InputError(problems)
         if problems:
-            raise InputError([_at(points, text) for text, points in problems.items()])
+            raise InputError(
+                f"{text}, at {name_point(points[0])}"
+                + (
+                    f" and {len(points) - 1} more of the sweep"
+                    if points[1:]
+                    else " of the sweep"
+                )
+                for text, points in problems.items()
+            )
         return found
 
     @property
@@ -276,23 +299,13 @@ class Study:
 
         A key that is swept need not have a value of its own.
         """
-        check("study", given, dict)
-        folder = None if folder is None else check("folder", folder, FilePath)
-        sweep, mistakes = read_sweep(given, folder, cls)
-        try:
-            study: Study = pydantic.TypeAdapter(cls).validate_python(
-                completed(given, sweep), context=reading(folder)
-            )
-        except pydantic.ValidationError as error:
-            texts = explain(error, cls)
-            raise InputError(dict.fromkeys([*texts, *mistakes])) from None
-        return study
+        return _read(cls, given, folder)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """A study from a TOML file."""
         file = Path(check("path", path, FilePath))
-        return cls.from_dict(read_toml(file), folder=file.parent)
+        return cls.from_dict(_read_toml(file), folder=file.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -322,11 +335,6 @@ class _Parts:
 _PARTS = tuple(_Parts.__dataclass_fields__)
 
 
-def _at(points: list[Point], text: str) -> str:
-    more = f" and {len(points) - 1} more" if len(points) > 1 else ""
-    return f"{text}, at {name_point(points[0])}{more} of the sweep"
-
-
 def study_schema() -> dict[str, Any]:
     """JSON schema of a study file."""
     return pydantic.TypeAdapter(Study).json_schema()
@@ -334,29 +342,44 @@ def study_schema() -> dict[str, Any]:
 
 @model(kw_only=True)
 class Setup:
-    """What a study file says of one interface, without what is random."""
+    """What a study file says of one interface; what is random is not looked at."""
 
     problem: Problem
     method: AnyMethod | None = None
     save: Save | None = None
+    random: Any = None
+    ensemble: Any = None
+    sweep: Any = ()
+    title: Any = ""
 
 
 def read_setup(path: Path) -> Setup:
     """Read what a study file says of one interface; of a sweep, the first values."""
-    given = read_toml(path)
-    known = Study.__dataclass_fields__
-    problems = [unknown_name("study", name, known) for name in given if name not in known]
-    given = completed(given, read_sweep(given, path.parent, Study)[0])
-    own = {name: given[name] for name in Setup.__dataclass_fields__ if name in given}
+    return _read(Setup, _read_toml(path), path.parent)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        setup: Setup = pydantic.TypeAdapter(Setup).validate_python(
-            own, context=reading(path.parent)
-        )
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    except (RecursionError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
+    """Validate a study in plain form, or its `Setup`; names of files are relative to `folder`."""
+    check("study", given, dict)
+    context: dict[str, Any] = {"folder": None}
+    if folder is not None:
+        place = check("folder", folder, FilePath)
+        context["folder"] = place
+        context["read"] = lambda profile, name: profile_in_file(profile, name, place)
+    plain = with_first_values(given, context["folder"])
+    try:
+        return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
-        problems += explain(error, Setup)
-    if problems:
-        raise InputError(problems)
-    return setup
+        raise InputError(dict.fromkeys(explain(error, cls))) from None
 
 
 def open_run(path: Any) -> StoredRun:

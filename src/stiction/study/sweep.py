@@ -1,28 +1,24 @@
 """Sweeps: any key of a study takes several values; axes are crossed, keys of one axis zipped."""
 
 import dataclasses
-import itertools
 import json
 import math
 import numbers
-import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import pydantic
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from stiction.ensemble.dataset import GridAxis
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.model import (
     Real,
-    _models_in,
     at_least,
     describe,
     explain,
-    keys_of,
     model,
     to_plain,
 )
@@ -77,8 +73,15 @@ class _Range:
 
     start: Real
     stop: Real
-    count: at_least(2)  # type: ignore[valid-type]  # a call makes it
+    count: Annotated[at_least(2), Field(le=MOST_POINTS)]  # type: ignore[valid-type]
     spacing: Literal["linear", "log"] = "linear"
+
+    @model_validator(mode="after")
+    def _log_of_positive(self) -> "_Range":
+        if self.spacing == "log" and min(self.start, self.stop) <= 0.0:
+            ends = f"{self.start!r} and {self.stop!r}"
+            raise InputError(f"a log range needs positive ends, got {ends}")
+        return self
 
 
 def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
@@ -86,25 +89,19 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
         found: _Range = pydantic.TypeAdapter(_Range).validate_python(given)
     except pydantic.ValidationError as error:
         raise InputError(explain(error, _Range, key)) from None
-    if found.count > MOST_POINTS:
-        raise InputError(f"{key}.count: must be at most {MOST_POINTS}, got {found.count}")
-    ends = found.start, found.stop
-    if found.spacing == "log" and min(ends) <= 0.0:
-        raise InputError(
-            f"{key}: a log range needs positive ends, got {ends[0]!r} and {ends[1]!r}"
-        )
-    values = (np.geomspace if found.spacing == "log" else np.linspace)(*ends, found.count)
+    spread = np.geomspace if found.spacing == "log" else np.linspace
+    values = spread(found.start, found.stop, found.count)
     whole = all(isinstance(given[name], numbers.Integral) for name in ("start", "stop"))
     if whole and np.all(values == np.round(values)):
-        return [int(value) for value in values]
-    return [float(value) for value in values]
+        values = values.astype(np.int64)
+    return values.tolist()
 
 
 def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
     if isinstance(given, Mapping):
         return _range(key, given)
     if isinstance(given, np.ndarray):
-        given = list(given) if given.ndim else given
+        given = given.tolist()
     if not isinstance(given, list | tuple) or not given:
         raise InputError(
             f"{key}: must be a list of values or a range such as {{start = 1e-3, stop = 4e-3,"
@@ -114,14 +111,12 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
 
 
 def _value(key: str, value: Any, folder: Path | None) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
+    """A value as it stands in TOML; a profile in a file is read."""
     file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
     if file and folder is not None and is_profile(key):
         with prefixed(key):
-            found = profile_in_file(value, key, folder)
-        return found if isinstance(found, dict) else found.tolist()
-    return value
+            value = profile_in_file(value, key, folder)
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
 def _axis(number: int, given: Any, folder: Path | None) -> Axis:
@@ -201,15 +196,14 @@ def _axes(given: Any, info: pydantic.ValidationInfo) -> tuple[Axis, ...]:
 
 
 def _plain_value(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
     return to_plain(value) if dataclasses.is_dataclass(value) else value
 
 
 def _plain_axes(axes: tuple[Axis, ...]) -> list[dict[str, list[Any]]]:
+    columns = [zip(axis.keys, zip(*axis.steps, strict=True), strict=True) for axis in axes]
     return [
-        {key: [_plain_value(step[i]) for step in axis.steps] for i, key in enumerate(axis.keys)}
-        for axis in axes
+        {key: [_plain_value(value) for value in values] for key, values in axis}
+        for axis in columns
     ]
 
 
@@ -229,14 +223,30 @@ Sweep: TypeAlias = Annotated[
 """A list of tables of dotted keys and their values."""
 
 
-def points_of(axes: Sequence[Axis]) -> list[Point]:
-    """All combinations, the last axis running fastest."""
-    combinations = itertools.product(*(axis.steps for axis in axes))
-    keys = [key for axis in axes for key in axis.keys]
-    return [
-        Point(number, dict(zip(keys, itertools.chain(*steps), strict=True)))
-        for number, steps in enumerate(combinations)
-    ]
+def with_first_values(given: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return a study in plain form, each swept key without a value with the first of its sweep.
+
+    A sweep that is not valid is left to the validation of the whole.
+    """
+    context = {"folder": folder}
+    try:
+        axes = pydantic.TypeAdapter(Sweep).validate_python(
+            given.get("sweep", ()), context=context
+        )
+    except pydantic.ValidationError:
+        return given
+    for axis in axes:
+        for key, value in zip(axis.keys, axis.steps[0], strict=True):
+            given = _with_default(given, key.split("."), value)
+    return given
+
+
+def _with_default(table: dict[str, Any], steps: list[str], value: Any) -> dict[str, Any]:
+    name, *rest = steps
+    inner = table.get(name, {})
+    if rest and isinstance(inner, dict):
+        return table | {name: _with_default(inner, rest, value)}
+    return table if rest or name in table else table | {name: value}
 
 
 def name_point(point: Point) -> str:
@@ -250,26 +260,6 @@ def _text(value: Any) -> str:
         return f"{value:g}"
     kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
     return str(kind) if kind else describe(value)
-
-
-def unknown_keys(cls: type, axes: Sequence[Axis]) -> list[str]:
-    """Swept keys that no study has, found without a valid study."""
-    texts = []
-    for key in (key for axis in axes for key in axis.keys):
-        classes, done = [cls], ""
-        for step in key.split("."):
-            found = [key for c in classes for key in keys_of(c)]
-            names = list(dict.fromkeys(found))
-            if classes and step not in names:
-                texts.append(unknown_name(f"sweep: {done or 'the study'}", step, names))
-                break
-            owners = [c for c in classes if step in keys_of(c)]
-            hints = [
-                typing.get_type_hints(c, include_extras=True)[keys_of(c)[step]] for c in owners
-            ]
-            classes = [inner for hint in hints for inner in _models_in(hint)]
-            done = f"{done}.{step}" if done else step
-    return texts
 
 
 def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
