@@ -265,16 +265,9 @@ class TruncatedNormal(_ByMoments):
 
 @dataclass(frozen=True)
 class ScipyMarginal(Marginal):
-    """A continuous `scipy.stats` distribution.
+    """A continuous `scipy.stats` distribution, known by scipy's name and the given parameters.
 
-    Attributes
-    ----------
-    type : str
-        scipy's name.
-    parameters : tuple of (str, float)
-        Shapes, loc and scale that were given.
-    frozen : optional
-        A distribution that scipy has no name for: for Python only, equal to itself only.
+    One that scipy has no name for is kept `frozen`: for Python only, equal to itself only.
     """
 
     type: str

@@ -79,29 +79,14 @@ def lower_factor(matrix: Array) -> Array:
 
 
 class Stream(NamedTuple):
-    """The draws of one property, or of a factor between specimens, among all draws of a sample.
+    """The draws of one property, or of a factor between specimens, among all draws of a sample."""
 
-    Attributes
-    ----------
-    number, block : int
-        Number of the stream, which never changes, and samples that share a generator.
-    ranks : array of int
-        Modes drawn, by their `Modes.ranks`: those of the property and of all that it is
-        correlated with.
-    mean_mode : bool
-        Whether the mean mode is drawn.
-    columns : slice
-        Of the vector of all draws.
-    own : slice or array of int
-        Which of these columns are of modes of the property itself.
-    """
-
-    number: int
-    block: int
-    ranks: NDArray[np.int64]
-    mean_mode: bool
-    columns: slice
-    own: slice | NDArray[np.int64] = slice(None)
+    number: int  # of the stream of draws; never changes
+    block: int  # samples that share a generator
+    ranks: NDArray[np.int64]  # modes drawn, for the property and all that it is correlated with
+    mean_mode: bool  # whether the mean mode is drawn
+    columns: slice  # of the vector of all draws
+    own: slice | NDArray[np.int64] = slice(None)  # of `columns`: modes of the property itself
 
 
 @model(kw_only=True)
