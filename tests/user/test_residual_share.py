@@ -1,5 +1,6 @@
 """Strength that may lie below the residual strength is spoken of before anything is computed."""
 
+import dataclasses
 import warnings
 
 import pytest
@@ -50,3 +51,19 @@ def test_share_below_a_random_residual_strength(problem, make_strength):
         problem, st.RandomInterface(strength=strength, residual_strength=residual)
     )
     assert share == pytest.approx(1.0 / 32.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("strengths", [(1.0, 1.0), (2e6, 1.0), (1.0, 2e6), (2e6, 2e6)])
+def test_strengths_in_coefficients_are_compared_as_stresses(problem, make_strength, strengths):
+    """Both overlap in a quarter of each, in Pa (unit 1) or as coefficients (unit 2 MPa): 1/32."""
+    pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
+    fields = [
+        st.RandomField(
+            scipy.stats.uniform(low / unit, 4e5 / unit),
+            make_strength().spectrum,
+            of=None if unit == 1.0 else "friction_coefficient",
+        )
+        for low, unit in zip((3e5, 0.0), strengths, strict=True)
+    ]
+    random = st.RandomInterface(strength=fields[0], residual_strength=fields[1])
+    assert share_below_residual(pressed, random) == pytest.approx(1.0 / 32.0, rel=1e-5)

@@ -90,15 +90,25 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 
     Properties are taken as independent.
     """
-    fields, factor = random.properties, (random.between or {}).get("strength")
-    residual = np.asarray(problem.friction.residual_strength)
+    fields, between = random.properties, random.between or {}
+    residual, coefficients = np.asarray(problem.friction.residual_strength), False
     if "residual_strength" in fields:
-        law = fields["residual_strength"].marginal.distribution
-        residual = _equally_likely(law, QUANTILES)
-    if fields["strength"].of is not None:
-        residual = np.ravel(residual)[:, None] / _pressures(problem, random)
-    if factor is not None:
-        residual = np.ravel(residual)[:, None] / _equally_likely(factor.distribution, PRESSURES)
+        field = fields["residual_strength"]
+        coefficients = field.of is not None
+        residual = _equally_likely(field.marginal.distribution, QUANTILES)
+    factors = {
+        name: _equally_likely(between[name].distribution, PRESSURES)
+        for name in ("residual_strength", "strength")
+        if name in between
+    }
+    if "residual_strength" in factors:
+        residual = np.outer(residual, factors["residual_strength"])
+    if coefficients and fields["strength"].of is None:
+        residual = np.outer(residual, _pressures(problem, random))
+    elif fields["strength"].of is not None and not coefficients:
+        residual = np.outer(residual, 1.0 / _pressures(problem, random))
+    if "strength" in factors:
+        residual = np.outer(residual, 1.0 / factors["strength"])
     return float(np.mean(fields["strength"].marginal.distribution.cdf(residual)))
 
 
