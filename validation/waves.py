@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.ticker import NullFormatter
 
 import stiction as st
+from stiction.dynamics.method import make_run
 from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -41,19 +42,20 @@ def simulated(steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (in 1/(k c_s)) and a/a_0 of an explicit run; everything slides at its residual."""
     friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(SOLID, INTERFACE, friction)
-    run = st.simulate_rupture(
-        problem,
-        np.full(INTERFACE.nodes, 1.001e6),
-        method=st.Rupture(
-            load=([0.0, 1.0], [2e6, 2e6]), implicit=False, time_step=END * UNIT / steps,
-            stop="time", end_time=END * UNIT,
-        ),
-        initial_slip=1e-3 + 1e-6 * np.cos(K * INTERFACE.x),
-        initial_load=2e6,
-        save=st.Save(["slip"], every=1),
+    method = st.Rupture(
+        load=([0.0, 1.0], [2e6, 2e6]), implicit=False, time_step=END * UNIT / steps,
+        stop="time", end_time=END * UNIT,
     )  # fmt: skip
-    mode = np.fft.rfft(run["slip"].values, axis=1)[:, 2].real / (INTERFACE.nodes / 2) / 1e-6
-    return run["time"].values / UNIT, mode
+    rows = problem.sample(np.full(INTERFACE.nodes, 1.001e6), accept=method.accepts)
+    run = make_run(method, problem.friction, method.medium(problem), rows, 0)
+    state = run.start(0.0, 1e-3 + 1e-6 * np.cos(K * INTERFACE.x))
+    times, slips = [0.0], [state.slip.copy()]
+    for _ in range(steps):
+        run.advance(state, 1)
+        times.append(float(state.now["time"]))
+        slips.append(state.slip.copy())
+    mode = np.fft.rfft(slips, axis=1)[:, 2].real / (INTERFACE.nodes / 2) / 1e-6
+    return np.array(times) / UNIT, mode
 
 
 def compute() -> list[tuple[int, float]]:

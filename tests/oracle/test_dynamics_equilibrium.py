@@ -6,8 +6,7 @@ from scipy.linalg import circulant
 from scipy.optimize import linprog
 
 import stiction as st
-from stiction.dynamics.method import Rupture
-from stiction.dynamics.simulate import simulate_rupture
+from stiction.dynamics.method import Rupture, make_run
 
 RATE = 0.5e12
 
@@ -77,12 +76,12 @@ def test_a_run_from_an_equilibrium_finds_the_same_onset(system):
     method = Rupture(loading_rate=1e5, stop="onset")
     # The slip of the onset, scaled back, is in equilibrium at no load; so take the load of the
     # onset less a little, where that slip holds still.
-    found = simulate_rupture(
-        system, strength, method=method, initial_slip=slip * (1.0 - 1e-9),
-        initial_load=exact * (1.0 - 1e-6),
-    )  # fmt: skip
-    assert float(found["critical_stress"]) == pytest.approx(exact, rel=5e-6)
-    assert int(found["implicit_steps"]) > 0
+    rows = system.sample(strength)
+    run = make_run(method, system.friction, method.medium(system), rows, 0)
+    state = run.start(exact * (1.0 - 1e-6) / 1e5, slip * (1.0 - 1e-9))
+    assert run.follow(state, method.max_steps)[0] == "onset"
+    assert float(state.now["peak_stress"]) == pytest.approx(exact, rel=5e-6)
+    assert int(state.now["implicit_steps"]) > 0
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,6 @@ def held():
 
 
 FALLING = [[0.0, 1e-3, 2e-3, 3e-3], [0.0, 5e5, 4e5, 2e6]]
-START = np.zeros(NODES)
 METHOD_MISTAKES = {
     "loading_rate": {"loading_rate": 0.0},
     "loading_rate ... nan": {"loading_rate": float("nan")},
@@ -75,11 +74,6 @@ SAVE_MISTAKES = {
 RUN_MISTAKES = {
     "progress": {"progress": 3},
     "Rupture": {"method": st.LocalCriterion()},
-    "give both or neither": {"initial_slip": START},
-    "initial_load": {"initial_slip": START, "initial_load": "a"},
-    "initial_load: -1 Pa is below": {"initial_slip": START, "initial_load": -1.0},
-    "initial_slip": {"initial_slip": START + np.inf, "initial_load": 1e5},
-    "initial_slip ... numbers": {"initial_slip": ["a"] * NODES, "initial_load": 1e5},
     "one sample at a time": {"profiles": np.stack([profile()] * 2)},
     "not after the start": {"method": Rupture(loading_rate=1e8, end_time=1e-9)},
     "goes down at t = 0.001": {"method": Rupture(load=FALLING)},

@@ -164,6 +164,9 @@ def test_law_of_ones_own(with_law, tau_p):
     assert found.critical_stress.item() == pytest.approx(
         expected.critical_stress.item(), rel=1e-12
     )
+    method = dataclasses.replace(RUPTURE, stop="onset")
+    run = st.simulate_rupture(own, tau_p, method=method, save=st.Save([]))
+    assert "a friction law of your own" in run.attrs["study_incomplete"]
     with pytest.raises(st.InputError, match="OwnLaw has none"):
         st.onset(own, tau_p, method=st.Equilibrium())
     polygon = st.PiecewiseWeakening.from_law(own.friction, 32)

@@ -75,23 +75,6 @@ def problem_and_strength(path):
     return plan.problem, plan.profiles(plan.draws(plan.seed, 0, 1))
 
 
-def test_a_run_may_begin_from_an_equilibrium(path):
-    problem, strength = problem_and_strength(path)
-    along = st.equilibrium_path(problem, strength, loads=[7.5e5])
-    slip = along.slip.values.reshape(problem.interface.shape)
-    method = st.Rupture(loading_rate=1e6, stop="onset")
-    options = {"method": method, "progress": False}
-    later = st.simulate_rupture(
-        problem, strength, initial_slip=slip, initial_load=7.5e5, **options
-    )
-    whole = st.simulate_rupture(problem, strength, **options)
-    assert float(later.critical_stress) == pytest.approx(float(whole.critical_stress), rel=1e-5)
-    with pytest.raises(st.InputError, match=r"initial_slip: must be \(40, 36\) numbers"):
-        st.simulate_rupture(
-            problem, strength, initial_slip=np.zeros((40, 35)), initial_load=7.5e5, **options
-        )
-
-
 def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
     problem, strength = problem_and_strength(path)
     with pytest.raises(st.InputError, match=r"time_step: .* above the stability limit"):

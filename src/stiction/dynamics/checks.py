@@ -1,4 +1,4 @@
-"""What a run is warned of or refused for: grids, rates of loading, loads that reverse."""
+"""Refusals and warnings of a run: coarse grids, rates of loading, loads that reverse."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,9 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
         )
 
 
-def check_start(run: Run, time: float) -> None:
-    """Refuse or warn of loading that a run from a time (s) cannot follow."""
+def at_first_slip(run: Run) -> State:
+    """Return the state of rest at first slip; refuse or warn of loads that cannot be followed."""
+    time = run.first_slip()
     if time > LARGEST_STEP:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, more than "
@@ -71,9 +72,9 @@ def check_start(run: Run, time: float) -> None:
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
     times, values = run.history
     lowest, nodes = float(values[times <= time].min()), run.setting.nodes
-    _warn_of_reverse(
-        run, lowest * nodes.profile + nodes.initial < -nodes.strength, time, lowest
-    )
+    below = lowest * nodes.profile + nodes.initial < -nodes.strength
+    _warn_of_reverse(run, below, time, lowest)
+    return run.start(time)
 
 
 def resolves_steps(run: Run, time: float) -> bool:

@@ -87,12 +87,8 @@ def _assemble(
     """Matrix, stress if nothing slipped, and first guess; return the accuracy to ask for, Pa."""
     stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
-    size, ratio, rise, impedance = (
-        attempt.size,
-        attempt.ratio,
-        attempt.rise,
-        grid.impedance,
-    )
+    size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
+    impedance = grid.impedance
     if size != tables.valid_for[0]:
         tabulate(grid, size, tables)
     if size != tables.valid_for[0] or ratio != tables.valid_for[1]:
@@ -108,10 +104,12 @@ def _assemble(
     trial_hat, trial = tables.work, tables.trial_stress
     trial_hat[0] = impedance * ratio * past_hat[0]
     for q in range(1, trial_hat.size):
-        trial_hat[q] = (
-            stiffness[1, q] * (tables.memory_sum[q] - rise * ramp[entry[q]] * past_hat[q])
-            - stiffness[0, q] * state.slip_hat[q]
-            + impedance * ratio * past_hat[q]
+        g, c, risen = stiffness[0, q], stiffness[1, q], rise * ramp[entry[q]]
+        past, memory, slip = past_hat[q], tables.memory_sum[q], state.slip_hat[q]
+        real = c * (memory.real - risen * past.real) - g * slip.real
+        imaginary = c * (memory.imag - risen * past.imag) - g * slip.imag
+        trial_hat[q] = complex(
+            real + impedance * ratio * past.real, imaginary + impedance * ratio * past.imag
         )
     backward(grid.transform, trial_hat, trial)
     profile, initial = setting.nodes.profile, setting.nodes.initial
@@ -181,14 +179,18 @@ def _accept(
     forward(grid.transform, u, rate_hat)
     for q in range(rate_hat.size):
         slip_hat[q] += rate_hat[q]
-        rate_hat[q] /= size
-        past_hat[q] = rise * (rate_hat[q] - past_hat[q])
+        mean, past = complex(rate_hat[q].real / size, rate_hat[q].imag / size), past_hat[q]
+        rate_hat[q] = mean
+        past_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
     advance_with_ramp(grid, state.memory, tables)
     transfer_hat[0] = 0.0
     for q in range(1, transfer_hat.size):
         response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
-        memory_part = tables.memory_sum[q] + response * rate_hat[q] + ramp * past_hat[q]
-        transfer_hat[q] = stiffness[1, q] * memory_part - stiffness[0, q] * slip_hat[q]
+        memory, v, a, slip = tables.memory_sum[q], rate_hat[q], past_hat[q], slip_hat[q]
+        g, c = stiffness[0, q], stiffness[1, q]
+        real = c * (memory.real + response * v.real + ramp * a.real) - g * slip.real
+        imaginary = c * (memory.imag + response * v.imag + ramp * a.imag) - g * slip.imag
+        transfer_hat[q] = complex(real, imaginary)
     backward(grid.transform, transfer_hat, transfer)
     slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
     critical, profile, initial = nodes.critical, nodes.profile, nodes.initial

@@ -51,8 +51,8 @@ def load_history(load: Any) -> History:
     return times, values
 
 
-def first_reach(history: History, target: float, what: str = "first slip") -> float:
-    """Return when tau_0 first reaches `target`, s; refuse a load that falls before that."""
+def first_reach(history: History, target: float) -> float:
+    """Return when tau_0 first reaches that of the first slip, s; it must not fall before."""
     times, values = history
     if values[0] >= target:
         return 0.0
@@ -62,14 +62,14 @@ def first_reach(history: History, target: float, what: str = "first slip") -> fl
     if falling.size:
         at = times[falling[0]]
         raise InputError(
-            f"load: goes down at t = {at:.6g} s before the {what} at tau_0 = {target:.6g} Pa; "
+            f"load: goes down at t = {at:.6g} s before the first slip at tau_0 = {target:.6g} Pa; "
             "begin with a load that does not fall"
         )
     low = last - 1
     slope = (values[last] - values[low]) / (times[last] - times[low])
     if slope <= 0.0:
         raise InputError(
-            f"load: stays at or below {values.max():.6g} Pa, but the {what} needs tau_0 = "
+            f"load: stays at or below {values.max():.6g} Pa, but the first slip needs tau_0 = "
             f"{target:.6g} Pa"
         )
     return float(times[low] + (target - values[low]) / slope)

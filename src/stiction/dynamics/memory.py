@@ -23,7 +23,7 @@ from stiction.dynamics.state import (
     Ints,
     Spectrum,
 )
-from stiction.jit import jit, jit_inside
+from stiction.jit import jit_inside
 
 LANES = 64
 LINE = 64  # bytes of a cache line
@@ -90,9 +90,7 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
     table = zeros(count * pairs * 4 * LANES).reshape(count, pairs, 4, LANES)
     response = np.empty(grid.frequency.size)
     in_plane = (np.arange(pairs) < grid.split)[:, None]
-    for block in range(
-        count
-    ):  # one by one: their exponentials together would take more than it
+    for block in range(count):  # one by one: all exponentials together would take more
         some = slice(block * LANES, (block + 1) * LANES)
         z = np.multiply.outer(grid.poles, grid.frequency[some] * step)
         share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
@@ -167,9 +165,7 @@ def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) ->
         for copy in range(grid.multiplicity):
             own = y[block, copy]
             terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
-            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(
-                axis=0
-            )
+            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(0)
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
@@ -190,8 +186,8 @@ def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> No
 def _phi(z: Any) -> Any:
     """(exp(z) - 1)/z near z = 0."""
     value = 1.0 + 0.0j
-    for k in range(6, 1, -1):
-        value = 1.0 + z / k * value
+    for k in range(6, 1, -1):  # part by part: complex division is slow to compile and to run
+        value = 1.0 + complex(z.real / k, z.imag / k) * value
     return value
 
 
@@ -251,10 +247,8 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
             else:
                 per_z = inverse * (1.0 / (j + 1)) if grid.multiplicity == 1 else 1.0 / z
                 ratio = (decay - 1.0) * per_z
-                gain, ramp_gain = (
-                    step * ratio,
-                    step * step * ((ratio - 1.0) * per_z - 0.5 * ratio),
-                )
+                gain = step * ratio
+                ramp_gain = step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
             o = ((j // 64) * pairs + p) * 256 + j % 64
             table[o], table[o + 64] = decay.real, decay.imag
             table[o + 128], table[o + 192] = gain.real, gain.imag
@@ -307,14 +301,8 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
             own = block // multiplicity * pairs + p
             e, s = tables.table[own * 256 :][:256], tables.ramp[own * 128 :][:128]
             for j in range(64):
-                er, ei, gr, gi, lr, li = (
-                    e[j],
-                    e[64 + j],
-                    e[128 + j],
-                    e[192 + j],
-                    s[j],
-                    s[64 + j],
-                )
+                er, ei, gr, gi = e[j], e[64 + j], e[128 + j], e[192 + j]
+                lr, li = s[j], s[64 + j]
                 yr, yi = y[j], y[64 + j]
                 y[j] = er * yr - ei * yi + gr * v[j] + lr * a[j]
                 y[64 + j] = er * yi + ei * yr + gi * v[j] + li * a[j]
@@ -323,19 +311,17 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
                 y[192 + j] = er * yi + ei * yr + gi * v[64 + j] + li * a[64 + j]
 
 
-@jit
-def grown_memory(grid: Grid, memory: Array, rate_hat: Array, growth: float) -> Array:
+def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
     """psi of a slip rate that has always grown as exp(growth t); return Re sum w psi, (modes,)."""
     total = np.zeros(rate_hat.size, dtype=np.complex128)
-    pairs = grid.poles.size
-    for q in range(1, rate_hat.size):
-        v, entry = rate_hat[q], grid.entry[q]
-        o = grid.offset[q] // 128 * pairs * 256 + grid.offset[q] % 64
-        for p in range(pairs):
-            part = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
-            gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])
-            memory[o], memory[o + 64] = gain.real * v.real, gain.imag * v.real
-            memory[o + 128], memory[o + 192] = gain.real * v.imag, gain.imag * v.imag
-            total[q] += part * (grid.weights[p] * gain).real * v
-            o += 256
+    rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size
+    first = grid.offset[1:] // (2 * LANES) * pairs * 4 * LANES + grid.offset[1:] % LANES
+    for p in range(pairs):
+        part = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
+        gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])
+        own = first + p * 4 * LANES
+        for row, signal in enumerate((rate.real, rate.imag)):
+            memory[own + 2 * row * LANES] = gain.real * signal
+            memory[own + (2 * row + 1) * LANES] = gain.imag * signal
+        total[1:] += part * (grid.weights[p] * gain).real * rate
     return total

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from stiction.dynamics.checks import (
+    at_first_slip,
     check_finite,
-    check_start,
     warn_if_coarse,
     warn_if_unresolved,
 )
@@ -213,9 +213,8 @@ class Rupture:
         return solve
 
     def _one(self, problem: Problem, run: Run, state: State | None) -> dict[str, Any]:
-        time = run.first_slip()
-        check_start(run, time)
-        state = run.start(time) if state is None else state
+        rest = at_first_slip(run)
+        state = rest if state is None else state
         ended, reason = run.follow(state, self.max_steps)
         check_finite(run, state, reason)
         if ended is None:

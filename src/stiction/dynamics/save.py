@@ -30,41 +30,49 @@ FRAMES = 64
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
 _CHECKPOINT, _SUMMARY, _CHUNKS = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
-FIELDS: dict[str, Variable] = {
-    "slip": Variable("m", "slip", ("time",)),
-    "slip_rate": Variable("m/s", "slip rate", ("time",)),
-    "shear_stress": Variable("Pa", "shear stress on the interface", ("time",)),
-    "strength": Variable("Pa", "current strength", ("time",)),
-}
-SCALARS: dict[str, Variable] = {
-    "load": Variable("Pa", "load factor tau_0", ("time",)),
-    "mean_stress": Variable("Pa", "mean shear stress on the interface", ("time",)),
-    "mean_slip": Variable("m", "mean slip", ("time",)),
-    "top_slip_rate": Variable("m/s", "largest slip rate", ("time",)),
-    "weakened_fraction": Variable("1", "share of nodes at the residual strength", ("time",)),
-    "seismic_moment": Variable("N", "seismic moment per length", ("time",)),
-    "work": Variable("J/m", "work of the load on the slip", ("time",)),
-    "strain_energy": Variable("J/m", "static strain energy of the slip", ("time",)),
-    "fracture_energy": Variable("J/m", "energy dissipated above the residual", ("time",)),
-    "radiated_energy": Variable("J/m", "work less friction less strain energy", ("time",)),
-}
-STEPS: dict[str, Variable] = {  # in the order of RECORD
-    "step_time": Variable("s", "time after each step", ("step",)),
-    "step_load": Variable("Pa", "load factor tau_0 after each step", ("step",)),
-    "step_mean_stress": Variable("Pa", "mean shear stress after each step", ("step",)),
-    "step_mean_slip": Variable("m", "mean slip after each step", ("step",)),
-    "step_top_slip_rate": Variable("m/s", "largest slip rate after each step", ("step",)),
-    "step_size": Variable("s", "size of each step", ("step",)),
-    "step_work": Variable("J/m", "work of the load up to each step", ("step",)),
-}
-_AT_STATION = ("step", "station")
-STATIONS: dict[str, Variable] = {  # in the order of a station's columns
-    "station_slip": Variable("m", "slip at a station after each step", _AT_STATION),
-    "station_slip_rate": Variable("m/s", "slip rate at a station after each step", _AT_STATION),
-    "station_shear_stress": Variable(
-        "Pa", "shear stress (traction) at a station after each step", _AT_STATION
-    ),
-}
+
+def _over(*dims: str, **about: tuple[str, str]) -> dict[str, Variable]:
+    """Return variables with these dimensions, by name, from their units and meaning."""
+    return {name: Variable(*one, dims) for name, one in about.items()}
+
+
+FIELDS = _over(
+    "time",
+    slip=("m", "slip"),
+    slip_rate=("m/s", "slip rate"),
+    shear_stress=("Pa", "shear stress on the interface"),
+    strength=("Pa", "current strength"),
+)
+SCALARS = _over(
+    "time",
+    load=("Pa", "load factor tau_0"),
+    mean_stress=("Pa", "mean shear stress on the interface"),
+    mean_slip=("m", "mean slip"),
+    top_slip_rate=("m/s", "largest slip rate"),
+    weakened_fraction=("1", "share of nodes at the residual strength"),
+    seismic_moment=("N", "seismic moment per length"),
+    work=("J/m", "work of the load on the slip"),
+    strain_energy=("J/m", "static strain energy of the slip"),
+    fracture_energy=("J/m", "energy dissipated above the residual"),
+    radiated_energy=("J/m", "work less friction less strain energy"),
+)
+STEPS = _over(  # in the order of RECORD
+    "step",
+    step_time=("s", "time after each step"),
+    step_load=("Pa", "load factor tau_0 after each step"),
+    step_mean_stress=("Pa", "mean shear stress after each step"),
+    step_mean_slip=("m", "mean slip after each step"),
+    step_top_slip_rate=("m/s", "largest slip rate after each step"),
+    step_size=("s", "size of each step"),
+    step_work=("J/m", "work of the load up to each step"),
+)
+STATIONS = _over(  # in the order of a station's columns
+    "step",
+    "station",
+    station_slip=("m", "slip at a station after each step"),
+    station_slip_rate=("m/s", "slip rate at a station after each step"),
+    station_shear_stress=("Pa", "shear stress (traction) at a station after each step"),
+)
 TIME = Variable("s", "time from zero load", ("time",))
 _WATCHED = ("time", "load", "mean_stress", "work")
 
@@ -117,38 +125,28 @@ class Save:
 
     @pydantic.model_validator(mode="after")
     def _known(self) -> Save:
-        problems = [
-            unknown_name("fields", name, FIELDS) for name in self.fields if name not in FIELDS
-        ]
-        if problems:
-            raise InputError(problems)
+        if unknown := [name for name in self.fields if name not in FIELDS]:
+            raise InputError([unknown_name("fields", name, FIELDS) for name in unknown])
         return self
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
-        """Return the numbers of the stations' nodes, flat.
-
-        Raises
-        ------
-        InputError
-            Naming every station that is not on the interface.
-        """
+        """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
         wanted = "a pair (x, y)" if interface.is_plane else "a number x"
         reach = " x ".join(f"{length:g}" for length in interface.lengths)
         problems, numbers = [], []
         for name, place in self.stations.items():
-            if len(place) != len(interface.shape):
-                problems.append(f"stations[{name!r}]: must be {wanted} in m, got {place}")
-            elif not all(
-                0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=True)
+            each = list(zip(place, interface.lengths, strict=False))
+            if len(place) != len(interface.shape) or not all(
+                0.0 <= x <= end for x, end in each
             ):
                 problems.append(
-                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; places "
-                    "are in m, from the first node"
+                    f"stations[{name!r}]: must be {wanted} in m on the interface of {reach} m,"
+                    f" from the first node, got {place}"
                 )
-            else:
-                cells = zip(place, interface.spacings, interface.shape, strict=True)
-                index = tuple(round(x / spacing) % n for x, spacing, n in cells)
-                numbers.append(int(np.ravel_multi_index(index, interface.shape)))
+                continue
+            cells = zip(place, interface.spacings, interface.shape, strict=True)
+            index = tuple(round(x / spacing) % n for x, spacing, n in cells)
+            numbers.append(int(np.ravel_multi_index(index, interface.shape)))
         if problems:
             raise InputError(problems)
         return np.array(numbers, dtype=np.int64)
@@ -164,11 +162,10 @@ class Recorder:
         self._record = np.empty((save.every, self._columns))
         self._frames: list[dict[str, Any]] = []
         self._steps: list[Floats] = []
-        self.variables = (
-            {name: along(interface, variable) for name, variable in FIELDS.items()}
-            | STATIONS
-            | {name: per_area(interface, what) for name, what in (SCALARS | STEPS).items()}
-        )
+        self.variables = {name: along(interface, what) for name, what in FIELDS.items()}
+        self.variables |= STATIONS
+        for name, what in (SCALARS | STEPS).items():
+            self.variables[name] = per_area(interface, what)
 
     def advance(self, state: State, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them; return (steps taken, why it returned)."""
@@ -248,7 +245,7 @@ class Recorder:
         read_checkpoint(checkpoint, self.run, state, self._others)
         if whole.exists():
             with xr.open_dataset(whole, engine="netcdf4") as summary:
-                if summary.attrs["study"] == json.dumps(self.attributes["study"]):
+                if summary.attrs.get("study") == json.dumps(self.attributes.get("study")):
                     return True
             whole.unlink()  # of a run that goes on, to another end
         for path in folder.glob(_CHUNKS):
@@ -311,7 +308,7 @@ def _digest(run: Run, others: str) -> str:
 
 
 def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> None:
-    """Save the state of a run, with a digest of all that it depends on; whole or not at all."""
+    """Save the state of a run and a digest of all that it depends on, whole or not at all."""
     digest = np.frombuffer(_digest(run, others).encode(), np.uint8)
     write_arrays(path, {"digest": digest} | state._asdict())
 
@@ -359,10 +356,8 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     parts = []
     for path in sorted(folder.glob(_CHUNKS)):
         with xr.open_dataset(path, engine="netcdf4") as data:
-            unwanted = [
-                f for f in FIELDS if f in data and fields is not None and f not in fields
-            ]
-            parts.append(data.drop_vars(unwanted).load())
+            unwanted = [] if fields is None else FIELDS.keys() - set(fields)
+            parts.append(data.drop_vars(unwanted, errors="ignore").load())
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
     framed = xr.concat(

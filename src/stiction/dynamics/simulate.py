@@ -9,23 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiction.dynamics.checks import (
+    at_first_slip,
     check_finite,
-    check_start,
     warn_if_coarse,
     warn_if_reversed,
     warn_if_unresolved,
 )
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.loading import first_reach
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import Recorder, Save, open_rupture
 from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, StoreError, warn_accuracy
-from stiction.model import Progress, checked, describe, real_array, to_plain
+from stiction.model import Progress, checked, to_plain
 from stiction.placing import with_gaps
 from stiction.problem import Problem, named_profiles, refusals
-from stiction.profiles import at_nodes, gather
+from stiction.profiles import gather
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
 
@@ -45,8 +44,6 @@ def simulate_rupture(
     profiles: Any,
     *,
     method: Rupture,
-    initial_slip: Any = None,
-    initial_load: float | None = None,
     save: Save | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
@@ -62,8 +59,6 @@ def simulate_rupture(
     method : Rupture
         Load, numerical options, and when to stop. The run begins at the first slip, whatever its
         `start`; after `max_steps` it ends as it is.
-    initial_slip, initial_load : (nodes,) array in m, float in Pa, optional
-        Start from this equilibrium (with an empty memory) instead of from rest at first slip.
     save : Save, optional
         What to keep and where: by default slip, slip rate and shear stress every ten explicit
         steps, in memory.
@@ -101,8 +96,6 @@ def simulate_rupture(
     save = Save() if save is None else save
     if refused := refusals(problem, method):
         raise InputError(refused)
-    if (initial_slip is None) != (initial_load is None):
-        raise InputError("initial_slip and initial_load: give both or neither")
     given, measured = gather(problem, named_profiles(profiles))
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
@@ -111,20 +104,15 @@ def simulate_rupture(
     problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
     warn_if_coarse(problem, rows)
     run = make_run(method, problem.friction, method.medium(problem), rows, 0, stations)
-    state = _initial(run, initial_slip, initial_load)
-    if method.end_time is not None and state.now["time"] >= method.end_time:
+    state = at_first_slip(run)
+    if run.ended(state):
         raise InputError(
             f"end_time: {method.end_time:g} s is not after the start of the run, t = "
             f"{state.now['time']:.6g} s (first slip)"
         )
-    attributes = {
-        "study": {"problem": to_plain(problem), "method": to_plain(method)},
-        "stopped": "running",
-    }
-    recorder = Recorder(run, save, attributes)
+    recorder = Recorder(run, save, _attributes(problem, method))
     if recorder.begin(state) and save.to is not None:
-        result = open_rupture(save.to, fields=())
-        return with_gaps(problem, result, measured)
+        return with_gaps(problem, open_rupture(save.to, fields=()), measured)
     if state.steps == 0:
         recorder.add(state)
     try:
@@ -145,30 +133,13 @@ def simulate_rupture(
     return with_gaps(problem, result, measured)
 
 
-def _initial(run: Run, slip: Any, load: float | None) -> State:
-    """Return the state of rest at first slip, or of an equilibrium with a slip (m) at a load."""
-    if slip is None or load is None:
-        time = run.first_slip()
-        check_start(run, time)
-        return run.start(time)
-    interface = run.medium.interface
-    slip = at_nodes("initial_slip", slip, "slip", interface)[0]
+def _attributes(problem: Problem, method: Rupture) -> dict[str, Any]:
+    """Return what the result is labelled with; a friction law of one's own has no plain form."""
     try:
-        start = real_array(slip)
-    except TypeError:
-        start = np.full(1, np.nan)
-    if start.shape != interface.shape or not np.all(np.isfinite(start) & (start >= 0.0)):
-        raise InputError(
-            f"initial_slip: must be {interface.shape} numbers in m, finite and nowhere negative, "
-            f"got {describe(slip)}"
-        )
-    time = first_reach(run.history, load, "initial_load")
-    if time == 0.0 and run.history[1][0] > load:
-        raise InputError(
-            f"initial_load: {load:.6g} Pa is below the load at t = 0, {run.history[1][0]:.6g} Pa"
-        )
-    check_start(run, time)
-    return run.start(time, start)
+        study: dict[str, Any] = {"problem": to_plain(problem), "method": to_plain(method)}
+    except InputError as error:
+        return {"study_incomplete": str(error), "stopped": "running"}
+    return {"study": study, "stopped": "running"}
 
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:

@@ -67,10 +67,11 @@ def apply_stiffness(
     """
     strip = stiffness.strip
     half = halves.shape[1]
-    halves[:] = 0.0
     for parity in range(2):
         # Sources of this parity act on targets of the other one.
         target = halves[1 - parity]
+        for q in range(half):
+            target[q] = 0.0
         held = 0
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0

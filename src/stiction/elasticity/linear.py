@@ -65,6 +65,13 @@ def add_scaled(target: Array, factor: float, source: Array) -> None:
 
 
 @jit
+def set_scaled(target: Array, factor: float, source: Array) -> None:
+    """`target` = factor * source; a slice on the left takes numba seconds to compile."""
+    for i in range(target.size):
+        target[i] = factor * source[i]
+
+
+@jit
 def restrict(field: Array, inside: Mask) -> None:
     """Set a field to zero outside a set of nodes."""
     for i in range(field.size):
@@ -154,12 +161,12 @@ def solve_inside(
 @jit
 def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
     """`out` = the second to last vectors of a basis with these weights; the first is scaled."""
-    out[:] = 0.0
-    for k in range(1, count):
-        add_scaled(out, weights[k], basis[k])
-    basis[2] = out
-    basis[0] *= weights[0]
-    basis[0] += out
+    for i in range(out.size):
+        total = 0.0
+        for k in range(1, count):
+            total += weights[k] * basis[k, i]
+        out[i] = basis[2, i] = total
+        basis[0, i] = basis[0, i] * weights[0] + total
 
 
 @jit
@@ -176,16 +183,16 @@ def lowest_eigenvector(
     basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction
     images = np.empty((3, nodes))
     moved = np.empty(nodes)
-    basis[0] = vector
+    set_scaled(basis[0], 1.0, vector)
     restrict(basis[0], inside)
-    basis[0] *= 1.0 / np.sqrt(inner(basis[0], basis[0]))
+    set_scaled(basis[0], 1.0 / np.sqrt(inner(basis[0], basis[0])), basis[0])
     product(operator, basis[0], images[0])
     restrict(images[0], inside)
     value = inner(basis[0], images[0])
     count = 2
     taken = 0
     while taken < iterations:
-        moved[:] = images[0]
+        set_scaled(moved, 1.0, images[0])
         add_scaled(moved, -value, basis[0])
         if np.sqrt(inner(moved, moved)) <= tolerance:
             break
@@ -204,24 +211,25 @@ def lowest_eigenvector(
             if norm < 1e-14:
                 count = k
                 break
-            basis[k] *= 1.0 / norm
-            images[k] *= 1.0 / norm
+            set_scaled(basis[k], 1.0 / norm, basis[k])
+            set_scaled(images[k], 1.0 / norm, images[k])
         if count < 2:
             break
         small = np.empty((count, count))
         for k in range(count):
-            for m in range(count):
-                small[k, m] = inner(basis[k], images[m])
-        values, vectors = np.linalg.eigh(0.5 * (small + small.T))
-        value = values[0]
-        weights = np.ascontiguousarray(vectors[:, 0])
+            for m in range(k + 1):
+                both = inner(basis[k], images[m]) + inner(basis[m], images[k])
+                small[k, m] = small[m, k] = 0.5 * both
+        values, vectors = np.linalg.eigh(small)
+        value, weights = values[0], vectors[:, 0]
         _combine(basis, weights, count, moved)
         _combine(images, weights, count, moved)
         scale = 1.0 / np.sqrt(inner(basis[2], basis[2]))
-        basis[2] *= scale
-        images[2] *= scale
+        set_scaled(basis[2], scale, basis[2])
+        set_scaled(images[2], scale, images[2])
         count = 3
-    vector[:] = basis[0]
-    if vector.sum() < 0.0:
-        vector *= -1.0
+    total = 0.0
+    for i in range(nodes):
+        total += basis[0, i]
+    set_scaled(vector, -1.0 if total < 0.0 else 1.0, basis[0])
     return value, taken
