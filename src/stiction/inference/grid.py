@@ -26,25 +26,13 @@ HOPELESS = 40.0
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Cells of equal prior mass in a box, each with its share of the posterior.
+    """Cells of equal prior mass in a box, each with its share of the posterior."""
 
-    Attributes
-    ----------
-    low, high : (parameters,) arrays
-        Corners of the box, as u.
-    mass : (n_1, ..., n_parameters) array
-        Of the cells; sums to 1.
-    log_evidence : float
-        Logarithm of the mean of the likelihood over the whole prior.
-    gain : float
-        Kullback-Leibler divergence of the posterior from the prior, nats.
-    """
-
-    low: Array
+    low: Array  # (parameters,): corners of the box, as u
     high: Array
-    mass: Array
-    log_evidence: float
-    gain: float
+    mass: Array  # (n_1, ..., n_parameters): of the cells; sums to 1
+    log_evidence: float  # logarithm of the mean of the likelihood over the whole prior
+    gain: float  # Kullback-Leibler divergence of the posterior from the prior, nats
 
     def centres(self, axis: int) -> Array:
         """Return the centres of the cells along one parameter, as u."""

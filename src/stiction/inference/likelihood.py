@@ -38,27 +38,13 @@ ERRORS = 5.0
 
 
 class Specimen(NamedTuple):
-    """What is simulated of one kind of specimen.
+    """What is simulated of one kind of specimen, in the unit of the peaks."""
 
-    Attributes
-    ----------
-    onsets : (nodes, samples) array
-        Onsets of the same samples at every node, in the unit of the peaks.
-    local : (nodes, more samples) array or None
-        Onsets by the local criterion of the same samples and of more, if they help.
-    bound : (nodes,) array
-        Least possible peak; -inf where none is known.
-    peaks : (nodes, samples) array
-        Onsets, as many as of the local criterion if that helps.
-    densities : Densities
-        Of the peaks.
-    """
-
-    onsets: Array
-    local: Array | None
-    bound: Array
-    peaks: Array
-    densities: Densities
+    onsets: Array  # (nodes, samples): of the same samples at every node
+    local: Array | None  # by the local criterion, of the same samples and of more, if they help
+    bound: Array  # (nodes,): least possible peak; -inf where none is known
+    peaks: Array  # (nodes, samples): onsets, as many as of the local criterion if that helps
+    densities: Densities  # of the peaks
 
     @classmethod
     def of(cls, onsets: Array, local: Array | None, bound: Array) -> Self:
@@ -77,29 +63,15 @@ class Specimen(NamedTuple):
 
 
 class Model(NamedTuple):
-    """All that does not depend on the data: made once, used for any number of data sets.
-
-    Attributes
-    ----------
-    prior : Prior
-    method : Method
-    scaling : Scaling
-    axes : tuple of Axis
-        Of the parameters that are simulated.
-    error : float
-        Standard deviation of the load cell, in the unit of the peaks.
-    specimens : tuple of Specimen
-    low, high : (parameters,) arrays
-        Corners, as u, between which it is simulated.
-    """
+    """All that does not depend on the data: made once, used for any number of data sets."""
 
     prior: Prior
     method: Any
     scaling: Scaling
-    axes: tuple[Axis, ...]
-    error: float
+    axes: tuple[Axis, ...]  # of the parameters that are simulated
+    error: float  # standard deviation of the load cell, in the unit of the peaks
     specimens: tuple[Specimen, ...]
-    low: Array
+    low: Array  # corners, as u, between which onsets are simulated
     high: Array
 
     def log_densities(

@@ -26,21 +26,11 @@ LOG = 3.0
 
 
 class Axis(NamedTuple):
-    """Nodes of one simulated parameter.
+    """Nodes of one simulated parameter."""
 
-    Attributes
-    ----------
-    parameter : int
-        Its place in the prior.
-    values : (nodes,) array
-        Of the parameter, rising.
-    log : bool
-        Whether to interpolate in the logarithm.
-    """
-
-    parameter: int
-    values: Array
-    log: bool
+    parameter: int  # its place in the prior
+    values: Array  # rising
+    log: bool  # whether to interpolate in the logarithm
 
     def place(self, theta: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the node below each value (points,), and the share of the way to the next."""
@@ -68,10 +58,7 @@ def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
-    """Return the parameters at all nodes, (nodes, parameters), in C order of the axes.
-
-    Parameters that scale are at their reference.
-    """
+    """Return the parameters at all nodes, (nodes, parameters); those that scale at `reference`."""
     steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
     result[:, [axis.parameter for axis in axes]] = steps

@@ -31,26 +31,13 @@ PRESSURE = "problem.load.normal_pressure"
 
 
 class Scaling(NamedTuple):
-    """Parameters that shift and stretch the onset, and how.
+    """Parameters that shift and stretch the onset, and how: linear in the parameters."""
 
-    Attributes
-    ----------
-    keys : tuple of int
-        Their places in the prior; empty if there are none.
-    reference : (parameters,) array
-        Where shift is 0 and stretch 1, in these parameters.
-    shifts, stretches : (len(keys) + 1,) arrays
-        Shift (in the unit of the peaks) and stretch are linear in the parameters: a constant, then
-        one slope each.
-    reason : str
-        Why there are none, or no more than these; empty if every parameter of the marginal scales.
-    """
-
-    keys: tuple[int, ...]
-    reference: Array
-    shifts: Array
-    stretches: Array
-    reason: str = ""
+    keys: tuple[int, ...]  # their places in the prior
+    reference: Array  # (parameters,): where shift is 0 and stretch 1
+    shifts: Array  # in the unit of the peaks: a constant, then one slope for each key
+    stretches: Array  # the same
+    reason: str = ""  # why there are none
 
     def of(self, theta: Array) -> tuple[Array, Array]:
         """Return shift (unit of the peaks) and stretch at points (points, parameters)."""

@@ -33,16 +33,12 @@ def simulator(
 
     Parameters
     ----------
-    problem : Problem
-    random : RandomInterface or RandomField
-        What is random, with its known parameters.
+    problem, random, method, seed
+        As in `infer`.
     parameters : sequence of str
         Keys as in the prior of `infer`: ``("correlation_length", "marginal.low")``.
-    method : LocalCriterion, Equilibrium or any other
     samples : int
         Tests that a call simulates.
-    seed : int
-        Not negative.
     load_cell_error : float
         Standard deviation of the error of a peak, Pa.
 

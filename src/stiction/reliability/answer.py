@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -79,6 +79,16 @@ class Answer:
     warnings: tuple[str, ...]
     normal_pressure: float
 
+    @classmethod
+    def of(cls, state: LimitState, *, doubts: Sequence[str] = (), **values: Any) -> Self:
+        """Issue the doubts as warnings, and return the answer with them."""
+        for text in doubts:
+            warn_accuracy(text)
+        bound, pressure = state.bounds[0], state.experiment.pressure
+        return cls(
+            lower_bound=bound, normal_pressure=pressure, warnings=tuple(doubts), **values
+        )
+
     @property
     def friction_coefficient(self) -> float:
         """`stress` over the mean normal pressure; NaN without one."""
@@ -92,9 +102,8 @@ class Answer:
     @property
     def _place(self) -> str:
         """The coefficient and the distance from the bound, in words where there are any."""
-        text = ""
-        if math.isfinite(self.normal_pressure):
-            text = f" (friction coefficient {self.friction_coefficient:.4g})"
+        coefficient = f" (friction coefficient {self.friction_coefficient:.4g})"
+        text = coefficient if math.isfinite(self.normal_pressure) else ""
         if bounded(self.lower_bound):
             text += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
         return text
@@ -133,23 +142,6 @@ class DesignStress(Answer):
             f" {high / 1e6:.7g}){self._place}, at P = {self.probability:g};"
             f" {self.algorithm}, {self.evaluations} evaluations"
         )
-
-
-AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
-
-
-def answered(
-    kind: type[AnyAnswer], state: LimitState, *, doubts: Sequence[str] = (), **values: Any
-) -> AnyAnswer:
-    """Issue the doubts as warnings, and return the answer with them."""
-    for text in doubts:
-        warn_accuracy(text)
-    return kind(
-        lower_bound=state.bounds[0],
-        normal_pressure=state.experiment.pressure,
-        warnings=tuple(doubts),
-        **values,
-    )
 
 
 def prepare(

@@ -15,12 +15,8 @@ BATCH = 1024
 class Count(NamedTuple):
     """Failures among the first samples of an ensemble.
 
-    Attributes
-    ----------
-    failures, samples : int
-    until_failure : bool
-        Whether counting ended at a failure, because it was the last one wanted. That one does not
-        show how frequent failures are, and neither does its sample.
+    If counting ended at a failure, because it was the last one wanted, that one does not show how
+    frequent failures are, and neither does its sample.
     """
 
     failures: int
@@ -69,13 +65,7 @@ def count_failures(
 
     Stopping when the estimate looks precise enough would favour counts that saw many failures
     early. So the number of failures is fixed beforehand, and what was computed beyond the last of
-    them does not count.
-
-    Returns
-    -------
-    count : Count
-    values : (samples,) array
-        Stresses of samples start, start + 1, ..., those that do not count included.
+    them does not count; the stresses that are returned include it.
     """
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)

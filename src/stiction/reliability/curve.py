@@ -21,7 +21,6 @@ from stiction.reliability.answer import (
     DesignStress,
     Probability,
     TargetCv,
-    answered,
     exact_doubts,
     imprecise,
     prepare,
@@ -128,8 +127,8 @@ def design_stress(
             cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
             interval = (lowest, stress) if stress > lowest else state.bounds
             doubts.append(tail.short_of(f"P = {probability:g}"))
-    return answered(
-        DesignStress, state, stress=stress, probability=probability, cv=cv, interval=interval,
+    return DesignStress.of(
+        state, stress=stress, probability=probability, cv=cv, interval=interval,
         confidence=confidence, doubts=doubts, **tail.attributes,
     )  # fmt: skip
 

@@ -19,7 +19,6 @@ from stiction.reliability.answer import (
     Confidence,
     FailureProbability,
     TargetCv,
-    answered,
     distinct,
     exact_doubts,
     imprecise,
@@ -69,9 +68,8 @@ def failure_probability(
 
     Parameters
     ----------
-    problem : Problem
-    random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa.
+    problem, random, seed, workers, progress
+        As in `monte_carlo`. How many samples it will take is not known beforehand.
     stress : float, optional
         Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
@@ -88,8 +86,6 @@ def failure_probability(
         wasted, else subset simulation. `reason` in the result gives the choice and its cause.
     target_cv : float
         Coefficient of variation to reach.
-    seed : int
-        Not negative. The result depends on it and not on the number of workers.
     max_evaluations : int, optional
         Most samples the method is asked for: by default 2,000,000 by the local criterion, 200,000
         by equilibrium, 1,000 by rupture. If they do not suffice, the result holds what there is
@@ -99,10 +95,6 @@ def failure_probability(
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become unstable,
         arrested or not. By the local criterion they are the same.
-    workers : int, optional
-        Threads; all cores by default.
-    progress : bool or callable
-        As in `monte_carlo`; the number of samples that it will take is not known beforehand.
 
     Returns
     -------
@@ -156,7 +148,7 @@ def failure_probability(
             found = _sampled(state, stress, algorithm, slow, target_cv, budget, confidence)
         else:
             found = _certain(stress, low, high)
-    return answered(FailureProbability, state, stress=stress, confidence=confidence, **found)
+    return FailureProbability.of(state, stress=stress, confidence=confidence, **found)
 
 
 def _certain(stress: float, low: float, high: float) -> dict[str, Any]:

@@ -30,25 +30,15 @@ FEWEST = 16
 class LimitState:
     """Stress at onset as a function of standard normal draws; see `stiction.external.limit_state`.
 
-    Attributes
-    ----------
-    experiment : Experiment
-    event : {"critical_stress", "first_instability"}
-        Which of the method's stresses.
-    per_pressure : bool
-        Whether stresses are taken per normal pressure: where that is random, each is multiplied by
-        the mean pressure over that of its sample, so that one number stands for a coefficient.
-    workers : int
-        Threads; the numbers do not depend on this.
-    meter : Meter
-        Counts the samples.
+    Stresses may be taken per normal pressure: where that is random, each is multiplied by the mean
+    pressure over that of its sample, so that one number stands for a coefficient.
     """
 
     experiment: Experiment
-    event: Event = "critical_stress"
+    event: Event = "critical_stress"  # which of the method's stresses
     per_pressure: bool = False
-    workers: int = 1
-    meter: Meter = SILENT
+    workers: int = 1  # threads; the numbers do not depend on this
+    meter: Meter = SILENT  # counts the samples
 
     @cached_property
     def _portions(self) -> Portions:

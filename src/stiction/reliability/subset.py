@@ -31,29 +31,15 @@ ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='pla
 
 
 class Population(NamedTuple):
-    """Samples of one level: standard normal, given that the value is below `ceiling`.
-
-    Attributes
-    ----------
-    ceiling : float
-    log_probability : float
-        Logarithm of the estimated probability of the level.
-    values : (samples,) array
-    ancestors : (samples,) int array
-        The sample of the first level that each descends from.
-    draws : (samples, dimension) array
-        Empty for early levels.
-    acceptance, step : float
-        Share of Metropolis steps accepted, and b at the end; the first level has none.
-    """
+    """Samples of one level: standard normal, given that the value is below `ceiling`."""
 
     ceiling: float
-    log_probability: float
-    values: Array
-    ancestors: NDArray[np.int64]
-    draws: Array
-    acceptance: float = 1.0
-    step: float = FIRST_STEP
+    log_probability: float  # of the level
+    values: Array  # (samples,)
+    ancestors: NDArray[np.int64]  # the sample of the first level that each descends from
+    draws: Array  # (samples, dimension); empty for early levels
+    acceptance: float = 1.0  # share of Metropolis steps
+    step: float = FIRST_STEP  # b at the end
 
     def light(self) -> Self:
         """Return the same without draws, which take nearly all of the memory."""
@@ -63,20 +49,11 @@ class Population(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    Attributes
-    ----------
-    samples : int
-        N, samples of the first level and, within a few, of each other.
-    populations : list of Population
-    threshold : float
-        Below it lies the share of the last population that would go on; the failures, if complete.
-    evaluations : int
-        Calls of the function, counted by samples.
-    complete : bool
-        Whether it reached the threshold or the probability.
+    Below the threshold lies the share of the last population that would go on: the failures, if the
+    repetition is complete, that is if it reached the threshold or the probability asked for.
     """
 
-    samples: int
+    samples: int  # N, of the first level and, within a few, of each other
     populations: list[Population]
     threshold: float
     evaluations: int

@@ -30,21 +30,12 @@ POOR = 0.02
 
 
 class Tail(NamedTuple):
-    """The lower tail of the stress at onset from pooled repetitions.
+    """The lower tail of the stress at onset from pooled repetitions."""
 
-    Attributes
-    ----------
-    repetitions : sequence of Descent or of Bridge
-    algorithm, reason : str
-        'subset' or 'two_level', and why.
-    spent : int
-        Evaluations of the method in all, those to choose the algorithm included.
-    """
-
-    repetitions: Sequence[Any]
-    algorithm: str = "subset"
+    repetitions: Sequence[Any]  # all of type Descent, or all of type Bridge
+    algorithm: str = "subset"  # or 'two_level'
     reason: str = ""
-    spent: int = 0
+    spent: int = 0  # evaluations of the method, those to choose the algorithm included
 
     @property
     def complete(self) -> bool:
@@ -53,7 +44,7 @@ class Tail(NamedTuple):
 
     @property
     def reached(self) -> float:
-        """Pa; of the last level of a subset simulation that is not complete."""
+        """Stress of the last level of a subset simulation that is not complete, Pa."""
         return float(np.nextafter(self.repetitions[0].threshold, math.inf))
 
     def short_of(self, goal: str) -> str:
@@ -245,19 +236,15 @@ def sample_tail(
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(probability) if probability else stress)
 
-    def repeated() -> list[Any]:
+    while True:
         first, largest = SUBSET if guide is None else BRIDGE
         # Fewer than usual where the budget would not even hold four levels.
-        return repeat_until_precise(
+        found = repeat_until_precise(
             make, judge, target_cv=target_cv, first=min(first, max((budget - spent) // 4, 20)),
             largest=largest, max_evaluations=budget - spent, meter=state.meter,
         )  # fmt: skip
-
-    found = repeated()
-    if is_poor(found[0]):
         spent += sum(one.evaluations for one in found)
+        if not is_poor(found[0]):
+            return Tail(found, "subset" if guide is None else "two_level", reason, spent)
         reason += f"; of what fails by the {label} {found[0].share:.1%} fails: a poor guide"
         guide = None
-        found = repeated()
-    spent += sum(one.evaluations for one in found)
-    return Tail(found, "subset" if guide is None else "two_level", reason, spent)

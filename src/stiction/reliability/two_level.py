@@ -36,42 +36,25 @@ MARGIN = 2.5
 class Bridge(NamedTuple):
     """One repetition over both levels.
 
-    Attributes
-    ----------
-    samples : int
-        Exact evaluations meant for the middle factor.
-    rarest : float
-        Probability of the last level of the guide.
-    evaluations, first_stage_evaluations : int
-        Of the exact limit state and of the guide.
-    complete : bool
-        Whether the exact limit state was evaluated. If it found no failure, the estimate is zero:
-        leaving it out of a mean would favour repetitions that found one.
-    log_probability : float
-        Logarithm of the estimate of P(L < b).
-    values, ancestors : (samples,) arrays
-        Exact stress of samples with L < b, and the guide's first samples they descend from.
-    share : float
-        Share of them that fails.
-    last, last_variance : float
-        P(L < b | E < s), and the squared coefficient of variation of its estimate.
-    draws, stresses : arrays
-        Of failing samples.
+    It is complete if the exact limit state was evaluated. If that found no failure, the estimate is
+    zero: leaving it out of a mean would favour repetitions that found one.
     """
 
-    samples: int
-    rarest: float
-    evaluations: int
-    first_stage_evaluations: int
+    samples: int  # exact evaluations meant for the middle factor
+    rarest: float  # probability of the last level of the guide
+    evaluations: int  # of the exact limit state
+    first_stage_evaluations: int  # of the guide
     complete: bool = False
-    log_probability: float = -math.inf
-    values: Array = np.zeros(0)
-    ancestors: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    share: float = 0.0
-    last: float = 1.0
-    last_variance: float = 0.0
-    draws: Array = np.zeros((0, 0))
-    stresses: Array = np.zeros(0)
+    log_probability: float = -math.inf  # logarithm of P(L < b)
+    values: Array = np.zeros(0)  # E of samples with L < b
+    ancestors: NDArray[np.int64] = np.zeros(
+        0, dtype=np.int64
+    )  # in the first level of the guide
+    share: float = 0.0  # of them that fails
+    last: float = 1.0  # P(L < b | E < s)
+    last_variance: float = 0.0  # squared coefficient of variation of its estimate
+    draws: Array = np.zeros((0, 0))  # of failing samples
+    stresses: Array = np.zeros(0)  # theirs
 
     def light(self) -> Self:
         """Return the same; nothing in it is large."""
