@@ -42,9 +42,8 @@ ONSET = (
 StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
-LoadingRate = Annotated[
-    float, Option(help="Pa/s, of a rupture that the study does not describe.")
-]
+LOADING_RATE = 2e7
+"""Pa/s, of a rupture if the method of the study is another one."""
 
 
 # -- what commands share -------------------------------------------------------------------------
@@ -105,9 +104,7 @@ def _executor(scheduler: str | None) -> Iterator[Any]:
         from distributed import Client
 
         client = Client(scheduler)
-    except ImportError:
-        raise InputError("--scheduler: needs distributed, which is not installed") from None
-    except (OSError, ValueError, TypeError) as error:
+    except (ImportError, OSError, ValueError, TypeError) as error:
         raise InputError(f"--scheduler: {scheduler} cannot be reached: {error}") from None
     with client:
         yield client.get_executor(pure=False)
@@ -155,12 +152,9 @@ def run(
                 pilot=pilot,
             )
     except KeyboardInterrupt:
-        try:
-            state = open_run(out).status()
-            done = f"{state.done} of {state.samples} samples are stored in {out}"
-        except RunError:
-            done = "nothing is stored yet"
-        echo(f"interrupted: {done}; the same command goes on", err=True)
+        echo(
+            f"interrupted: what is done is stored in {out}; the same command goes on", err=True
+        )
         raise typer.Exit(130) from None
     dims = [axis.dim for axis in loaded.axes]
     for name in ("critical_stress", "friction_coefficient"):
@@ -187,20 +181,16 @@ def status(run: RunPath) -> None:
 
     stored = open_run(run)
     state, study = stored.status(), stored.study
-    share = 100.0 * state.done / state.samples
-    echo(f"{run}" + (f": {' '.join(study.title.split())}" if study.title else ""))
-    echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
+    each = study.ensemble.samples
+    echo(f"{run}: {' '.join(study.title.split())}".removesuffix(": "))
+    echo(f"  samples   {state.done} of {state.samples} ({100.0 * state.done / state.samples:.1f} %)")
     echo(f"  chunks    {state.chunks}, {state.bytes / 1e6:.3g} MB")
     echo(f"  computed  {duration(state.seconds)} of one core")
-    if study.sweep and not state.complete:
-        each = study.ensemble.samples
-        counts = zip(study.points, state.done_by_point, strict=True)
-        some = [
-            f"{name_point(point)}: {done} of {each}" for point, done in counts if done < each
-        ]
-        _show_some(some, "  ")
+    counts = zip(study.points, state.done_by_point, strict=True)
+    behind = [f"{name_point(one)}: {done} of {each}" for one, done in counts if done < each]
+    _show_some(behind if study.sweep else [], "  ")
+    _show_some(state.damaged, "  damaged   ")
     if state.damaged:
-        _show_some(state.damaged, "  damaged   ")
         echo("  running the study again mends this")
     else:
         echo("  verified  everything that is stored is what was written")
@@ -273,12 +263,10 @@ def description(study: Any) -> dict[str, str]:
         keys = " with ".join(variable.long_name for _, variable in axis.coordinates.values())
         values = axis.coordinates[axis.dim][0]
         lines[f"axis {number}"] = f"{keys}: {axis.size} values, {values[0]} to {values[-1]}"
-    found: dict[tuple[str, str], list[float]] = {}
-    for point in some:
-        for key, value in _numbers(point).items():
-            found.setdefault(key, []).append(value)
-    for (title, unit), numbers in found.items():
-        ends = dict.fromkeys(f"{value:.5g}" for value in (min(numbers), max(numbers)))
+    numbers = [_numbers(point) for point in some]
+    for title, unit in dict.fromkeys(key for found in numbers for key in found):
+        each = [found[title, unit] for found in numbers if (title, unit) in found]
+        ends = dict.fromkeys(f"{value:.5g}" for value in (min(each), max(each)))
         lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
 
@@ -287,14 +275,14 @@ def _numbers(point: Any) -> dict[tuple[str, str], float]:
     """What is worth knowing of a point, by title and unit."""
     problem, field = point.problem, point.random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
-    found = {("mean strength", unit): field.mean}
-    found["its deviation", unit] = field.standard_deviation
-    found["its correlation", "m to 1/e"] = field.efolding_length()
-    try:
-        length = problem.nucleation_length
-    except InputError:  # it varies along the interface
+    found = {
+        ("mean strength", unit): field.mean,
+        ("its deviation", unit): field.standard_deviation,
+        ("its correlation", "m to 1/e"): field.efolding_length(),
+    }
+    if problem.uniform_rate is None:  # the nucleation length varies along the interface
         return found
-    found["nucleation length", "m"] = length
+    length = found["nucleation length", "m"] = problem.nucleation_length
     found["nodes in it", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
     for dim, whole in zip(problem.interface.dims, problem.interface.lengths, strict=True):
         found[f"L / h_n along {dim}", ""] = whole / length
@@ -308,24 +296,20 @@ def _methods_that_apply(experiment: Any) -> dict[str, str]:
     from stiction.ensemble.pilot import compare
     from stiction.methods import methods
 
-    local, exact, dynamic = (
-        methods()[n] for n in ("local_criterion", "equilibrium", "rupture")
-    )
+    local = methods()["local_criterion"]()
     lines = {}
     for method, text in (
-        (local(), "applies"),
-        (exact(), "exact"),
-        (dynamic(loading_rate=1.0), "with inertia; depends on the loading rate"),
+        (local, "applies"),
+        (methods()["equilibrium"](), "exact"),
+        (methods()["rupture"](loading_rate=LOADING_RATE), "with inertia"),
     ):
         refused = method.supports(experiment.problem)
-        lines[method.label] = f"does not apply: {'; '.join(refused)}" if refused else text
-    if lines[local().label] == "applies":
-        found = compare(experiment.by(local()))
-        if found is not None:
-            lines[local().label] = (
+        if method is local and not refused and (found := compare(experiment.by(local))):
+            text = (
                 f"{100.0 * found.bias:+.2g} % of the exact onset on average, with a scatter of"
                 f" {100.0 * found.scatter:.2g} % (a pilot of {found.samples} samples)"
             )
+        lines[method.label] = f"does not apply: {'; '.join(refused)}" if refused else text
     return lines
 
 
@@ -413,7 +397,6 @@ def onset(
     study: StudyFile,
     strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
     method: Annotated[list[str] | None, Option(help="Only this one (repeatable).")] = None,
-    loading_rate: LoadingRate = 2e7,
     **reading: Any,
 ) -> None:
     """At which load, and where, does one interface of given strength begin to slide?
@@ -421,7 +404,8 @@ def onset(
     Takes the problem from a study file, which needs nothing else, and the strength from PROFILE:
     .npy, text (.csv, .txt, ...) or NetCDF, with or without x, in Pa and m unless it states units,
     as in 'x (mm); strength (MPa)'; of a plane .npy of shape (nx, ny). Asks every method that
-    applies. That of the study keeps its options; the others take their defaults.
+    applies. That of the study keeps its options; the others take their defaults, and a rupture a
+    loading rate of 2e7 Pa/s.
     """
     import pandas as pd
 
@@ -440,10 +424,9 @@ def onset(
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     for name in method or methods():
-        options = {"loading_rate": loading_rate} if name == "rupture" else {}
+        options = {"loading_rate": LOADING_RATE} if name == "rupture" else {}
         try:
-            given = own is not None and own.type == name
-            one = own if given else methods()[name](**options)
+            one = own if own is not None and own.type == name else methods()[name](**options)
             with Meter(f"onset by {name}"):
                 found = table_of(find(problem, profile, method=one))
             rows[name] = {key: v[0] for key, v in found.items() if key.startswith(ONSET)}
@@ -468,7 +451,6 @@ def rupture(
         Path | None,
         Option(metavar="PROFILE", help="Instead of a sample; see `stiction onset`."),
     ] = None,
-    loading_rate: LoadingRate = 2e7,
     film: Annotated[bool, Option("--film", help="Also a film, rupture.gif.")] = False,
     **reading: Any,
 ) -> None:
@@ -477,7 +459,8 @@ def rupture(
     Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
     Writes `rupture.nc` (slip, slip rate and stress over time and x), and as PNG and PDF `rupture`
     (slip rate in space and time, load, strength) and `front` (where the rupture front is and how
-    fast), and with --film an animation.
+    fast), and with --film an animation. The loading rate is that of the study's method `rupture`,
+    else 2e7 Pa/s.
     """
     from stiction import plot
     from stiction.dynamics.method import Rupture
@@ -497,7 +480,7 @@ def rupture(
         problem, method, save = setup.problem, setup.method, setup.save
         profiles = read_strength(strength, problem, **reading)
     if not isinstance(method, Rupture):
-        method = Rupture(loading_rate=loading_rate)
+        method = Rupture(loading_rate=LOADING_RATE)
     result = simulate_rupture(problem, profiles, method=method, save=save)
     write_result(result, out / "rupture.nc")
     echo(_summary(result))
