@@ -183,7 +183,8 @@ def status(run: RunPath) -> None:
     state, study = stored.status(), stored.study
     each = study.ensemble.samples
     echo(f"{run}: {' '.join(study.title.split())}".removesuffix(": "))
-    echo(f"  samples   {state.done} of {state.samples} ({100.0 * state.done / state.samples:.1f} %)")
+    share = 100.0 * state.done / state.samples
+    echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
     echo(f"  chunks    {state.chunks}, {state.bytes / 1e6:.3g} MB")
     echo(f"  computed  {duration(state.seconds)} of one core")
     counts = zip(study.points, state.done_by_point, strict=True)
