@@ -37,6 +37,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "mathml",
+    "see_also",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["README.md", "_build", "**/GALLERY_HEADER.rst", "**/*.ipynb", "gallery/*"]

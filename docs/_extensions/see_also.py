@@ -1,0 +1,38 @@
+"""Related functions below each docstring: everything that shares a row with it in `ROWS`."""
+
+ROWS = """
+    Problem Solid Interface Load LinearWeakening
+    LinearWeakening ExponentialWeakening PiecewiseWeakening
+    Load EdgeLoad GradientLoad
+    RandomField RandomInterface read_profile fit_field plot.field
+    Beta Lognormal Weibull Gamma TruncatedNormal
+    PowerLawSpectrum SquaredExponentialSpectrum ExponentialSpectrum CustomSpectrum
+    LocalCriterion Equilibrium Rupture
+    onset monte_carlo equilibrium_path simulate_rupture
+    onset plot.onset
+    monte_carlo Study plot.monte_carlo plot.quantiles
+    simulate_rupture Save Rupture plot.rupture plot.film statistics.misfit
+    failure_probability failure_curve design_stress external.limit_state
+    failure_curve plot.failure_curve theory.rice_distribution
+    failure_probability plot.weak_spots
+    fit_field plot.fit
+    infer read_peaks design_of_tests plot.posterior external.simulator
+    statistics.density statistics.quantiles statistics.combined_mean
+    theory.nucleation_stress theory.nucleation_statistics theory.rice_distribution
+    theory.griffith_length theory.energy_release_rate
+    Study Ensemble open_run monte_carlo
+""".split("\n")
+ROWS = [[f"stiction.{name}" for name in row.split()] for row in ROWS if row.strip()]
+
+
+def _append(app, what, name, obj, options, lines):
+    related = [other for row in ROWS if name in row for other in row if other != name]
+    if related and "See Also" not in lines:
+        names = ", ".join(f":obj:`~{other}`" for other in dict.fromkeys(related))
+        lines += ["", "See Also", "--------", names]
+
+
+def setup(app):
+    # Before numpydoc, which turns the section into a box.
+    app.connect("autodoc-process-docstring", _append, priority=100)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
