@@ -21,12 +21,12 @@ ROWS = """
     theory.nucleation_stress theory.nucleation_statistics theory.rice_distribution
     theory.griffith_length theory.energy_release_rate
     Study Ensemble open_run monte_carlo
-""".split("\n")
-ROWS = [[f"stiction.{name}" for name in row.split()] for row in ROWS if row.strip()]
+"""
+_RELATED = [[f"stiction.{name}" for name in row.split()] for row in ROWS.splitlines()]
 
 
 def _append(app, what, name, obj, options, lines):
-    related = [other for row in ROWS if name in row for other in row if other != name]
+    related = [other for row in _RELATED if name in row for other in row if other != name]
     if related and "See Also" not in lines:
         names = ", ".join(f":obj:`~{other}`" for other in dict.fromkeys(related))
         lines += ["", "See Also", "--------", names]
