@@ -1,8 +1,12 @@
-"""The how-tos of examples/: each runs, says something readable, and what it says is right."""
+"""How-tos and other scripts run, the long ones in small, and what they find is right."""
 
 import ast
+import dataclasses
+import importlib
+import itertools
 import re
 import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -150,3 +154,122 @@ def test_the_tables_list_every_how_to():
     for page in ("README.md", "docs/README.md"):
         text = (ROOT / page).read_text()
         assert [name for name in HOW_TOS if f"examples/{name}.py" not in text] == []
+
+
+def load(name):
+    """A script as a module."""
+    sys.path[:0] = [str(EXAMPLES), str(ROOT / "validation")]
+    try:
+        return importlib.import_module(name)
+    finally:
+        del sys.path[:2]
+
+
+def test_friction_laws(capsys):
+    load("friction_laws").main(nodes=256)
+    assert "exponential" in capsys.readouterr().out
+
+
+def test_path(tmp_path):
+    example = load("equilibrium_path")
+    tau_p, onset, path = example.compute(nodes=256)
+    # The last state is 1e-9 below the onset: its stress is the critical stress, its patches too.
+    assert path.mean_stress.values[-1] == pytest.approx(onset.critical_stress.item(), rel=2e-9)
+    slipping = path.slip.values[-1] > 0.0
+    starts = np.count_nonzero(slipping & ~np.roll(slipping, 1))
+    assert starts == onset.slip_patches.item()
+    example.draw(tmp_path, tau_p, onset, path)
+    assert (tmp_path / "equilibrium_path.png").stat().st_size > 10_000
+
+
+def test_memory_script():
+    found = load("memory").compute()
+    # 4.8e-8, 2.1e-6 and 1.3e-3 on the page.
+    assert found["exponentials, 1e-06"].max() < 1e-6
+    assert found["exponentials, 1e-04"].max() < 1e-4
+    assert 1e-4 < found["history cut at 100"].max() < 1e-2
+
+
+def test_energy_script():
+    errors = load("energy").compute()
+    order = np.log2(errors[0][1] / errors[1][1])
+    assert order == pytest.approx(2.0, abs=0.3)  # 1.93 on the page
+
+
+def test_onset_script():
+    found = load("onset").compute(nodes=256, samples=2, rates=(1e5, 2e7))
+    for difference in found.values():
+        assert np.abs(difference[0]).max() < 5e-6
+        assert np.abs(difference[1]).max() < 1e-3
+
+
+def test_grid_script():
+    found = load("grid").compute((0.25,), (512, 2048), samples=2)
+    slip, stress = found[0.25, 512]
+    # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
+    assert 1e-4 < slip.max() < 0.04
+    assert stress.max() < 1e-3
+
+
+@pytest.mark.slow
+def test_remaining_scripts(tmp_path):
+    waves = load("waves")
+    errors = waves.compute()
+    assert errors[0][1] / errors[1][1] == pytest.approx(4.0, abs=0.4)
+    waves.draw(tmp_path, errors)
+    kernels = load("kernels")
+    for (_, tolerance), (pairs, error) in kernels.compute().items():
+        assert error < 1.2 * tolerance
+        assert pairs <= 26
+    kernels.draw(tmp_path)
+    speeds = load("rupture_speed")
+    curves = speeds.compute((0.5, 2.0))
+    speeds.draw(tmp_path, curves)
+    assert np.nanmean(curves[0.5][1][-50:]) == pytest.approx(1.865, abs=0.01)
+    assert np.nanmean(curves[2.0][1][-50:]) == pytest.approx(0.993, abs=0.003)
+    assert len(list(tmp_path.glob("*.png"))) == 3
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_line_and_plane_in_small(tmp_path, monkeypatch, capsys):
+    """Eight nodes in h_n, six samples, and one correlation length."""
+    study = load("line_and_plane")
+    coarse = [
+        dataclasses.replace(case, nodes=16 if "fine" in case.name else 8)
+        for case in study.CASES
+    ]
+    monkeypatch.setattr(study, "CASES", tuple(coarse))
+    monkeypatch.setattr(study, "RATIOS", (0.5,))
+    monkeypatch.setattr(study, "NEIGHBOURS", 2)
+    arguments = [str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)]
+    drawing = load("line_and_plane_figures")
+    drawn = []  # laying out and writing the figures takes longer than all the rest
+    monkeypatch.setattr(study, "draw", lambda folder, *shown: drawn.append(shown))
+    study.main(arguments)
+    assert (
+        "| xi_0/h_n | line, 16 h_n | line, 64 h_n | plane, 4 h_n | plane, 8 h_n |"
+        in capsys.readouterr().out
+    )
+    assert [len(figure.axes) for figure in drawing.figures(*drawn[0]).values()] == [3, 4, 4]
+    found = study.compute(tmp_path / "runs", 6, progress=False)  # what is stored
+    plane = found["plane, small"]
+    # The local criterion is an upper bound of the discrete problem, up to the gap of 1e-6.
+    assert np.all(study.lowering(plane) > -1e-4)
+    assert plane.sizes["sample"] == 6
+    # Finer nodes carry the same samples: 8 in h_n cost a per cent at most.
+    fine = found["plane, small, fine"]
+    np.testing.assert_allclose(fine.first_instability, plane.first_instability, rtol=0.01)
+    # Slip that is held back near the critical patch can only raise the onset.
+    (far,) = study.split(study.CASES[2], plane)["far"]
+    assert far.value > 0.0
+    line, wide = (study.lowering(found[f"{kind}, small"]).mean() for kind in ("line", "plane"))
+    assert wide > line
+
+
+def test_weakest_link_is_the_mean_over_all_choices():
+    study = load("line_and_plane")
+    values = np.random.default_rng(0).normal(size=9)
+    least = [min(chosen) for chosen in itertools.combinations(values, 4)]
+    # Sums of some hundred terms of order one, in another order.
+    assert study.weakest_link(values, 4) == pytest.approx(np.mean(least), rel=1e-12)
+    assert study.weakest_link(values, 1) == pytest.approx(values.mean(), rel=1e-12)
