@@ -284,21 +284,18 @@ class Problem:
         return tuple(length / spacing for length, spacing in lengths)
 
     def _check_resolution(self, highest_rate: float) -> None:
-        resolution, shape = (
-            min(self.nodes_in_nucleation_length(highest_rate)),
-            self.interface.shape,
-        )
+        resolutions = self.nodes_in_nucleation_length(highest_rate)
+        resolution, shape = min(resolutions), self.interface.shape
         if resolution < FEWEST_NODES:
+            length = self.nucleation_lengths(highest_rate)[resolutions.index(resolution)]
             finer = 2.0 * np.ceil(
                 0.5 * FEWEST_NODES * np.array(shape) / max(resolution, 1e-300)
             )
             raise InputError(
-                "interface.nodes: the nucleation length"
-                f" {self.nucleation_lengths(highest_rate)[0]:.3g} m spans {resolution:.2g} nodes;"
-                f" at least {FEWEST_NODES} are needed, that is interface.nodes >="
-                f" {' x '.join(f'{n:.10g}' for n in finer)}, got"
-                f" {' x '.join(map(str, shape))}; if that is far, check the units of all lengths,"
-                " moduli and strengths"
+                f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g}"
+                f" nodes; at least {FEWEST_NODES} are needed, that is interface.nodes >="
+                f" {' x '.join(f'{n:.10g}' for n in finer)}, got {' x '.join(map(str, shape))}; if"
+                " that is far, check the units of all lengths, moduli and strengths"
             )
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:

@@ -212,3 +212,10 @@ def test_draws_move_along_the_plane():
     draws = rng.standard_normal((3, shift.size))
     direct = draws @ mixture.moved(np.arange(plane.size)).T
     np.testing.assert_allclose(mixture.projections(draws), direct, atol=1e-10)
+
+
+def test_a_plane_that_is_short_across_against_its_anisotropy_is_warned_of():
+    """z falls to 1/e within 14 mm along y, 0.9 mm along x: the plane is 2.1 such lengths across."""
+    field = field_of(st.PowerLawSpectrum(1.6e-3), anisotropy=16.0)
+    with pytest.warns(st.AccuracyWarning, match="only 2.1 e-folding lengths long"):
+        field.sample(st.Interface(length=(0.04, 0.03), nodes=(128, 32)))

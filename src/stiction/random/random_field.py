@@ -252,7 +252,9 @@ class RandomField:
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
                 f" grid does not resolve (interface.nodes >= {enough} resolves all)"
             )
-        ratio = min(interface.lengths) / self.spectrum.efolding_length
+        across = 1.0 if self.anisotropy is None else self.anisotropy
+        spans = np.array(interface.lengths) / [1.0, across][: len(interface.shape)]
+        ratio = float(spans.min()) / self.spectrum.efolding_length
         if self.mean_mode or ratio >= FEWEST_LENGTHS:
             return
         lowest = _lowest_correlation(self, interface)
