@@ -46,6 +46,18 @@ def test_a_study_file_is_the_same_as_the_calls(study):
     assert st.open_run("RUN").study == read
 
 
+def test_measured_values_and_their_places_may_state_other_units():
+    field, x = st.Study.from_dict(small_study()).random.strength, np.array([0.01, 0.02, 0.03])
+    values = np.array([0.8e6, 0.9e6, 1.0e6])
+    plain = field.given(xr.DataArray(values, {"x": x}, "x"), noise=20e3)
+    places = ("x", x * 1e3, {"units": "mm"})
+    stated = xr.DataArray(values * 1e-6, {"x": places}, "x", attrs={"units": "MPa"})
+    found = field.given(stated, noise=20e3).conditions.profile
+    np.testing.assert_allclose(found, plain.conditions.profile, rtol=1e-15)
+    with pytest.raises(st.InputError, match="state a known unit, not 'furlong'"):
+        field.given(stated.assign_attrs(units="furlong"), noise=20e3)
+
+
 def test_noise_and_scatter_can_be_swept(study):
     found = st.Study.from_dict(study | {"sweep": SWEEP}, folder=".").run(progress=False)
     assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 30}

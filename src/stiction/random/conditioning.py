@@ -33,6 +33,7 @@ from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 from stiction.random.synthesis import condition
+from stiction.units import parse
 
 NEGLIGIBLE = 1e-8
 """Singular values below which a direction of the draws stays as it is, to round-off."""
@@ -65,15 +66,23 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
-        value = value.transpose(*names)
-        places = np.meshgrid(*(value[name].values for name in names), indexing="ij")
-        rows = [*places, value.values]
+        places = np.meshgrid(*(_in_si(value[name]) for name in names), indexing="ij")
+        rows = [*places, _in_si(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     points = points[:, np.isfinite(points).all(axis=0)]
     if points.shape[1] == 0:
         raise ValueError("must hold at least one value")
     points.flags.writeable = False
     return points
+
+
+def _in_si(array: Any) -> Array:
+    """Values of a labelled array, in SI if it states a unit."""
+    stated = str(array.attrs.get("units") or array.attrs.get("unit") or "1")
+    unit = parse(stated)
+    if unit is None:
+        raise ValueError(f"must be in SI or state a known unit, not {stated!r}")
+    return np.asarray(array.values) * unit.factor
 
 
 def _table(points: Array) -> dict[str, list[float]]:
