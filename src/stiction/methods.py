@@ -25,7 +25,6 @@ from stiction.results import (
     ONSET_VARIABLES,
     SAMPLE,
     Variable,
-    coordinate,
     to_dataset,
 )
 
@@ -88,9 +87,7 @@ class Method(Protocol):
         """A solver of samples; what is the same for all of them is computed here, once."""
 
 
-MEMBERS = (
-    "type", "label", "chunk_size", "variables", "seconds_per_sample", "supports", "prepare",
-)  # fmt: skip
+MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
 
 
 @lru_cache(maxsize=1)
@@ -164,14 +161,14 @@ def _check_values(
     sizes |= {"sample": sample.samples, DIRECTION: 2}
     problems = [f"does not return {name!r}" for name in variables if name not in values]
     for name, found in values.items():
-        dims = variables[name].dims if name in variables else ()
-        shape = tuple(sizes.get(dim) for dim in dims)
         if name not in variables:
             problems.append(f"returns {name!r}, which is none of its variables")
-        elif found.shape != shape and None not in shape:
-            over = ", ".join(dims)
+            continue
+        dims = variables[name].dims
+        shape = tuple(sizes.get(dim) for dim in dims)
+        if found.shape != shape and None not in shape:
             problems.append(
-                f"returns {name!r} of shape {found.shape}, not {shape} over ({over})"
+                f"returns {name!r} of shape {found.shape}, not {shape} over ({', '.join(dims)})"
             )
     if problems:
         raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
@@ -208,12 +205,10 @@ def label(
 ) -> xr.Dataset:
     """Label values of many samples: a dataset over 'sample', and the nodes where they differ."""
     variables = variables_of(problem, method, "friction_coefficient" in values)
-    variables |= dict(more_variables)
-    coordinates: dict[str, tuple[NDArray[Any], Variable]] = {"sample": (samples, SAMPLE)}
-    used = {dim for name in values for dim in variables[name].dims}
-    for dim in sorted(used & {*problem.interface.dims, DIRECTION}):
-        coordinates[dim] = coordinate(problem.interface, dim)
-    return to_dataset(values, variables, coordinates, attributes)
+    coordinates = {"sample": (samples, SAMPLE)}
+    return to_dataset(
+        values, variables | dict(more_variables), coordinates, attributes, problem.interface
+    )
 
 
 @checked

@@ -87,10 +87,12 @@ def to_dataset(
     variables: Mapping[str, Variable],
     coordinates: Mapping[str, tuple[NDArray[Any], Variable]],
     attributes: Mapping[str, Any],
+    interface: Interface | None = None,
 ) -> xr.Dataset:
     """Label arrays with dimensions, coordinates, units and long names.
 
-    Of the attributes, strings and numbers are kept; anything else is written as JSON.
+    Of the attributes, strings and numbers are kept; anything else is written as JSON. The places of
+    nodes are added if they lie on one `interface`.
     """
     import xarray as xr
 
@@ -102,6 +104,11 @@ def to_dataset(
     attrs |= {f"{library}_version": version(library) for library in ("numpy", "numba")}
     for name, value in attributes.items():
         attrs[name] = value if isinstance(value, str | int | float) else json.dumps(value)
+    coordinates = dict(coordinates)
+    if interface is not None:
+        used = {dim for name in values for dim in variables[name].dims}
+        for dim in sorted(used & {*interface.dims, DIRECTION}):
+            coordinates[dim] = coordinate(interface, dim)
     return xr.Dataset(
         {name: labelled(array, variables[name]) for name, array in values.items()},
         coords={name: labelled(*given) for name, given in coordinates.items()},

@@ -17,7 +17,7 @@ from stiction.equilibrium.solver import (
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, check_memory, real_array, to_plain
 from stiction.problem import Problem
-from stiction.results import Variable, along, coordinate, to_dataset
+from stiction.results import Variable, along, to_dataset
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {
@@ -143,7 +143,5 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
-    dims = (*interface.dims, "direction") if interface.is_plane else interface.dims
-    coordinates |= {dim: coordinate(interface, dim) for dim in dims}
     attributes = {"study": {"problem": to_plain(problem)}}
-    return to_dataset(values, variables, coordinates, attributes)
+    return to_dataset(values, variables, coordinates, attributes, interface)
