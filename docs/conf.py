@@ -10,6 +10,8 @@ from pathlib import Path
 
 import click
 import typer.main
+from matplotlib.figure import Figure
+from sphinx_gallery.scrapers import figure_rst
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -75,6 +77,17 @@ autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
 templates_path = ["_templates"]
 
+
+def scrape_figure(block, block_vars, gallery_conf):
+    """Return the picture of a `figure` that pyplot does not manage, as `st.plot.fit` returns it."""
+    figure = block_vars["example_globals"].get("figure")
+    if not isinstance(figure, Figure) or figure.canvas.manager is not None:
+        return ""
+    path = next(block_vars["image_path_iterator"])
+    figure.savefig(path, dpi=150)
+    return figure_rst([path], gallery_conf["src_dir"])
+
+
 # The how-tos that README.md lists, with what the gallery wants of a script: a title that is marked.
 HOW_TOS = re.findall(r"examples/(\w+)\.py\)? \|", (HERE / "README.md").read_text("utf-8"))
 SCRIPTS = ROOT / "build" / "how-to"
@@ -83,6 +96,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["how-to", "pictures"],
     "backreferences_dir": "api/backreferences",
     "doc_module": ("stiction",),
+    "image_scrapers": ("matplotlib", scrape_figure),
     "thumbnail_size": (480, 320),
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",

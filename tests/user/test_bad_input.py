@@ -90,7 +90,6 @@ MISTAKES = {
     "arrest ... True or False ... 'no'": lambda: st.theory.griffith_length(
         make_problem(), 1e6, 1.0, arrest="no"
     ),
-    "whole ... True or False ... got 1": lambda: st.plot.rupture(None, whole=1),
     "seed ... -1 ... >= 0": lambda: make_strength().sample(LINE, seed=-1),
     "seed ... whole ... '1'": lambda: st.theory.rice_distribution(
         make_problem(), make_strength(), seed="1"

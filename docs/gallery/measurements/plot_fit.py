@@ -5,9 +5,6 @@ A field fitted to a record
 Histogram, quantiles, correlation and spectrum of a record of strength and of the fitted field.
 """
 
-import io
-
-import matplotlib.pyplot as plt
 import xarray as xr
 
 import stiction as st
@@ -20,13 +17,3 @@ record = xr.DataArray(
 ).assign_attrs(units="Pa")
 found = st.fit_field(record, marginal=["weibull", "lognormal"], bootstrap=50, seed=0)
 figure = st.plot.fit(found)
-
-# %%
-# The functions for fits return a figure of several panels, which is saved as any other:
-
-image = io.BytesIO()
-figure.savefig(image, dpi=150)
-image.seek(0)
-axes = plt.figure(figsize=figure.get_size_inches()).add_axes((0, 0, 1, 1))
-axes.axis("off")
-axes.imshow(plt.imread(image))

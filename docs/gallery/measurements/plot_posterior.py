@@ -5,10 +5,6 @@ A posterior from peak stresses
 The lower bound of the strength from 25 synthetic tests, and the peaks that it predicts.
 """
 
-import io
-
-import matplotlib.pyplot as plt
-
 import stiction as st
 
 problem = st.paper.problem(nodes=256)
@@ -18,13 +14,3 @@ peaks = st.monte_carlo(problem, strength, method=method, samples=25, seed=7).cri
 prior = {"marginal.low": (0.4e6, 0.8e6), "marginal.high": (1.2e6, 2.2e6)}
 found = st.infer(problem, strength, peaks.values, prior=prior, method=method, load_cell_error=4e3)
 figure = st.plot.posterior(found)
-
-# %%
-# The functions for fits return a figure of several panels, which is saved as any other:
-
-image = io.BytesIO()
-figure.savefig(image, dpi=150)
-image.seek(0)
-axes = plt.figure(figsize=figure.get_size_inches()).add_axes((0, 0, 1, 1))
-axes.axis("off")
-axes.imshow(plt.imread(image))

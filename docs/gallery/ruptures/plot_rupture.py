@@ -17,11 +17,6 @@ run = st.simulate_rupture(problem, tau_p, method=method, save=st.Save(every=4))
 st.plot.rupture(run)
 
 # %%
-# The whole run, most of it creep:
-
-st.plot.rupture(run, whole=True)
-
-# %%
 
 film = st.plot.film(run, Path(tempfile.mkdtemp()) / "rupture.gif", frames=10)
 print(film.stat().st_size // 1000, "kB")

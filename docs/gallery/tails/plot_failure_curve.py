@@ -11,8 +11,3 @@ problem = st.paper.problem(nodes=512)
 strength = st.paper.strength(problem, correlation_ratio=1.0)
 curve = st.failure_curve(problem, strength, method=st.LocalCriterion(), smallest=1e-6)
 st.plot.failure_curve(curve)
-
-# %%
-# Against the stress above the least strength the tail is a straight line:
-
-st.plot.failure_curve(curve, above_bound=True)

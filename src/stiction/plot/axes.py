@@ -11,17 +11,18 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from stiction.errors import InputError
+from stiction.interface import Interface
+from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
 from stiction.results import FRICTION_COEFFICIENT
 
-_MULTIPLES: dict[str, tuple[tuple[float, str], ...]] = {
-    "m": ((1e-3, "km"), (1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")),
-    "s": ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")),
-    "Pa": ((1e-6, "MPa"), (1e-3, "kPa"), (1.0, "Pa")),
+_MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
+    "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
+    "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),
+    "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
 }
-_LEAST = {"m": 1.0, "s": 1.0, "Pa": 0.1}
-"""Largest value on a scale from which on a unit is used, in that unit."""
+"""Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
 
 
 def unit_for(units: str, values: Any) -> tuple[float, str]:
@@ -30,11 +31,10 @@ def unit_for(units: str, values: Any) -> tuple[float, str]:
         return 1.0, "" if units == "1" else units
     array = np.asarray(values, dtype=np.float64)
     largest = float(np.max(np.abs(array[np.isfinite(array)]), initial=0.0))
-    suited = (
-        step for step in _MULTIPLES[units] if largest * step[0] >= _LEAST[units] * (1.0 - 1e-9)
-    )
-    last = _MULTIPLES[units][0 if largest == 0.0 else -1]
-    return next(suited, last)
+    least, multiples = _MULTIPLES[units]
+    suited = [unit for unit, f in multiples.items() if largest * f >= least * (1.0 - 1e-9)]
+    unit = suited[0] if suited else list(multiples)[-1 if largest else 0]
+    return multiples[unit], unit
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -71,39 +71,22 @@ def add_legend(axes: Axes, given: Axes | None) -> None:
 
 
 def problem_of(result: Any, problem: Problem | None = None) -> Problem:
-    """Return the given problem, or the one in the attributes of a result.
-
-    Raises
-    ------
-    InputError
-        If there is neither.
-    """
+    """Return the given problem, or the one in the attributes of a result; else an `InputError`."""
     if problem is not None:
-        if not isinstance(problem, Problem):
-            raise InputError(f"problem: must be a Problem, got {type(problem).__name__}")
-        return problem
+        return check("problem", problem, Problem)
     try:
-        found: Problem = pydantic.TypeAdapter(Problem).validate_python(
-            json.loads(result.attrs["study"])["problem"]
-        )
+        plain = json.loads(result.attrs["study"])["problem"]
+        return pydantic.TypeAdapter(Problem).validate_python(plain)
     except (KeyError, TypeError, ValueError, InputError):
         raise InputError(
             "problem: the result does not hold all of it (a part exists in Python only, or was"
             " swept); give problem=..."
         ) from None
-    return found
 
 
 def need(result: Any, *names: str, hint: str = "") -> None:
-    """Refuse a result without these variables.
-
-    Raises
-    ------
-    InputError
-        Naming what is missing, what there is, and the hint.
-    """
-    if not isinstance(result, xr.Dataset):
-        raise InputError(f"result: must be an xarray.Dataset, got {type(result).__name__}")
+    """Refuse a result without these variables: an `InputError` that ends with the hint."""
+    check("result", result, xr.Dataset)
     missing = [name for name in names if name not in result]
     if missing:
         raise InputError(
@@ -117,40 +100,37 @@ def named(results: Any) -> dict[str, xr.Dataset]:
     if isinstance(results, xr.Dataset):
         results = [results]
     if not isinstance(results, Mapping):
-        results = {_method_of(one, number): one for number, one in enumerate(results)}
+        found: dict[str, Any] = {}
+        for number, one in enumerate(results):
+            name = _method_of(one) or f"result {number}"
+            found[f"{name}, result {number}" if name in found else name] = one
+        results = found
     if not results:
         raise InputError("result: is empty; give one result or several")
     return dict(results)
 
 
-def _method_of(result: Any, number: int) -> str:
+def _method_of(result: Any) -> str | None:
     try:
         return str(json.loads(result.attrs["study"])["method"]["type"])
     except (AttributeError, KeyError, TypeError, ValueError):
-        return f"result {number}"
+        return None
 
 
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
-    """Return what of an onset is drawn: the coefficient if there is a pressure, else the stress.
-
-    Raises
-    ------
-    InputError
-        If the result has no variable of that name.
-    """
-    if quantity is not None:
-        need(result, quantity)
-        return quantity
-    name = "friction_coefficient"
-    if name in result and bool(np.isfinite(result[name]).any()):
-        return name
-    need(result, "critical_stress")
-    return "critical_stress"
+    """Return what of an onset is drawn: the coefficient if there is a pressure, else the stress."""
+    if quantity is None:
+        name = "friction_coefficient"
+        has_pressure = name in result and bool(np.isfinite(result[name]).any())
+        quantity = name if has_pressure else "critical_stress"
+    need(result, quantity)
+    return quantity
 
 
-def scaled(variable: xr.DataArray) -> tuple[float, str, str]:
-    """Return factor, unit and label, such as 'critical stress (MPa)', of a variable."""
-    factor, unit = unit_for(str(variable.attrs.get("units", "1")), variable.values)
+def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, str]:
+    """Return factor, unit and label, such as 'critical stress (MPa)', for variables of a kind."""
+    values = np.concatenate([one.values.ravel() for one in (variable, *others)])
+    factor, unit = unit_for(str(variable.attrs.get("units", "1")), values)
     name = str(variable.name).replace("_", " ")
     if variable.name == "friction_coefficient":
         name = FRICTION_COEFFICIENT.long_name
@@ -158,17 +138,9 @@ def scaled(variable: xr.DataArray) -> tuple[float, str, str]:
 
 
 def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) -> None:
-    """Add a second scale on the other side: the stress over the mean normal pressure.
+    """Add a second scale on the other side: the stress over the mean normal pressure, if any.
 
-    Parameters
-    ----------
-    axes : Axes
-    problem : Problem
-        Without a normal pressure nothing is added.
-    which : {"x", "y"}
-        The scale of stresses.
-    factor : float
-        Of its unit.
+    `which` is the scale of stresses, "x" or "y", and `factor` that of its unit.
     """
     if problem.load.normal_pressure is None:
         return
@@ -179,3 +151,9 @@ def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) 
         axes.secondary_yaxis("right", functions=convert).set_ylabel(label)
     else:
         axes.secondary_xaxis("top", functions=convert).set_xlabel(label)
+
+
+def node_of(place: Any, interface: Interface) -> tuple[int, ...]:
+    """Return the node nearest to a place on an interface, m."""
+    steps = np.atleast_1d(place) / interface.spacings
+    return tuple(int(step) for step in np.round(steps).astype(int) % interface.shape)

@@ -58,11 +58,11 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
     'critical stress (MPa)'
     """
     results = named(result)
-    single = isinstance(result, xr.Dataset)
     quantity = shown_quantity(next(iter(results.values())), quantity)
     with on_axes(ax) as axes:
         along: list[str] = []
-        for number, (name, one) in enumerate(results.items()):
+        curves: list[tuple[str | None, xr.DataArray]] = []
+        for name, one in results.items():
             need(one, quantity)
             variable = one[quantity]
             along = _swept(variable)
@@ -71,25 +71,24 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
                     f"result: is swept over {', '.join(along)}; choose steps of all but one with"
                     f" result.isel({along[0]}=0)"
                 )
-            if along:
-                for i, step in enumerate(_chosen(variable.sizes[along[0]])):
-                    part = variable.isel({along[0]: step})
-                    _draw_values(axes, part, _step_text(variable[along[0]], step), i)
-            else:
-                text = None if single else name
-                _draw_values(axes, variable, text, number + len(axes.lines) * single)
-        _, unit, text = scaled(variable)
+            curves += _steps(variable, along[0]) if along else [(name, variable)]
+        single = isinstance(result, xr.Dataset) and not along
+        factor, unit, text = scaled(*(variable for _, variable in curves))
+        for number, (label, variable) in enumerate(curves, len(axes.lines) * single):
+            _draw_values(axes, variable, factor, None if single else label, number)
         axes.set_xlabel(text)
         axes.set_ylabel(f"density (1/{unit})" if unit else "density")
         axes.set_ylim(bottom=0.0)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(title=scaled(variable[along[0]])[2] if along else None)
+            axes.legend(title=scaled(one[along[0]])[2] if along else None)
     return axes
 
 
-def _draw_values(axes: Axes, variable: xr.DataArray, label: str | None, number: int) -> None:
+def _draw_values(
+    axes: Axes, variable: xr.DataArray, factor: float, label: str | None, number: int
+) -> None:
     """Draw the density of a variable; of positions a histogram, of few values marks."""
-    values = _finite(variable) * scaled(variable)[0]
+    values = _finite(variable) * factor
     if values.size == 0:
         return
     if variable.attrs.get("units") == "m":
@@ -144,34 +143,25 @@ def quantiles(
         )
     along = along or dims[0]
     within = next((dim for dim in dims if dim != along), None)
-    curves: list[tuple[str | None, xr.DataArray]] = [(None, variable)]
-    if within is not None:
-        steps = _chosen(variable.sizes[within])
-        curves = [
-            (_step_text(variable[within], step), variable.isel({within: step}))
-            for step in steps
-        ]
-    place, ticks = _places(variable[along])
+    curves = [(None, variable)] if within is None else _steps(variable, within)
+    place = variable[along].values
+    named_steps = place.dtype.kind not in "if" or np.unique(place).size < place.size
+    place = np.arange(1.0 * place.size) if named_steps else place * scaled(variable[along])[0]
     with on_axes(ax, height=3.2) as axes:
         for number, (label, part) in enumerate(curves):
-            table = _table(part, along)
+            values, errors = _quantiles(part, scaled(variable)[0], along)
             style: dict[str, Any] = {"color": color(number), "linewidth": 0}
             if label is None:
-                axes.fill_between(place, table[0], table[4], alpha=0.12, **style)
-            axes.fill_between(place, table[1], table[3], alpha=0.12 if label else 0.25, **style)
-            errors = np.abs(table[5:] - table[2])
-            axes.errorbar(
-                place,
-                table[2],
-                yerr=errors,
-                capsize=2,
-                label=label,
-                **series(number, marker=True),
-            )
+                axes.fill_between(place, values[0], values[4], alpha=0.12, **style)
+            pale = 0.12 if label else 0.25
+            axes.fill_between(place, values[1], values[3], alpha=pale, **style)
+            style = {"capsize": 2, "label": label, **series(number, marker=True)}
+            axes.errorbar(place, values[2], yerr=errors, **style)
         axes.set_xlabel(scaled(variable[along])[2])
         axes.set_ylabel(scaled(variable)[2])
-        if ticks is not None:
-            axes.set_xticks(place, ticks)
+        if named_steps:
+            names = [_step_text(variable[along], step) for step in range(place.size)]
+            axes.set_xticks(place, names)
         elif _is_geometric(place):
             axes.set_xscale("log")
             if place.size <= 8:  # powers of ten would not name the steps
@@ -187,10 +177,14 @@ def _swept(variable: xr.DataArray) -> list[str]:
     return [str(dim) for dim in variable.dims if dim not in ("sample", DIRECTION)]
 
 
-def _chosen(steps: int) -> list[int]:
-    """Return at most `CURVES` steps of a sweep, spread evenly."""
-    spread = np.linspace(0, steps - 1, min(CURVES, steps))
-    return [int(step) for step in np.unique(spread.round())]
+def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.DataArray]]:
+    """Return at most `CURVES` steps of a sweep, spread evenly, each with its name."""
+    last = variable.sizes[along] - 1
+    steps = np.unique(np.linspace(0, last, min(CURVES, last + 1)).round().astype(int))
+    names = [_step_text(variable[along], step) for step in steps]
+    return [
+        (name, variable.isel({along: step})) for name, step in zip(names, steps, strict=True)
+    ]
 
 
 def _finite(values: Any) -> NDArray[np.float64]:
@@ -198,29 +192,20 @@ def _finite(values: Any) -> NDArray[np.float64]:
     return array[np.isfinite(array)]
 
 
-def _table(part: xr.DataArray, along: str) -> NDArray[np.float64]:
-    """Return quantiles at `LEVELS` and the interval of the median, (7, steps), as drawn."""
-    factor = scaled(part)[0]
-    columns = []
+def _quantiles(
+    part: xr.DataArray, factor: float, along: str
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return quantiles (levels, steps), and errors of the median (2, steps), as drawn."""
+    found = np.full((len(LEVELS), part.sizes[along]), np.nan)
+    errors = found[:2].copy()
     for step in range(part.sizes[along]):
         values = _finite(part.isel({along: step})) * factor
-        if values.size == 0:
-            columns.append(np.full(7, np.nan))
-            continue
-        found = estimate_quantiles(values, LEVELS)
-        low = max(found.lower[2], values.min())
-        high = min(found.upper[2], values.max())
-        columns.append(np.concatenate([found.value, [low, high]]))
-    return np.array(columns).T
-
-
-def _places(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], list[str] | None]:
-    """Return the places of the steps on the axis, and their names if they are not numbers."""
-    values = coordinate.values
-    if values.dtype.kind in "if" and np.unique(values).size == values.size:
-        return values.astype(np.float64) * scaled(coordinate)[0], None
-    names = [_step_text(coordinate, i) for i in range(values.size)]
-    return np.arange(values.size, dtype=np.float64), names
+        if values.size:
+            one = estimate_quantiles(values, LEVELS)
+            found[:, step] = one.value
+            ends = max(one.lower[2], values.min()), min(one.upper[2], values.max())
+            errors[:, step] = np.abs(np.array(ends) - one.value[2])
+    return found, errors
 
 
 def _is_geometric(place: NDArray[np.float64]) -> bool:

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from stiction.errors import InputError
-from stiction.plot.axes import add_friction_scale, need, on_axes, problem_of, unit_for
+from stiction.plot.axes import add_friction_scale, need, node_of, on_axes, problem_of, unit_for
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET
 from stiction.problem import Problem
 from stiction.reliability.answer import FailureProbability, bounded
@@ -19,61 +18,44 @@ NEAR = 4.0
 NEAR_ON_A_PLANE = 2.0
 
 
-def failure_curve(
-    curve: xr.Dataset, *, above_bound: bool = False, ax: Axes | None = None
-) -> Axes:
+def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw P(onset < s) over decades, with its interval.
 
     Parameters
     ----------
     curve : Dataset
         From `stiction.failure_curve`.
-    above_bound : bool
-        Draw against the stress above the lower bound of the strength, logarithmic, instead of the
-        stress: the lower tail is a straight line there.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
-        With friction coefficients above, if there is a pressure.
+        With friction coefficients above, if there is a pressure. A dotted line marks the lower
+        bound of the strength.
 
     Raises
     ------
     InputError
-        If this is no failure curve, or the strength has no lower bound.
+        If this is no failure curve.
     """
-    need(curve, "stress", "stress_above_bound", "probability", "probability_low")
-    bound = float(curve.attrs["lower_bound"])
-    if above_bound and not bounded(bound):
-        raise InputError("above_bound: this strength has no lower bound; leave it out")
-    stress = curve["stress_above_bound" if above_bound else "stress"].values
-    factor, unit = unit_for("Pa", stress)
-    x = stress * factor
+    need(curve, "stress", "probability", "probability_low", "probability_high")
+    bound, probability = float(curve.attrs["lower_bound"]), curve["probability"].values
+    factor, unit = unit_for("Pa", curve["stress"].values)
+    x = curve["stress"].values * factor
     with on_axes(ax) as axes:
-        if above_bound:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-            axes.xaxis.set_minor_formatter(NullFormatter())
-            axes.set_xlabel(f"stress above the lower bound ({unit})")
-        else:
-            axes.set_xlabel(f"stress $s$ ({unit})")
-            if bounded(bound):
-                axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
+        if bounded(bound):
+            axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
         low, high = curve["probability_low"].values, curve["probability_high"].values
-        percent = 100.0 * float(curve.attrs["confidence"])
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
-        text = f"subset simulation, {percent:g} % interval"
-        style: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 0.9}
-        axes.plot(x, curve["probability"].values, color=INK, label=text, **style)
+        text = f"subset simulation, {100.0 * float(curve.attrs['confidence']):g} % interval"
+        axes.plot(x, probability, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
         axes.set_yscale("log")
-        axes.set_ylim(0.5 * float(curve["probability"].min()), 1.0)
+        axes.set_ylim(0.5 * float(probability.min()), 1.0)
+        axes.set_xlabel(f"stress $s$ ({unit})")
         axes.set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")
-        if not above_bound:
-            with suppress(InputError):  # a problem that exists in Python only: stresses alone
-                add_friction_scale(axes, problem_of(curve), "x", factor)
+        with suppress(InputError):  # a problem that exists in Python only: stresses alone
+            add_friction_scale(axes, problem_of(curve), "x", factor)
         axes.legend(loc="lower right")
     return axes
 
@@ -109,35 +91,20 @@ def weak_spots(
     if isinstance(failing, xr.Dataset) and not failing:
         raise InputError("found: holds no failing profile")
     need(failing, "strength", "critical_position")
-    length = problem_of(failing, problem).nucleation_length
-    is_plane = "y" in failing.dims
-    dims = ("x", "y") if is_plane else ("x",)
-    spacings = [float(failing[dim][1] - failing[dim][0]) for dim in dims]
-    middle = [failing.sizes[dim] // 2 for dim in dims]
-    centred = np.stack(
-        [
-            np.roll(
-                strength,
-                [
-                    m - round(float(a) / h)
-                    for m, a, h in zip(middle, place, spacings, strict=True)
-                ],
-                range(len(dims)),
-            )
-            for strength, place in zip(
-                failing["strength"].values,
-                failing["critical_position"].values.reshape(-1, len(dims)),
-                strict=True,
-            )
-        ]
-    )
+    problem = problem_of(failing, problem)
+    interface, length = problem.interface, problem.nucleation_length
+    middle = np.array(interface.shape) // 2
+    shifts = [middle - node_of(at, interface) for at in failing["critical_position"].values]
+    dims = tuple(range(middle.size))
+    pairs = zip(failing["strength"].values, shifts, strict=True)
+    centred = np.stack([np.roll(strength, shift, dims) for strength, shift in pairs])
     offsets = [
-        (np.arange(failing.sizes[dim]) - m) * h / length
-        for dim, m, h in zip(dims, middle, spacings, strict=True)
+        (np.arange(n) - m) * h / length
+        for n, m, h in zip(interface.shape, middle, interface.spacings, strict=True)
     ]
     factor, unit = unit_for("Pa", centred)
-    with on_axes(ax, COLUMN * 1.2, 2.7 if is_plane else 2.5) as axes:
-        if is_plane:
+    with on_axes(ax, COLUMN * 1.2, 2.6) as axes:
+        if interface.is_plane:
             _draw_weak_map(axes, offsets, centred.mean(axis=0) * factor, unit)
             return axes
         near = np.abs(offsets[0]) <= NEAR

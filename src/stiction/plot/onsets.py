@@ -34,7 +34,6 @@ from stiction.problem import Problem
 
 Array = NDArray[np.float64]
 
-_GAP: dict[str, Any] = {"facecolor": PALE, "alpha": 0.6, "linewidth": 0.0, "zorder": 0.0}
 _NAMES = {
     "local_criterion": "local criterion",
     "equilibrium": "equilibrium",
@@ -121,13 +120,17 @@ def _draw_line(
     factor, unit = unit_for("Pa", tau_p)
     length, length_unit = unit_for("m", interface.lengths)
     spans = stored_gaps(next(iter(results.values())))
-    measured = tau_p.copy()
+    missing = np.zeros(x.size, dtype=bool)
     for begin, end in spans:
-        measured[_between(interface, begin, end)] = np.nan
-        _shade(axes, interface, begin, end)
+        missing |= _between(interface, begin, end)
+    measured = np.where(missing, np.nan, tau_p)
     if spans:
         axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
-        axes.fill([], [], **_GAP, label="not measured, filled in")
+        beside = np.roll(missing, 1) | np.roll(missing, -1)
+        axes.fill_between(
+            x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
+            facecolor=PALE, alpha=0.6, linewidth=0.0, zorder=0.0, label="not measured, filled in",
+        )  # fmt: skip
     axes.plot(x, measured * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
     try:
         averaged = nucleation_stress(problem, tau_p)
@@ -204,17 +207,6 @@ def _between(interface: Interface, begin: float, end: float) -> Any:
     x, half = interface.x, 0.5 * interface.spacing
     after, before = x > begin - half, x < end + half
     return after & before if begin <= end else after | before
-
-
-def _shade(axes: Axes, interface: Interface, begin: float, end: float) -> None:
-    """Shade a gap from the last measured node to the next one."""
-    factor, _ = unit_for("m", interface.lengths)
-    left, right = (begin - interface.spacing) * factor, (end + interface.spacing) * factor
-    pieces = (
-        [(left, right)] if begin <= end else [(left, interface.extent * factor), (0.0, right)]
-    )
-    for piece in pieces:
-        axes.axvspan(*piece, **_GAP)
 
 
 def equilibrium_path(

@@ -9,9 +9,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
-from stiction.model import Flag, check
 from stiction.plot import maps
-from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.axes import need, node_of, on_axes, problem_of, unit_for, with_unit
 from stiction.plot.fields import finish_line, places
 from stiction.plot.style import ACCENT, INK, PAGE, series
 from stiction.problem import Problem
@@ -30,7 +29,6 @@ def rupture(
     run: xr.Dataset,
     *,
     problem: Problem | None = None,
-    whole: bool = False,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw slip rate in space and time; on a plane the advance of the front.
@@ -41,8 +39,6 @@ def rupture(
         From `simulate_rupture`, on a line with `slip_rate`.
     problem : Problem, optional
         Needed only if the run does not hold it.
-    whole : bool
-        On a line: draw all frames instead of those from shortly before the onset on.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -58,7 +54,6 @@ def rupture(
     InputError
         If a variable was not kept.
     """
-    check("whole", whole, Flag)
     need(run, "onset_time", "critical_position")
     problem = problem_of(run, problem)
     if problem.interface.is_plane:
@@ -68,7 +63,7 @@ def rupture(
         return axes
     need(run, "slip_rate", hint=KEEP)
     with on_axes(ax, width=PAGE, height=3.4) as axes:
-        mesh, text = _draw_space_time(axes, run, problem, whole)
+        mesh, text = _draw_space_time(axes, run, problem)
         finish_line(axes, problem.interface, text)
         axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
     return axes
@@ -105,7 +100,7 @@ def front(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = 
     speed = run["front_speed"].values
     with on_axes(ax) as axes:
         if interface.is_plane:
-            i, j = _critical_node(run, problem)
+            i, j = node_of(run["critical_position"], interface)
             lines = {"x": speed[:, j], "y": speed[i, :]}
             for number, (dim, values) in enumerate(lines.items()):
                 place = interface.coordinates[dim] * factor
@@ -137,47 +132,31 @@ def since_onset(run: xr.Dataset) -> tuple[Array, str]:
     return run["time"].values, "time"
 
 
-def _critical_node(run: xr.Dataset, problem: Problem) -> tuple[int, ...]:
-    interface = problem.interface
-    return tuple(
-        round(float(at) / h) % n
-        for at, h, n in zip(
-            np.atleast_1d(run["critical_position"]), interface.spacings, interface.shape,
-            strict=True,
-        )
-    )  # fmt: skip
-
-
 def rate_scale(rate: Array, decades: float) -> LogNorm:
     """Return the scale of colours: some decades below the largest slip rate."""
     top = max(float(rate.max()), 1e-12)
     return LogNorm(top * 10.0**-decades, top)
 
 
-def _draw_space_time(
-    axes: Axes, run: xr.Dataset, problem: Problem, whole: bool
-) -> tuple[Any, str]:
+def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> tuple[Any, str]:
     """Draw slip rate and the onset; return the mesh and the label of the time."""
     since, name = since_onset(run)
     rate = run["slip_rate"].values
     norm = rate_scale(rate, DECADES)
-    if not whole:
-        before = BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
-        near = since >= -before
-        if near.sum() > 2:
-            since, rate = since[near], rate[near]
+    near = since >= -BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
+    if near.sum() > 2:
+        since, rate = since[near], rate[near]
     factor, unit = unit_for("s", since)
     length, _ = unit_for("m", problem.interface.lengths)
     x, spacing = problem.interface.x, problem.interface.spacing
     along = np.append(x, x[-1] + spacing) - 0.5 * spacing
-    middle = 0.5 * (since[1:] + since[:-1])
-    edges = np.concatenate([since[:1], middle, since[-1:]])
+    edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
         along * length, edges * factor, masked(rate, norm), norm=norm,
         cmap=COLORS, rasterized=True,
     )  # fmt: skip
-    place = float(run["critical_position"]) * length
-    if np.isfinite(float(run["onset_time"])):
+    if name != "time":
+        place = float(run["critical_position"]) * length
         axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
     return mesh, with_unit(name, unit)
 

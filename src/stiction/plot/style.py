@@ -110,14 +110,8 @@ def marker(index: int) -> str:
     return _SERIES[index % len(_SERIES)][2]
 
 
-def panel(axes: Axes, letter: str, *, x: float = 0.0, y: float = 1.02) -> None:
+def panel(axes: Axes, letter: str) -> None:
     """Letter a panel, above its upper left corner."""
     axes.text(
-        x,
-        y,
-        f"({letter})",
-        transform=axes.transAxes,
-        fontweight="bold",
-        va="bottom",
-        ha="left",
+        0.0, 1.02, f"({letter})", transform=axes.transAxes, fontweight="bold", va="bottom"
     )
