@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +23,19 @@ from stiction.inference.whittle import (
     origin,
 )
 from stiction.inference.window import Window
-from stiction.progress import Meter
+from stiction.progress import Meter, Show
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
+FEWEST = 20
+"""Repetitions that determine a tail of errors."""
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
 """In correlation lengths; every spectrum has its 1/e there."""
+NAMES = {name: f"spectrum.{name}" for name in ("correlation_length", "exponent")}
+NAMES["anisotropy"] = "anisotropy"
+"""What is estimated of a spectrum, as study files have it."""
 PLACES = ("mean", "marginal.mean", "marginal.loc")
 """Parameters that state where something is."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
@@ -79,11 +84,7 @@ class Estimate:
         own = self.setting.marginal.parameters(self.marginal)
         values |= {f"marginal.{name}": value for name, value in own.items()}
         free = self.setting.spectrum.of(self.model)
-        for name in ("correlation_length", "exponent"):
-            if name in free:
-                values[f"spectrum.{name}"] = free[name]
-        if "anisotropy" in free:
-            values["anisotropy"] = free["anisotropy"]
+        values |= {NAMES[name]: value for name, value in free.items() if name in NAMES}
         if "noise_share" in free:
             values["noise"] = self.model.noise
         return values
@@ -169,24 +170,41 @@ class Repetitions(NamedTuple):
     fits: list[Estimate]
 
 
-def repeat(found: Estimate, count: int, seed: int, workers: int, meter: Meter) -> Repetitions:
-    """Fit records simulated from a field, as many as the family can be fitted to.
+def bootstrapped(
+    found: Estimate, count: int, confidence: float, seed: int, workers: int, progress: Show
+) -> tuple[list[Repetitions], int]:
+    """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
+    Returns the repetitions, as many as the family can be fitted to, and how many were asked for.
     Repetition b depends on (seed, b) only.
     """
 
-    def one(number: int) -> Estimate | None:
+    def one(field: Estimate, number: int) -> Estimate | None:
         rng = np.random.default_rng([seed, number])
         try:
-            again = estimate(found.simulate(rng), found.setting, found)
+            again = estimate(field.simulate(rng), found.setting, field)
         except InputError:  # no member of the family fits: counted by its absence
             return None
         meter.advance()
         return again
 
-    with ThreadPoolExecutor(workers) as pool:
-        results = list(pool.map(one, range(count)))
-    return Repetitions(found, [result for result in results if result is not None])
+    def repeat(field: Estimate) -> Repetitions:
+        results = pool.map(partial(one, field), range(count))
+        return Repetitions(field, [result for result in results if result is not None])
+
+    ends = "correlation_length" in found.setting.spectrum.free
+    asked = 3 * count if ends else count
+    with Meter("fit_field", asked, progress) as meter, ThreadPoolExecutor(workers) as pool:
+        repeated = [repeat(found)]
+        if ends and len(repeated[0].fits) >= FEWEST:
+            repeated += [repeat(field) for field in at_ends(repeated[0], confidence)]
+    done = [len(own.fits) for own in repeated]
+    if min(done) < FEWEST:
+        raise InputError(
+            f"marginal: {found.setting.marginal.name!r} could be fitted to only {sum(done)} of"
+            f" {asked} repetitions; take another marginal"
+        )
+    return repeated, asked
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
@@ -198,9 +216,10 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
     found, family = around.truth, around.truth.setting.spectrum
     values, place = family.of(found.model), family.free.index("correlation_length")
     moved = []
-    for end in Scale("spectrum.correlation_length").ends(found, around, around, confidence):
+    scale, tail = Scale("spectrum.correlation_length"), 0.5 * (1.0 - confidence)
+    for share in (1.0 - tail, tail):
         vector = family.vector(list(values.values()))
-        vector[place] = np.clip(end, *family.limits[place])
+        vector[place] = np.clip(scale.end(found, around, share), *family.limits[place])
         moved.append(replace(found, model=family.model(vector, found.model.shares)))
     return moved
 
@@ -220,10 +239,8 @@ class Scale(NamedTuple):
     def to(self, values: Mapping[str, float]) -> float:
         """Return the parameter on this scale."""
         value = values[self.name]
-        if self.linear:
-            return value
         above = SIDES.get(self.name, 1.0) * (value - self._origin(values))
-        return math.log(max(above, 1e-300))
+        return value if self.linear else math.log(max(above, 1e-300))
 
     def back(self, scaled: float, values: Mapping[str, float]) -> float:
         """Return a parameter from this scale."""
@@ -240,24 +257,16 @@ class Scale(NamedTuple):
             width *= one.parameters["standard_deviation"]
         return self.to(one.parameters), width
 
-    def ends(
-        self, found: Estimate, shorter: Repetitions, longer: Repetitions, confidence: float
-    ) -> tuple[float, float]:
-        """Return an estimate less the quantiles of its error in units of its width.
+    def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
+        """Return an estimate less a quantile of its error in units of its width.
 
         Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default,
         it lies further inside.
         """
-        at, width = self.of(found)
-        tail = 0.5 * (1.0 - confidence)
-        highest = np.quantile(self._errors(shorter), 1.0 - tail, method="weibull")
-        lowest = np.quantile(self._errors(longer), tail, method="weibull")
-        return at - width * float(highest), at - width * float(lowest)
-
-    def _errors(self, repeated: Repetitions) -> list[float]:
-        truth = repeated.truth
+        (at, width), truth = self.of(found), repeated.truth
         true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
-        return [(at - true) / width for at, width in map(self.of, repeated.fits)]
+        errors = [(own - true) / wide for own, wide in map(self.of, repeated.fits)]
+        return at - width * float(np.quantile(errors, share, method="weibull"))
 
 
 def intervals(
@@ -280,6 +289,7 @@ def intervals(
     """
     around, *ends = repeated
     found, estimated = around.truth, around.truth.parameters
+    tail = 0.5 * (1.0 - confidence)
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
@@ -289,14 +299,14 @@ def intervals(
         own = [scale.to(one.parameters) for one in around.fits]
         if np.cov(own, lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
-        both = scale.ends(found, shorter, longer, confidence)
+        low, high = scale.end(found, shorter, 1.0 - tail), scale.end(found, longer, tail)
         if name == "noise":
-            if both[1] <= 0.0:  # far below zero by chance: as wide as of an estimate of zero
-                both = both[0], both[1] - found.noise[0]
-            low, high = (math.sqrt(max(end, 0.0)) for end in both)
+            if high <= 0.0:  # far below zero by chance: as wide as of an estimate of zero
+                high -= found.noise[0]
+            result[name] = math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0))
         else:
-            low, high = sorted(scale.back(end, estimated) for end in both)
-        result[name] = (low, high)
+            ordered = sorted(scale.back(end, estimated) for end in (low, high))
+            result[name] = ordered[0], ordered[1]
     noise = result["noise"][1] if "noise" in result else found.model.noise
     quiet = found.setting.marginal.quiet(values, noise)
     for name, limits in limits_of(found, quiet).items():

@@ -13,22 +13,20 @@ from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.inference.between import scatter_between, variances_within
 from stiction.inference.bootstrap import (
+    FEWEST,
     Estimate,
-    Repetitions,
     Setting,
-    at_ends,
+    bootstrapped,
     estimate,
     intervals,
-    repeat,
 )
-from stiction.inference.marginal_fit import families_of, mean_log_likelihood
+from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
 from stiction.inference.whittle import RANGES, SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
 from stiction.profiles import UNITS
-from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
@@ -36,10 +34,12 @@ ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record says little of any parameter."""
 FAR = 0.01
 """p-value below which a family does not suit."""
-AT_LIMIT = 1e-3
-"""As a share of a range: how near to an end of it an estimate is not determined."""
-FEWEST = 20
-"""Repetitions that determine a tail of errors."""
+ADVICE = {
+    "marginal": "the values are far from its family; compare families",
+    "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
+}
+STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
+"""Parameters in the unit of the field."""
 
 
 def _known(value: Any, info: ValidationInfo) -> float | None:
@@ -54,26 +54,27 @@ def _known(value: Any, info: ValidationInfo) -> float | None:
     return float(value)
 
 
+def _families(given: Any) -> list[Family]:
+    """The families of one name or table, or of several."""
+    several = given if isinstance(given, list | tuple) else [given]
+    if not several:
+        raise InputError("must name a family")
+    return [family_of(one) for one in several]
+
+
 DEFAULT_TOO = Field(validate_default=True)
 Known = Annotated[Any, BeforeValidator(_known), DEFAULT_TOO]
-Marginals = Annotated[Any, BeforeValidator(families_of), DEFAULT_TOO]
+Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
 Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
 Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
 class Goodness(NamedTuple):
-    """How well a family describes the values at a point.
+    """How well a family of marginals describes the values: its best member, and two measures.
 
-    Attributes
-    ----------
-    marginal
-        The member that fits best.
-    distance : float
-        Largest difference of the distribution functions (Kolmogorov).
-    score : float
-        Log likelihood of as many independent values as the record holds correlation lengths, less
-        the number of parameters, and less that of the best family; differences below about 2 mean
-        nothing.
+    `distance` is the largest difference of the distribution functions (Kolmogorov). `score` is the
+    log likelihood of as many independent values as the records hold correlation lengths, less the
+    number of parameters, and less that of the best family; differences below about 2 mean nothing.
     """
 
     marginal: Any
@@ -95,8 +96,9 @@ class FieldFit:
         the names that study files use; ``anisotropy``; ``noise``, the standard deviation of the
         measurement noise; and ``between``, the coefficient of variation between specimens.
     interval : dict of str to (float, float)
-        Of each of them, from the bootstrap; within what is searched, and of bounds of the marginal
-        outside the values.
+        Of each of them, from the bootstrap. That of the noise may begin at zero, those of bounds of
+        the marginal end outside the values, those of an exponent and of an anisotropy at the ranges
+        that are searched, 0.65 to 16 and 0.05 to 20.
     confidence : float
         Of the intervals.
     repetitions : tuple of RandomField
@@ -129,7 +131,6 @@ class FieldFit:
     _rows: Sequence[Array]
 
     def __str__(self) -> str:
-        width = max(map(len, self.parameters))
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
         spectrum = self.field.spectrum.type.replace("_", " ")
         lines = [
@@ -138,32 +139,26 @@ class FieldFit:
         ]
         if self.missing[0]:
             lines.append("  {} of {} points are missing and left out".format(*self.missing))
+        width = max(map(len, self.parameters))
         for name, value in self.parameters.items():
             if name == "mean" and "marginal.mean" in self.parameters:
                 continue  # the same number
             low, high = self.interval[name]
-            suffix = _unit_of(name, UNITS[self.quantity])
-            least, most = RANGES.get(name.removeprefix("spectrum."), (-math.inf, math.inf))
-            if low <= least or high >= most:
-                suffix += f" (searched from {least:g} to {most:g})"
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
-            lines.append(f"{line} {suffix.strip()}".rstrip())
-        lines.append(
-            f"  p-values: marginal {self.p_values['marginal']:.3g}, spectrum"
-            f" {self.p_values['spectrum']:.3g} ({len(self.repetitions)} repetitions)"
-        )
+            last = name.rpartition(".")[2]
+            if last.endswith("length"):
+                line += " m"
+            elif last in STRESSES and UNITS[self.quantity] != "1":
+                line += f" {UNITS[self.quantity]}"
+            least, most = RANGES.get(last, (-math.inf, math.inf))
+            if low <= least or high >= most:
+                line += f" (searched from {least:g} to {most:g})"
+            lines.append(line)
+        p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
+        lines.append(f"  p-values: {p_values} ({len(self.repetitions)} repetitions)")
         return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
 
     __repr__ = __str__
-
-
-def _unit_of(name: str, unit: str) -> str:
-    """SI unit of a parameter of a field in `unit`; empty for pure numbers."""
-    last = name.rpartition(".")[2]
-    if last in ("correlation_length", "efolding_length"):
-        return "m"
-    stresses = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
-    return "" if last not in stresses or unit == "1" else unit
 
 
 @checked
@@ -259,10 +254,7 @@ def fit_field(
 
     A likelihood's own curvature understates the error. The intervals come from a studentised
     bootstrap (Davison and Hinkley, 1997, section 5.2), and their upper and lower ends from fields
-    of longer and shorter correlation (Carpenter, 1999), which matters for short records. An
-    interval of the noise may begin at zero, one of a bound of the marginal ends outside the values,
-    and those of an exponent and of an anisotropy end at the ranges that are searched, 0.65 to 16
-    and 0.05 to 20.
+    of longer and shorter correlation (Carpenter, 1999), which matters for short records.
 
     Examples
     --------
@@ -293,16 +285,34 @@ def fit_field(
                 f" {levels.min():g} to {levels.max():g}"
             )
         rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
-    options = (bootstrap, seed, usable_cores() if workers is None else workers)
-    fields = 3 if "correlation_length" in family.free else 1
-    with Meter("fit_field", fields * bootstrap, progress) as meter:
-        settings = [Setting(windows, one, family) for one in marginal]
-        found, compared = _best(settings, rows)
-        repeated = [repeat(found, *options, meter)]
-        if fields == 3 and len(repeated[0].fits) >= FEWEST:
-            for field in at_ends(repeated[0], confidence):
-                repeated.append(repeat(field, *options, meter))
-    fit = _result(repeated, compared, records, rows, confidence, quantity, fields * bootstrap)
+    found, compared = _best([Setting(windows, one, family) for one in marginal], rows)
+    cores = usable_cores() if workers is None else workers
+    repeated, asked = bootstrapped(found, bootstrap, confidence, seed, cores, progress)
+    p_values = {"marginal": _p_value("distance", *repeated[0])}
+    p_values["spectrum"] = _p_value("roughness", *repeated[0])
+    doubts = _doubts(found, p_values)
+    done = sum(len(one.fits) for one in repeated)
+    if done < asked:
+        doubts.append(
+            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
+            " the others"
+        )
+    points = sum(record.values.size for record in records)
+    fit = FieldFit(
+        field=found.field(quantity),
+        parameters=found.parameters,
+        interval=intervals(repeated, confidence, np.concatenate(rows)),
+        confidence=confidence,
+        repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
+        families=compared,
+        p_values=p_values,
+        lengths_held=_lengths_held(found),
+        missing=(points - sum(row.size for row in rows), points),
+        quantity=quantity,
+        doubts=tuple(doubts),
+        _estimate=found,
+        _rows=rows,
+    )
     if between:
         fit = _with_between(fit, levels)
     for doubt in fit.doubts:
@@ -363,56 +373,10 @@ def _lengths_held(found: Estimate) -> float:
     return area / (length if windows[0].measured.ndim == 1 else length * length * ratio)
 
 
-def _p_value(name: str, repeated: Repetitions) -> float:
+def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
     """Of data that are a record of their model (Barnard's test; Davison and Hinkley, 1997)."""
-    own = getattr(repeated.truth, name)
-    return (sum(getattr(one, name) >= own for one in repeated.fits) + 1) / (
-        len(repeated.fits) + 1
-    )
-
-
-def _result(
-    repeated: Sequence[Repetitions],
-    compared: dict[str, Goodness],
-    records: Sequence[Record],
-    rows: Sequence[Array],
-    confidence: float,
-    quantity: str,
-    asked: int,
-) -> FieldFit:
-    found, fits = repeated[0]
-    done = sum(len(one.fits) for one in repeated)
-    if min(len(one.fits) for one in repeated) < FEWEST:
-        raise InputError(
-            f"marginal: {found.setting.marginal.name!r} could be fitted to only {done} of {asked}"
-            " repetitions; take another marginal"
-        )
-    p_values = {
-        "marginal": _p_value("distance", repeated[0]),
-        "spectrum": _p_value("roughness", repeated[0]),
-    }
-    doubts = _doubts(found, p_values)
-    if done < asked:
-        doubts.append(
-            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
-            " the others"
-        )
-    points = sum(record.values.size for record in records)
-    return FieldFit(
-        field=found.field(quantity),
-        parameters=found.parameters,
-        interval=intervals(repeated, confidence, np.concatenate(rows)),
-        confidence=confidence,
-        repetitions=tuple(one.field(quantity) for one in fits),
-        families=compared,
-        p_values=p_values,
-        lengths_held=_lengths_held(found),
-        missing=(points - sum(row.size for row in rows), points),
-        quantity=quantity,
-        doubts=tuple(doubts),
-        _estimate=found,
-        _rows=rows,
-    )
+    own = getattr(truth, name)
+    return (sum(getattr(one, name) >= own for one in fits) + 1) / (len(fits) + 1)
 
 
 def _with_between(fit: FieldFit, levels: Array) -> FieldFit:
@@ -439,35 +403,24 @@ def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
             f"the records hold {held:.2g} correlation lengths, too few for intervals to be trusted:"
             f" at least {ENOUGH_LENGTHS:g} are needed; measure a longer piece, or several"
         )
-    left = max(_power_at_cutoff(found, one) for one in set(found.setting.windows))
+    left = max(_power_at_cutoff(found, window) for window in set(found.setting.windows))
     if left <= noise**2:
         doubts.append(
             f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
             f" {math.sqrt(left):.3g} left: the correlation length rests on the family, not on the"
             " data"
         )
-    family = found.setting.spectrum
-    values = family.of(found.model)
-    sides = np.abs(family.limits - family.vector(list(values.values()))[:, None])
-    near = sides < AT_LIMIT * np.ptp(family.limits, axis=1, keepdims=True)
-    for (name, value), at_end in zip(values.items(), near, strict=True):
-        if name in ("correlation_length", "exponent", "anisotropy") and at_end.any():
+    for name, value, end in found.setting.spectrum.ends_met(found.model):
+        doubts.append(
+            f"{name} {value:.3g} lies at the end of the range that is searched, {end:.3g}: the data"
+            " do not determine it; give it"
+        )
+    for name, p in p_values.items():
+        if p <= FAR:
             doubts.append(
-                f"{name} {value:.3g} lies at the end of the range that is searched,"
-                f" {family.ranges[name][at_end.argmax()]:.3g}: the data do not determine it; give"
-                " it"
+                f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
+                " st.plot.fit"
             )
-    advice = {
-        "marginal": "the values are far from its family; compare families",
-        "spectrum": "the periodogram is far from its family; take another spectrum or a higher"
-        " detrend",
-    }
-    doubts += [
-        f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {advice[name]}, or look at"
-        " st.plot.fit"
-        for name, p in p_values.items()
-        if p <= FAR
-    ]
     return doubts
 
 

@@ -10,7 +10,7 @@ composite likelihood) and its error to the bootstrap.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.stats
@@ -20,15 +20,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.scoring import climb
 from stiction.model import describe, is_finite
-from stiction.random.marginals import (
-    Beta,
-    Gamma,
-    Lognormal,
-    ScipyMarginal,
-    TruncatedNormal,
-    Weibull,
-    marginal_of,
-)
+from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
 BINS = 160
 REACH = 5.0
@@ -45,11 +37,14 @@ NEGLIGIBLE = 1e-4
 MOST_NOISE = 0.95
 
 
-class Kind(NamedTuple):
-    """A family fitted here, by functions of u = (value - loc)/scale and scipy's shapes."""
+Parameters: TypeAlias = tuple[float, ...]
+"""Those of scipy: shapes, loc and scale."""
 
-    made: Any
-    scipys: Any
+
+class Kind(NamedTuple):
+    """A family fitted here: scipy's, and functions of u = (value - loc)/scale and its shapes."""
+
+    family: Any
     distribution: Callable[..., Array]
     log_density: Callable[..., Array]
 
@@ -65,31 +60,26 @@ def _between(below: float, above: float) -> float:
 
 KINDS = {
     "lognormal": Kind(
-        Lognormal,
         scipy.stats.lognorm,
         lambda u, s: ndtr(np.log(_positive(u)) / s),
         lambda u, s: -np.log(u) - math.log(s) - 0.5 * (np.log(u) / s) ** 2,
     ),
     "weibull": Kind(
-        Weibull,
         scipy.stats.weibull_min,
         lambda u, k: -np.expm1(-(_positive(u) ** k)),
         lambda u, k: math.log(k) + (k - 1.0) * np.log(u) - u**k,
     ),
     "gamma": Kind(
-        Gamma,
         scipy.stats.gamma,
         lambda u, a: gammainc(a, _positive(u)),
         lambda u, a: (a - 1.0) * np.log(u) - u - math.lgamma(a),
     ),
     "beta": Kind(
-        Beta,
         scipy.stats.beta,
         lambda u, a, b: betainc(a, b, np.clip(u, 0.0, 1.0)),
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
     "truncated_normal": Kind(
-        TruncatedNormal,
         scipy.stats.truncnorm,
         lambda u, a, b: (ndtr(np.clip(u, a, b)) - ndtr(a)) / _between(a, b),
         lambda u, a, b: -0.5 * u * u - math.log(_between(a, b)),
@@ -100,11 +90,11 @@ SCIPYS = {"normal": "norm"}
 
 
 class Search(NamedTuple):
-    """Where to begin, between which limits, and scipy's parameters of a vector."""
+    """Where to begin, between which limits, and the parameters of a vector."""
 
-    start: Array
+    start: Any
     limits: Any
-    parameters: Callable[[Array], tuple[float, ...]]
+    parameters: Callable[[Array], Parameters]
 
 
 @dataclass(frozen=True)
@@ -124,20 +114,18 @@ class Family:
             return self._by_scipy(quiet)
         if noise**2 <= NEGLIGIBLE * values.var():
             noise, values = 0.0, quiet
-        kind = KINDS[self.name]
-        search = self._search(values, quiet, noise, start)
+        kind, search = KINDS[self.name], self._search(values, quiet, noise, start)
         limits = np.array(search.limits)
-        counts, at, probabilities = np.ones(values.size), values, None
-        if noise:
-            counts, at, probabilities = _bins(values, noise)
+        bins = _bins(values, noise) if noise else None
+        counts, at = (np.ones(values.size), values) if bins is None else bins[:2]
 
         def terms(v: Array) -> Array:
             *shapes, low, scale = search.parameters(v)
             u = (at - low) / scale
-            if probabilities is None:
+            if bins is None:
                 found: Array = kind.log_density(u, *shapes) - math.log(scale)
                 return found
-            return np.log(probabilities(kind.distribution(u, *shapes)))
+            return np.log(bins[2](kind.distribution(u, *shapes)))
 
         def value_of(v: Array) -> tuple[float, Array]:
             found = terms(v)
@@ -145,9 +133,8 @@ class Family:
 
         def derivatives(v: Array, found: Array) -> tuple[Array, Array]:
             sides = np.where(v + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
-            slopes = np.stack(
-                [(terms(v + step) - found) / step.sum() for step in np.diag(sides)]
-            )
+            moved = [(terms(v + step) - found) / step.sum() for step in np.diag(sides)]
+            slopes = np.stack(moved)
             return slopes @ counts, (slopes * counts) @ slopes.T
 
         best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
@@ -160,34 +147,30 @@ class Family:
         mean, unit = float(quiet.mean()), float(quiet.std())
         if self.name == "truncated_normal":
 
-            def parameters(v: Array) -> tuple[float, ...]:
+            def parameters(v: Array) -> Parameters:
                 middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
                 return (low - middle) / width, (high - middle) / width, middle, width
 
             return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
         if start is None:
-            start = KINDS[self.name].made(mean=mean, cv=unit / mean, low=low)
+            start = MARGINALS[self.name](mean=mean, cv=unit / mean, low=low)
         shape, _, scale = start.distribution.args
-        shapes = (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)
-        return Search(
-            np.log([scale, shape]),
-            [(-700.0, 700.0), shapes],
-            lambda v: (math.exp(v[1]), low, math.exp(v[0])),
-        )
+        limits = [(-700.0, 700.0), (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)]
+        first = np.log([scale, shape])
+        return Search(first, limits, lambda v: (math.exp(v[1]), low, math.exp(v[0])))
 
-    def _member(self, parameters: tuple[float, ...]) -> Any:
+    def _member(self, parameters: Parameters) -> Any:
         """The marginal of scipy's parameters; most of ours have a mean and a cv instead."""
-        kind = KINDS[self.name]
         if self.name == "beta":
             a, b, low, width = parameters
             return Beta(alpha=a, beta=b, low=low, high=low + width)
-        mean, variance = map(float, kind.scipys.stats(*parameters))
+        mean, variance = map(float, KINDS[self.name].family.stats(*parameters))
         # A cut normal distribution may tend to an exponential or uniform one: the widest is taken
         # that its moments still determine.
         for narrower in 0.97 ** np.arange(60):
             try:
                 cv = narrower * math.sqrt(variance) / mean
-                return kind.made(mean=mean, cv=cv, **self.fixed)
+                return MARGINALS[self.name](mean=mean, cv=cv, **self.fixed)
             except InputError:
                 continue
         raise InputError(f"marginal: no {self.name!r} distribution resembles the values")
@@ -213,7 +196,7 @@ class Family:
 
     def parameters(self, marginal: Any) -> dict[str, float]:
         """Return what was estimated, by name."""
-        own = vars(marginal) if not isinstance(marginal, ScipyMarginal) else marginal.parameters
+        own = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
         known = {"type", "distribution", *self.fixed}
         return {n: float(v) for n, v in dict(own).items() if v is not None and n not in known}
 
@@ -225,68 +208,49 @@ class Family:
     def check(self, values: Array) -> None:
         """Refuse values that the family cannot have."""
         low, high = self.bounds
-        outside = (values <= low) | (values >= high)
-        if outside.any():
+        outside = int(((values <= low) | (values >= high)).sum())
+        if outside:
             raise InputError(
-                f"marginal: {int(outside.sum())} of {values.size} values, from {values.min():.6g}"
-                f" to {values.max():.6g}, do not lie between the bounds of {self.name!r},"
-                f" {low:.6g} and {high:.6g}; give others, as in marginal={{'type': {self.name!r},"
-                " 'low': ...}, or noise=True if measurement noise carries them there"
+                f"marginal: {outside} of {values.size} values, from {values.min():.6g} to"
+                f" {values.max():.6g}, do not lie between the bounds of {self.name!r}, {low:.6g}"
+                f" and {high:.6g}; give others, as in marginal={{'type': {self.name!r}, 'low':"
+                " ...}, or noise=True if measurement noise carries them there"
             )
 
 
-def name_and_fixed(
-    given: Any, names: Iterable[str], parameters: Callable[[str], Iterable[str] | None]
-) -> tuple[str, dict[str, float]]:
-    """Return the name of a family and its given parameters, from a name or a table {type, ...}.
-
-    `names` are offered where a name is unknown, that is where it has no `parameters`.
-    """
-    table = {"type": given} if isinstance(given, str) else given
-    if not isinstance(table, Mapping):
+def table_of(given: Any) -> dict[str, Any]:
+    """Return a table {type, ...} of what may also be a name."""
+    if isinstance(given, str):
+        return {"type": given}
+    if not isinstance(given, Mapping):
         raise InputError(
             "must be a name, or a table with the parameters to keep, such as"
             f" {{'type': 'beta', 'low': 0.0}}, got {describe(given)}"
         )
-    fixed = {str(key): value for key, value in table.items() if key != "type"}
-    name = str(table.get("type"))
-    known = parameters(name)
-    if known is None:
-        raise InputError(unknown_name("type", name, names))
+    return dict(given)
+
+
+def family_of(given: Any) -> Family:
+    """Return the family of a name, or of a table with some of its parameters."""
+    fixed = table_of(given)
+    name = str(fixed.pop("type", None))
+    if name in KINDS:
+        known = ("low", "high") if name in ("beta", "truncated_normal") else ("low",)
+    else:
+        family = getattr(scipy.stats, SCIPYS.get(name, name), None)
+        if not isinstance(family, scipy.stats.rv_continuous):
+            raise InputError(unknown_name("type", name, [*KINDS, *SCIPYS, "uniform"]))
+        known = (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
     problems = [unknown_name(name, key, known) for key in fixed if key not in known]
     problems += [
-        f"{key}: must be a finite number, got {describe(value)}"
+        f"{name}.{key}: must be a finite number, got {describe(value)}"
         for key, value in fixed.items()
         if not is_finite(value)
     ]
     if problems:
         raise InputError(problems)
-    return name, {key: float(value) for key, value in fixed.items()}
-
-
-def _parameters(name: str) -> Iterable[str] | None:
-    """What may be given of a family."""
-    if name in KINDS:
-        return ("low", "high") if name in ("beta", "truncated_normal") else ("low",)
-    family = getattr(scipy.stats, SCIPYS.get(name, name), None)
-    if not isinstance(family, scipy.stats.rv_continuous):
-        return None
-    return (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
-
-
-def family_of(given: Any) -> Family:
-    """Return the family of a name, or of a table with some of its parameters."""
-    name, fixed = name_and_fixed(given, [*KINDS, *SCIPYS, "uniform"], _parameters)
     zero = {"low": 0.0} if name in KINDS and name != "beta" else {}
-    return Family(name, zero | fixed)
-
-
-def families_of(given: Any) -> list[Family]:
-    """Return the families of one such name or table, or of several."""
-    several = given if isinstance(given, list | tuple) else [given]
-    if not several:
-        raise InputError("must name a family")
-    return [family_of(one) for one in several]
+    return Family(name, zero | {key: float(value) for key, value in fixed.items()})
 
 
 def _beta(
@@ -297,17 +261,16 @@ def _beta(
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
     room = {"low": mean - float(values.min()), "high": float(values.max()) - mean}
 
-    def parameters(v: Array) -> tuple[float, ...]:
-        ends = fixed | {
-            name: mean + side * unit * math.exp(at)
-            for (name, side), at in zip(sides.items(), v[2:], strict=True)
-        }
+    def ends_at(distances: Iterable[float]) -> dict[str, Any]:
+        pairs = zip(sides.items(), distances, strict=True)
+        return fixed | {name: mean + side * distance for (name, side), distance in pairs}
+
+    def parameters(v: Array) -> Parameters:
+        ends = ends_at(unit * math.exp(at) for at in v[2:])
         return math.exp(v[0]), math.exp(v[1]), ends["low"], ends["high"] - ends["low"]
 
     if start is None:
-        ends: dict[str, Any] = {
-            name: mean + 1.1 * side * room[name] for name, side in sides.items()
-        } | fixed
+        ends = ends_at(1.1 * room[name] for name in sides)
         u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
         total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, 0.2)
         start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
@@ -325,14 +288,9 @@ def _beta(
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
     """Counts of values in bins, and how their probabilities follow from a distribution function.
 
-    Returns
-    -------
-    counts : (BINS,) array
-    at : array
-        Where the function of the values without noise is needed, at equal distances.
-    probabilities : callable
-        From it to the probabilities of the bins with noise. The convolution is a sum in steps of
-        half a deviation of the noise or less; noise far below the width of a bin does not count.
+    That function, of the values without noise, is needed at the second array. The convolution with
+    the noise is a sum in steps of half its deviation or less; far below the width of a bin it does
+    not count.
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
@@ -352,14 +310,14 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
-    """Compute that of values in bins, marginal and noise together, without the width of a bin."""
+    """Return that of values in bins, marginal and noise together, without the width of a bin."""
     counts, at, probabilities = _bins(values, noise)
     expected = probabilities(marginal.distribution.cdf(at))
     return float(counts @ np.log(expected) / values.size)
 
 
 def distance(marginal: Any, values: Array) -> float:
-    """Compute Kolmogorov's distance: the largest difference of the distribution functions."""
+    """Return Kolmogorov's distance: the largest difference of the distribution functions."""
     expected = marginal.distribution.cdf(np.sort(values))
     steps = np.arange(values.size + 1) / values.size
     return float(max((steps[1:] - expected).max(), (expected - steps[:-1]).max()))

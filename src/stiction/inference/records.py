@@ -37,15 +37,12 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     for number, one in enumerate(profiles if several else [profiles]):
         try:
             with prefixed(f"profiles[{number}]" if several else "profiles"):
-                own = _records(one, interface, quantity)
-                for record in own:
-                    _check(record)
-                found += own
+                found += map(_checked, _records(one, interface, quantity))
         except InputError as error:
             problems += error.problems
-    if not found:
-        problems = problems or ["profiles: none were given"]
-    elif len({record.values.ndim for record in found}) > 1:
+    if not found and not problems:
+        problems.append("profiles: none were given")
+    if len({record.values.ndim for record in found}) > 1:
         problems.append("profiles: are of lines and of planes; fit them one after the other")
     if problems:
         raise InputError(problems)
@@ -116,7 +113,7 @@ def _spacing(x: Array, name: str) -> float:
     return spacing
 
 
-def _check(record: Record) -> None:
+def _checked(record: Record) -> Record:
     """Refuse a record that cannot be fitted, and warn of outliers."""
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
@@ -137,3 +134,4 @@ def _check(record: Record) -> None:
             f" standard deviations from the median, such as {values[aside.argmax()]:.4g}; if they"
             " are not real, make them NaN: missing values are left out"
         )
+    return record

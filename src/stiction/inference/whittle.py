@@ -13,7 +13,7 @@ alike. The score stays unbiased; what lies below the floor ceases to count.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -22,23 +22,13 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from stiction.arrays import Array
-from stiction.inference.marginal_fit import name_and_fixed
+from stiction.inference.marginal_fit import table_of
 from stiction.inference.scoring import climb
 from stiction.inference.window import Window
-from stiction.model import keys_of
+from stiction.random.kinds import from_table
 from stiction.random.mapping import quantile_of_normal
-from stiction.random.spectra import (
-    ExponentialSpectrum,
-    PowerLawSpectrum,
-    SquaredExponentialSpectrum,
-)
+from stiction.random.spectra import SPECTRA
 
-CLASSES: dict[str, Any] = {
-    "power_law": PowerLawSpectrum,
-    "squared_exponential": SquaredExponentialSpectrum,
-    "exponential": ExponentialSpectrum,
-}
-POWER_KEPT = {"power_law": 0.9997, "squared_exponential": 0.9997, "exponential": 0.99}
 RANGES = {
     "variance": (1e-200, 1e200),
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
@@ -60,6 +50,8 @@ FLOOR = 1e-3
 NEIGHBOURS = 5
 ORDERS = 10
 REACH, POINTS = 6.0, 121
+AT_END = 1e-3
+"""As a share of a range: how near to an end of it an estimate is not determined."""
 DIFFERENCE = 1e-4
 SETTLED = 1e-3
 """Gain of log likelihood below which scoring ends; a standard error is worth a half."""
@@ -166,17 +158,9 @@ def _unscaled(name: str, value: float) -> float:
 
 def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name of a family of spectra and the parameters to keep, checked."""
-
-    def parameters(name: str) -> list[str] | None:
-        return (
-            [key for key in keys_of(CLASSES[name]) if key != "type"]
-            if name in CLASSES
-            else None
-        )
-
-    name, fixed = name_and_fixed(given, CLASSES, parameters)
-    CLASSES[name](**({"correlation_length": 1.0} | fixed))
-    return name, fixed
+    table = table_of(given)
+    name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
+    return name, {key: float(value) for key, value in table.items() if key != "type"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,14 +180,11 @@ class SpectrumFamily:
     @cached_property
     def free(self) -> tuple[str, ...]:
         """What is estimated, in the order of the vector of parameters."""
-        estimated = {
-            "variance": True,
-            "correlation_length": "correlation_length" not in self.fixed,
-            "exponent": self.name == "power_law" and "exponent" not in self.fixed,
-            "anisotropy": self.anisotropy is None,
-            "noise_share": self.noise is None,
-        }
-        return tuple(name for name, is_free in estimated.items() if is_free)
+        known: dict[str, Any] = self.fixed | {"anisotropy": self.anisotropy}
+        known["noise_share"] = self.noise
+        others = ("exponent",) if self.name != "power_law" else ()
+        names = ("variance", "correlation_length", "exponent", "anisotropy", "noise_share")
+        return tuple(n for n in names if known.get(n) is None and n not in others)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -227,15 +208,23 @@ class SpectrumFamily:
         noise = found.pop("noise_share", known)
         options = self.fixed | found
         end_given = not {"truncation", "power_kept"}.isdisjoint(options)
+        spectrum = SPECTRA[self.name]
         if not end_given:
-            options["power_kept"] = POWER_KEPT[self.name]
-        return Model(
-            CLASSES[self.name](**options), anisotropy, noise, variance, shares, end_given
-        )
+            options["power_kept"] = spectrum.default_power
+        return Model(spectrum(**options), anisotropy, noise, variance, shares, end_given)
 
     def vector(self, values: Sequence[float]) -> Array:
         """Return free parameters on the scale of the search."""
         return np.array([_scaled(*one) for one in zip(self.free, values, strict=True)])
+
+    def ends_met(self, model: Model) -> Iterator[tuple[str, float, float]]:
+        """Yield parameters that lie at an end of their range: name, value and that end."""
+        found = self.of(model)
+        beside = np.abs(self.limits - self.vector(list(found.values()))[:, None])
+        near = beside < AT_END * np.ptp(self.limits, axis=1, keepdims=True)
+        for (name, value), ends in zip(found.items(), near, strict=True):
+            if name in ("correlation_length", "exponent", "anisotropy") and ends.any():
+                yield name, value, self.ranges[name][ends.argmax()]
 
     def of(self, model: Model) -> dict[str, float]:
         """Return the free parameters of a model."""
