@@ -25,7 +25,7 @@ from stiction.arrays import Array
 from stiction.inference.marginal_fit import table_of
 from stiction.inference.scoring import climb
 from stiction.inference.window import Window
-from stiction.random.kinds import from_table
+from stiction.kinds import from_table
 from stiction.random.mapping import quantile_of_normal
 from stiction.random.spectra import SPECTRA
 
