@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from stiction.arrays import Array
 from stiction.errors import InputError
@@ -16,8 +18,7 @@ if TYPE_CHECKING:
 UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa"}
 """What can be compared."""
 FEWEST = 5
-FINEST = 60
-"""Steps of the search for the shift, each with 0.6 times as far to go on either side."""
+"""Times of a record that are too few for a misfit are fewer than these."""
 
 
 class Misfit(NamedTuple):
@@ -72,57 +73,48 @@ def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Mi
     before the first and after the last. The search begins at every shift that puts the steepest
     moment of the record on a step or frame, and closes in on the best three.
     """
-    kind = str(getattr(measured, "name", None))
-    if kind not in UNITS:
-        raise InputError(
-            f"measured: must be a DataArray named one of {', '.join(UNITS)}, got {kind!r}"
-        )
-    times, values, places = _checked(measured)
+    times, values, places, kind = _checked(measured)
     clock, simulated = _at_gauges(run, kind, places)
-    held = np.isfinite(values)
-    weight = float(np.sum(values[held] ** 2))
-    if weight == 0.0:
+    weight = np.nansum(values**2, axis=0)
+    if not weight.sum() > 0.0:
         raise InputError("measured: is zero throughout; there is nothing to compare")
 
     def squares(shift: float) -> Array:
-        at = times + shift
-        model = np.stack([np.interp(at, clock, own) for own in simulated.T], axis=1)
-        return np.asarray(np.sum(np.where(held, model - values, 0.0) ** 2, axis=0))
+        model = [np.interp(times + shift, clock, own) for own in simulated.T]
+        return np.asarray(np.nansum((np.stack(model, axis=1) - values) ** 2, axis=0))
 
-    shift = _best_shift(squares, clock, times, values) if align else 0.0
+    shift = 0.0
+    if align:
+        shift = _best_shift(lambda shift: squares(shift).sum(), clock, times, values)
     own = squares(shift)
     with np.errstate(divide="ignore", invalid="ignore"):
-        by_gauge = np.sqrt(own / np.nansum(values**2, axis=0))
-    return Misfit(float(np.sqrt(own.sum() / weight)), shift, by_gauge)
+        by_gauge = np.sqrt(own / weight)
+    return Misfit(float(np.sqrt(own.sum() / weight.sum())), shift, by_gauge)
 
 
-def _best_shift(squares: Any, clock: Array, times: Array, values: Array) -> float:
+def _best_shift(
+    squares: Callable[[float], float], clock: Array, times: Array, values: Array
+) -> float:
     """Return the shift with the least sum of squares."""
     slope = np.abs(np.diff(np.nan_to_num(values), axis=0)).sum(axis=1) / np.diff(times)
     steepest = int(slope.argmax())
-    anchor = 0.5 * (times[steepest] + times[steepest + 1])
-    starts = clock - anchor
-    found = np.array([squares(shift).sum() for shift in starts])
-    step = float(np.diff(times).min())
-    gaps = np.diff(clock)
-    best, least = 0.0, np.inf
-    for first in np.argsort(found)[:3]:
-        beside = gaps[max(0, first - 2) : first + 1].max()
-        shift, reach, lowest = float(starts[first]), max(10.0 * step, beside), np.inf
-        for _ in range(FINEST):
-            around = shift + reach * np.linspace(-1.0, 1.0, 9)
-            sums = np.array([squares(one).sum() for one in around])
-            shift, lowest = float(around[sums.argmin()]), float(sums.min())
-            reach *= 0.6
-            if reach < 1e-4 * step:
-                break
-        if lowest < least:
-            best, least = shift, lowest
-    return best
+    starts = clock - 0.5 * (times[steepest] + times[steepest + 1])
+    order = np.argsort([squares(shift) for shift in starts])
+    step, gaps = float(np.diff(times).min()), np.diff(clock)
+    found = []
+    for first in order[:3]:
+        reach = max(10.0 * step, gaps[max(0, first - 2) : first + 1].max())
+        bounds = starts[first] - reach, starts[first] + reach
+        found.append(minimize_scalar(squares, bounds=bounds, options={"xatol": 1e-4 * step}))
+    return float(min(found, key=lambda one: one.fun).x)
 
 
-def _checked(record: xr.DataArray) -> tuple[Array, Array, Array]:
-    """Return times, values (times, gauges) and places of a record, SI."""
+def _checked(record: Any) -> tuple[Array, Array, Array, str]:
+    """Return times, values (times, gauges) and places of a record, SI, and its quantity."""
+    kind = str(getattr(record, "name", None))
+    if kind not in UNITS:
+        names = ", ".join(UNITS)
+        raise InputError(f"measured: must be a DataArray named one of {names}, got {kind!r}")
     if "time" not in record.dims or "x" not in record.coords:
         raise InputError(
             "measured: must have a dimension 'time' with coordinates (s) and a coordinate 'x' (m),"
@@ -136,16 +128,14 @@ def _checked(record: xr.DataArray) -> tuple[Array, Array, Array]:
         scale = factor_to(unit, str(part.attrs["units"])) if "units" in part.attrs else 1.0
         return scale * np.asarray(part.values, dtype=np.float64)
 
-    times, values = si(record["time"], "s"), si(record, UNITS[str(record.name)])
+    times, values = si(record["time"], "s"), si(record, UNITS[kind])
     if times.size < FEWEST:
         raise InputError(f"measured: has {times.size} times, at least {FEWEST} are needed")
     if not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise InputError("measured: its times must be finite and rising")
     if np.isinf(values).any() or not np.isfinite(values).any(axis=0).all():
-        raise InputError(
-            "measured: every gauge needs finite values; nan where none was recorded"
-        )
-    return times, values, si(record["x"], "m")
+        raise InputError("measured: every gauge needs finite values, and NaN in its gaps")
+    return times, values, si(record["x"], "m"), kind
 
 
 def _at_gauges(run: xr.Dataset, kind: str, places: Array) -> tuple[Array, Array]:
@@ -172,7 +162,5 @@ def _at_gauges(run: xr.Dataset, kind: str, places: Array) -> tuple[Array, Array]
             "the gauges, to st.simulate_rupture"
         )
     field = np.asarray(run[kind].transpose("time", "x").values, dtype=np.float64)
-    around = np.concatenate([x, [length]])
-    closed = np.concatenate([field, field[:, :1]], axis=1)
-    values = np.stack([[np.interp(p, around, row) for row in closed] for p in places], axis=1)
-    return np.asarray(run["time"].values, dtype=np.float64), values
+    values = [[np.interp(place, x, row, period=length) for row in field] for place in places]
+    return np.asarray(run["time"].values, dtype=np.float64), np.stack(values, axis=1)
