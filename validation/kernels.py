@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.exponential_sum import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel
 from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
 

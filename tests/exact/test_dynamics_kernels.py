@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from stiction import InputError
-from stiction.elasticity.exponential_sum import fit_exponentials
-from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.exponential_sum import fit_exponentials, kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
 
 ETAS = {

@@ -7,7 +7,7 @@ from scipy.special import j0, j1
 
 import stiction as st
 from stiction.dynamics.method import Rupture, make_run
-from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.exponential_sum import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
 
 ETA = np.sqrt(2.0 / 0.67)

@@ -12,7 +12,7 @@ from stiction.dynamics.energies import radiated_energy
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import read_checkpoint, write_checkpoint
 from stiction.dynamics.simulate import simulate_rupture
-from stiction.dynamics.state import ALL_SLID
+from stiction.dynamics.state import Reason
 
 NODES = 128
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
@@ -95,7 +95,7 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
     profile = strength(5)
     run, straight = fresh_run(profile)
     total, reason = run.advance(straight, 100_000)
-    assert reason == ALL_SLID
+    assert reason == Reason.ALL_SLID
     implicit = int(straight.now["implicit_steps"])
     assert implicit > 10
     path = tmp_path / "state.npz"

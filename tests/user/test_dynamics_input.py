@@ -15,7 +15,7 @@ from stiction.dynamics import save as save_module
 from stiction.dynamics.method import Rupture
 from stiction.dynamics.save import open_rupture
 from stiction.dynamics.simulate import simulate_rupture
-from stiction.elasticity.kernel_cache import kernel_sum, stored_kernel
+from stiction.elasticity.exponential_sum import kernel_sum, stored_kernel
 from stiction.errors import StoreError
 from stiction.files import read_arrays
 

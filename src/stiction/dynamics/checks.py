@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from stiction.dynamics.implicit import LARGEST_STEP
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_at
-from stiction.dynamics.state import NOT_FINITE, State
+from stiction.dynamics.state import Reason, State
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import FEWEST_NODES, Problem, Sample
 
@@ -110,7 +110,7 @@ def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: floa
 
 def check_finite(run: Run, state: State, reason: int) -> None:
     """Raise a `FloatingPointError` that says when and where a run became non-finite."""
-    if reason == NOT_FINITE:
+    if reason == Reason.NOT_FINITE:
         now = state.now
         node = int(now["bad_node"])
         raise FloatingPointError(

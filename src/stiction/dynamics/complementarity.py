@@ -19,13 +19,8 @@ from stiction.jit import jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
     """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
     u, slipping, driving = tables.increment, tables.slipping, tables.driving
-    falling, product, residual, z = (
-        tables.falling,
-        tables.product,
-        tables.residual,
-        tables.other,
-    )
-    direction, work = tables.direction, tables.work
+    falling, product, residual = tables.falling, tables.product, tables.residual
+    z, direction, work = tables.other, tables.direction, tables.work
     n = u.size
     convolve(transform, tables.symbol, u, work, product)
     worst = 0.0

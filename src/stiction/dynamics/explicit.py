@@ -16,14 +16,9 @@ from stiction.dynamics.diagnostics import (
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory import advance_memory, pack
 from stiction.dynamics.state import (
-    ALL_SLID,
-    AT_REST,
-    DONE,
-    DROPPED,
-    NOT_FINITE,
-    TO_IMPLICIT,
     ExplicitTables,
     Grid,
+    Reason,
     Setting,
     State,
     Thresholds,
@@ -64,9 +59,8 @@ def _predict(
     for i in range(slip.size):
         ahead = slip[i] + step * rate[i]
         limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
-        predicted[i] = (
-            max(transfer[i] + load * profile[i] + initial[i] - limit, 0.0) / impedance
-        )
+        stuck = transfer[i] + load * profile[i] + initial[i]
+        predicted[i] = max(stuck - limit, 0.0) / impedance
 
 
 @jit_inside
@@ -123,11 +117,9 @@ def _calm(now: Any, thresholds: Thresholds, step: Step, impedance: float, rise: 
 
     Waves make slip rates come and go; creep is slow, or as fast as it was.
     """
-    scale = now.scale
-    quiet = (
-        step.top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step.size
-    )
-    before = now.calm_rate
+    scale, before = now.scale, now.calm_rate
+    slow = _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step.size
+    quiet = step.top < slow
     steady = 0.5 * before <= step.top <= 2.0 * before
     if quiet or (steady and step.top < STEADY_STRESS * scale / impedance):
         now.calm_steps += 1
@@ -154,8 +146,11 @@ def explicit_steps(
     now, thresholds = state.diagnostics[0], setting.thresholds
     rate_hat, slip_hat = tables.rate_hat, state.slip_hat
     half = thresholds.arrival
-    taken, reason = ZERO, DONE  # one way out: each costs the compiler as much as the rest
-    while taken < count and reason == DONE:
+    taken, reason = (
+        ZERO,
+        Reason.DONE,
+    )  # one way out: each costs the compiler as much as the rest
+    while taken < count and reason == Reason.DONE:
         time = now.time + step
         load = load_at(setting.load_times, setting.load_values, time)
         forward(grid.transform, state.rate, rate_hat)
@@ -172,7 +167,7 @@ def explicit_steps(
                     now.bad_node = i
                     break
             now.time = time
-            reason = NOT_FINITE
+            reason = Reason.NOT_FINITE
             break
         top, node, slip_sum = _arrive(state, setting.nodes.critical, half, tables, time)
         for q in range(rate_hat.size):
@@ -189,13 +184,13 @@ def explicit_steps(
         fall = finish_step(state, setting, record, taken, done)
         taken += 1
         if slid >= thresholds.slid_stop:
-            reason = ALL_SLID
+            reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
-            reason = DROPPED
+            reason = Reason.DROPPED
         elif _calm(now, thresholds, done, impedance, rise):
             end_event(now, thresholds.unstable_rate, now.mean_stress, radiated)
             if thresholds.rest_stop and now.first_stress > -np.inf:
-                reason = AT_REST
+                reason = Reason.AT_REST
             elif not thresholds.explicit_only:
-                reason = TO_IMPLICIT
+                reason = Reason.TO_IMPLICIT
     return taken, reason

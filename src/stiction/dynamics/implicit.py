@@ -16,13 +16,9 @@ from stiction.dynamics.diagnostics import (
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.dynamics.state import (
-    ALL_SLID,
-    DONE,
-    DROPPED,
-    NOT_FINITE,
-    TO_EXPLICIT,
     Grid,
     ImplicitTables,
+    Reason,
     Setting,
     State,
     Thresholds,
@@ -156,9 +152,8 @@ def _accelerates(
     noticed = _NOTICED * now.scale
     growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
-    shorter = (
-        0.5 * attempt.size >= thresholds.smallest_step or largest > 0.1 * thresholds.slip_step
-    )
+    halved = 0.5 * attempt.size >= thresholds.smallest_step
+    shorter = halved or largest > 0.1 * thresholds.slip_step
     return growing and matters and shorter and attempt.ratio > 0.0
 
 
@@ -211,9 +206,8 @@ def _accept(
         if np.isnan(state.arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
             state.arrival[i] = arrived(slip[i], half * critical[i], u[i], attempt.time, size)
     mean_slip = slip_sum / u.size
-    return Step(
-        attempt.time, size, load, work * grid.cell, radiated, mean_slip, slid, top, node
-    )
+    work *= grid.cell
+    return Step(attempt.time, size, load, work, radiated, mean_slip, slid, top, node)
 
 
 @jit_inside
@@ -252,11 +246,14 @@ def implicit_steps(
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = thresholds.smallest_step
-    taken, reason = ZERO, DONE  # one way out: each costs the compiler as much as the rest
+    taken, reason = (
+        ZERO,
+        Reason.DONE,
+    )  # one way out: each costs the compiler as much as the rest
     while taken < count:
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:
-            reason = TO_EXPLICIT
+            reason = Reason.TO_EXPLICIT
             break
         past_step = now.past_step
         ratio = size / (size + past_step) if past_step > 0.0 else 0.0
@@ -265,22 +262,21 @@ def implicit_steps(
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
         accuracy = _assemble(state, grid, setting, tables, attempt)
         near = accuracy if thresholds.curved else 0.0
-        failed = not solve_increment(
-            grid.transform, setting, state.slip, tables, accuracy, near
-        )
+        found = solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
+        failed = not found
         largest, total, radiated = 0.0, 0.0, 0.0
         if not failed:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
         if not np.isfinite(total):
             now.bad_node = 0
-            reason = NOT_FINITE
+            reason = Reason.NOT_FINITE
             break
         too_much = largest > 2.0 * thresholds.slip_step
         if failed or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
             now.rejected_steps += 1
             step = size / 2.0
             if step < smallest:
-                reason = TO_EXPLICIT
+                reason = Reason.TO_EXPLICIT
                 break
             continue
         growing = radiated > _NOTICED * now.scale and radiated > np.sqrt(_GROWTH) * now.radiated
@@ -292,11 +288,11 @@ def implicit_steps(
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
         if done.slid >= thresholds.slid_stop:
-            reason = ALL_SLID
+            reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
-            reason = DROPPED
+            reason = Reason.DROPPED
         elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
-            reason = TO_EXPLICIT
-        if reason != DONE or last or now.time >= thresholds.end_time:
+            reason = Reason.TO_EXPLICIT
+        if reason != Reason.DONE or last or now.time >= thresholds.end_time:
             break
     return taken, step, reason

@@ -19,33 +19,30 @@ from stiction.dynamics.memory import (
     sum_memory,
 )
 from stiction.dynamics.state import (
-    ALL_SLID,
-    AT_REST,
     DIAGNOSTICS,
-    DONE,
-    DROPPED,
-    NOT_FINITE,
     RECORD,
-    TO_EXPLICIT,
-    TO_IMPLICIT,
     ExplicitTables,
     Floats,
     History,
     ImplicitTables,
+    Reason,
     Setting,
     State,
 )
+from stiction.elasticity.line import griffith_length
 from stiction.friction.kernels import strengths
 from stiction.friction.laws import FrictionLaw
 
-_OVERSTRESSED = (
-    1e-6  # of the stress scale: above the strength by so much, slip begins with waves
-)
+_OVERSTRESSED = 1e-6  # stress scales above the strength from which on slip begins with waves
 _NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
 _MARGIN = 1.5  # on the length from which on nothing stops a rupture: the same as equilibrium's
 _RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
 
-_ENDINGS = {ALL_SLID: "sliding", DROPPED: "onset", AT_REST: "rest"}
+_ENDINGS: dict[int, str] = {
+    Reason.ALL_SLID: "sliding",
+    Reason.DROPPED: "onset",
+    Reason.AT_REST: "rest",
+}
 NOTHING = np.empty((0, len(RECORD)))
 
 
@@ -111,9 +108,8 @@ class Run:
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         nodes, thresholds = self.setting.nodes, self.setting.thresholds
-        delta = np.zeros(interface.size)
-        if slip is not None:
-            delta = np.array(slip, dtype=np.float64).ravel()
+        given = np.zeros(interface.size) if slip is None else slip
+        delta = np.array(given, dtype=np.float64).ravel()
         memory, memory_sum = empty_memory(self.medium.grid)
         load = float(load_at(*self.history, time))
         slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
@@ -157,9 +153,8 @@ class Run:
 
     def ended(self, state: State) -> bool:
         """Return whether the end time is reached, up to the rounding of a sum of many steps."""
-        return bool(
-            self.setting.thresholds.end_time - state.now["time"] <= 1e-6 * self.medium.step
-        )
+        left = self.setting.thresholds.end_time - state.now["time"]
+        return bool(left <= 1e-6 * self.medium.step)
 
     def ending(self, state: State, reason: int) -> str | None:
         """Return why a run ends here, in a word; None if it goes on."""
@@ -202,10 +197,8 @@ class Run:
         if not (now["slid"] > 0 and now["in_event"]):
             return False
         drop = float((now["load"] * nodes.profile + nodes.initial - nodes.residual).min())
-        if drop <= 0.0:
-            return False
-        length = 4.0 * medium.effective_modulus * self._largest_fracture_energy
-        needed = _MARGIN * (length / (np.pi * drop**2)) / medium.grid.cell
+        energy, modulus = self._largest_fracture_energy, medium.effective_modulus
+        needed = _MARGIN * griffith_length(drop, energy, modulus) / medium.grid.cell
         return bool(
             now["slid"] >= needed and longest_row(state.slip >= nodes.critical) >= needed
         )
@@ -216,8 +209,8 @@ class Run:
         The word is None if it has not ended: the code is then NOT_FINITE, or DONE after the steps.
         """
         portion = _RUNAWAY_STEPS if self.stop == "runaway" else _STEPS
-        word, reason = None, DONE
-        while word is None and reason != NOT_FINITE and state.steps < most:
+        word, reason = None, int(Reason.DONE)
+        while word is None and reason != Reason.NOT_FINITE and state.steps < most:
             _, reason = self.advance(state, min(portion, most - state.steps))
             word = self.ending(state, reason)
         return word, reason
@@ -234,38 +227,31 @@ class Run:
             steps = self._explicit if state.explicit else self._implicit
             more, reason = steps(state, count - taken, part)
             taken += more
-            if reason == TO_EXPLICIT:
+            if reason == Reason.TO_EXPLICIT:
                 self._to_explicit(state)
-            elif reason == TO_IMPLICIT:
+            elif reason == Reason.TO_IMPLICIT:
                 self._to_implicit(state)
-            elif reason != DONE or self.ended(state):
+            elif reason != Reason.DONE or self.ended(state):
                 return taken, reason
-        return taken, DONE
+        return taken, Reason.DONE
 
     def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
         medium = self.medium
         left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
-        taken, reason = explicit_steps(
-            count, state, medium.grid, self.setting, self._explicit_tables(), record
-        )
+        tables = self._explicit_tables()
+        taken, reason = explicit_steps(count, state, medium.grid, self.setting, tables, record)
         return int(taken), int(reason)
 
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # let go of the others before these are made
             self.tables = implicit_tables(self.medium.grid)
-        taken, size, reason = implicit_steps(
-            count,
-            float(state.phase[1]),
-            state,
-            self.medium.grid,
-            self.setting,
-            self.tables,
-            record,
+        size, grid = float(state.phase[1]), self.medium.grid
+        taken, state.phase[1], reason = implicit_steps(
+            count, size, state, grid, self.setting, self.tables, record
         )
-        state.phase[1] = size
         return int(taken), int(reason)
 
     def _to_explicit(self, state: State) -> None:

@@ -7,8 +7,7 @@ import numpy as np
 
 from stiction.dynamics.memory import offsets, phi, step_table
 from stiction.dynamics.state import Floats, Grid
-from stiction.elasticity.exponential_sum import ExponentialSum
-from stiction.elasticity.kernel_cache import kernel_sum
+from stiction.elasticity.exponential_sum import ExponentialSum, kernel_sum
 from stiction.elasticity.memory_kernels import static_stiffness
 from stiction.elasticity.operator import make_transform
 from stiction.errors import InputError

@@ -4,6 +4,7 @@ Fields of the interface and their transforms are flat, whatever its shape; `Grid
 the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the mean.
 """
 
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,9 @@ Floats = NDArray[np.float64]
 History = tuple[Floats, Floats]
 """Times (s) and values of what is straight in between."""
 
-DONE, ALL_SLID, TO_EXPLICIT, TO_IMPLICIT, NOT_FINITE, DROPPED, AT_REST = range(7)
+Reason = IntEnum(
+    "Reason", "DONE ALL_SLID TO_EXPLICIT TO_IMPLICIT NOT_FINITE DROPPED AT_REST", start=0
+)
 """Why a compiled loop of steps returned."""
 
 RECORD = ("time", "load", "mean_stress", "mean_slip", "top_slip_rate", "size", "work")
@@ -68,17 +71,13 @@ class Thresholds(NamedTuple):
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
     breakable: int  # nodes that can break at all
-    calm_slip: (
-        float  # slip (m/Pa) of calm steps, times the rise of the load; see `explicit._calm`
-    )
+    calm_slip: float  # slip of calm steps over the rise of the load, m/Pa; see `explicit._calm`
     calm_count: int  # calm steps in a row after which implicit steps take over
     slip_step: float  # loss of strength of a node in one implicit step, in tau_p - tau_r
     load_step: float  # largest rise of the load in one implicit step, in stress scales
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
     unstable_rate: float  # slip rate, m/s, that only an instability reaches
-    arrival: (
-        float  # slip at which a front has arrived, in units of that at the residual strength
-    )
+    arrival: float  # slip at which a front has arrived, in units of `Nodes.critical`
     curved: bool  # whether the law is other than linear, whose pieces are met to the bit
     explicit_only: bool
 
@@ -93,14 +92,12 @@ class Grid(NamedTuple):
     entry: Ints  # (modes,): which entry of the tables a mode uses
     offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
     multiplicity: (
-        int  # modes that share one entry of the tables: 2 on a plane, kx and -kx, else 1
+        int  # modes that share an entry of the tables: 2 on a plane, kx and -kx, else 1
     )
     frequency: Array  # |k| c_s of each entry, rad/s
     mode_two: Array  # how much of it is mode II, (kx/k)²; 1 on a line, whatever its mode
-    poles: (
-        Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`, then,
-    )
-    weights: Spectrum  # on a plane, those of mode III, which weigh with 1 - mode_two
+    poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`,
+    weights: Spectrum  # then, on a plane, those of mode III, which weigh with 1 - mode_two
     split: int  # how many of the pairs weigh with `mode_two`
 
 
@@ -162,22 +159,11 @@ class State(NamedTuple):
 
 
 class ExplicitTables(NamedTuple):
-    """Of one fixed explicit step h, with arrays to work in.
+    """Of one fixed explicit step h, with arrays to work in."""
 
-    Attributes
-    ----------
-    step : float
-        h, s.
-    table : flat array
-        [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h); the memory
-        is kept as psi/B.
-    response : (modes,) array
-        Re sum_p w B, weight of the current slip rate, s.
-    """
-
-    step: float
-    table: Array
-    response: Array
+    step: float  # h, s
+    table: Array  # [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h)
+    response: Array  # (modes,): Re sum_p w B, weight of the current slip rate, s
     packed: Array
     rate_hat: Spectrum
     shared: Spectrum
@@ -186,36 +172,20 @@ class ExplicitTables(NamedTuple):
 
 
 class ImplicitTables(NamedTuple):
-    """Of an implicit step of some size, with arrays to work in; belongs to one run.
+    """Of an implicit step of some size, with arrays to work in; belongs to one run."""
 
-    Attributes
-    ----------
-    valid_for : (2,) array
-        Size (s) and ratio of the last step that `table` and `symbol` are for; -1 if none.
-    table, ramp, response, ramp_response
-        See `memory.tabulate`.
-    symbol, inverse : (modes,) arrays
-        Eigenvalues of the matrix of a step, Pa/m, and their inverses.
-    memory_sum to work : (modes,) complex arrays
-    trial_stress to other : (nodes,) arrays
-    slipping : (nodes,) int array
-        0 stuck, 1 slipping.
-    packed, others : arrays in packed order
-    sums : (2, 128) array
-    """
-
-    valid_for: Array
-    table: Array
+    valid_for: Array  # size (s) and ratio of the last step that they are for; -1 if none
+    table: Array  # this one to `ramp_response`: see `memory.tabulate`
     ramp: Array
     response: Array
     ramp_response: Array
-    symbol: Array
+    symbol: Array  # (modes,): eigenvalues of the matrix of a step, Pa/m
     inverse: Array
-    memory_sum: Spectrum
+    memory_sum: Spectrum  # (modes,), as the next three
     past_hat: Spectrum
     rate_hat: Spectrum
     work: Spectrum
-    trial_stress: Array
+    trial_stress: Array  # (nodes,), as the rest up to `slipping`
     increment: Array
     driving: Array
     falling: Array
@@ -223,7 +193,7 @@ class ImplicitTables(NamedTuple):
     direction: Array
     product: Array
     other: Array
-    slipping: Ints
-    packed: Array
+    slipping: Ints  # 0 stuck, 1 slipping
+    packed: Array  # in packed order, as `others`
     others: Array
-    sums: Array
+    sums: Array  # (2, 128)
