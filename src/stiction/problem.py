@@ -55,8 +55,7 @@ class Sample(NamedTuple):
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
         tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Without the
         first axis for `one` sample. Strength may be infinite for methods that accept barriers.
-        Where it was given at or below the residual strength, both are equal: strength is
-        constant, whatever W.
+        Where it is at or below the residual strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array

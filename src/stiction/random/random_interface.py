@@ -115,11 +115,9 @@ class RandomInterface:
     -----
     Correlated translation fields after Grigoriu (1995): the draws of a property are a
     combination, by the Cholesky factor of the correlation matrix, of independent draws of
-    its own and of the properties before it. So what is drawn for one does not depend on
-    those that come after it in the list above, and a property that is correlated with none
-    keeps its draws whatever else is random. Where spectra differ, so do the weights of the
-    modes, and the correlation of the fields at a point is a little less than that of the
-    modes.
+    its own and of the properties before it in the list above. So a property keeps its draws
+    whatever else is random, unless it is correlated with one before it. Where spectra differ,
+    the correlation of the fields at a point is a little less than that of the modes.
 
     Examples
     --------

@@ -103,10 +103,8 @@ def rice_distribution(
     there crossings of the level x come as a Poisson process at the rate nu (Rice, 1945;
     Cramer and Leadbetter, 1967). S and nu are pooled from sampled profiles of the
     nucleation stress, every position of which counts; so a few hundred profiles tell as
-    much of the lower tail as many more minima would.
-
-    On a plane P(tau_cr > x) ~ exp(-chi(x)), with chi the expected Euler characteristic of
-    what lies below x in the nucleation stress, that is the number of dips.
+    much of the lower tail as many more minima would. On a plane P(tau_cr > x) ~
+    exp(-chi(x)), with chi the expected number of dips below x in the nucleation stress.
 
     Parameters
     ----------
@@ -115,16 +113,10 @@ def rice_distribution(
     strength : RandomField
         Peak strength, Pa; or friction coefficients under a uniform normal pressure.
     profiles : int
-        How many profiles to sample, at least 16.
+        How many profiles to sample, at least 16: samples 0.. of `seed`.
     seed : int
-        The profiles are samples 0.. of this seed.
     stress : (m,) array, optional
         Levels of the critical stress, Pa, rising; by default 1024 over the range sampled.
-
-    Returns
-    -------
-    RiceDistribution
-        Its `trusted` says where the approximation holds.
 
     Examples
     --------
@@ -144,13 +136,12 @@ def rice_distribution(
         stress.ndim == 1 and stress.size and (np.diff(stress) > 0).all()
     ):
         raise InputError("stress: must be a (m,) array of rising levels, Pa")
-    interface, plane = problem.interface, problem.interface.is_plane
-    # A dip that only just reaches down between two nodes is a crossing as well. The onset of a
-    # plane is at a node.
-    fine = ENOUGH_POINTS * interface.spacing / problem.nucleation_length
-    factor = 1 if plane else math.ceil(fine)
+    interface, plane, factor, together = problem.interface, problem.interface.is_plane, 1, BATCH
+    if plane:  # the onset is at a node
+        together = max(1, MOST_NODES // interface.size)
+    else:  # a dip that only just reaches down between two nodes is a crossing as well
+        factor = math.ceil(ENOUGH_POINTS * interface.spacing / problem.nucleation_length)
     points = factor * interface.size
-    together = BATCH if not plane else max(1, MOST_NODES // interface.size)
 
     def batches() -> Iterator[Array]:
         for first in range(0, profiles, together):
