@@ -40,8 +40,10 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
         )
     flat: list[tuple[Any, Any]] = []
     for key, inner in value.items():
-        nested = inner.items() if isinstance(inner, Mapping) else ()
-        flat += [((key, other), rho) for other, rho in nested] if nested else [(key, inner)]
+        if isinstance(inner, Mapping):
+            flat += [((key, other), rho) for other, rho in inner.items()]
+        else:
+            flat.append((key, inner))
     found: dict[str, dict[str, float]] = {}
     for pair, rho in flat:
         if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
