@@ -58,6 +58,29 @@ def test_measured_values_and_their_places_may_state_other_units():
         field.given(stated.assign_attrs(units="furlong"), noise=20e3)
 
 
+@pytest.mark.parametrize(
+    ("name", "heading", "unit"),
+    [("strength", "mu", 1.0), ("critical_slip", "d_c (um)", 1e-6)],
+)
+def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit):
+    """A coefficient where the field is of those; any other property by its own name."""
+    spectrum = study["random"]["strength"]["spectrum"]
+    field = {
+        "marginal": {"type": "lognormal", "mean": 0.5 * unit, "cv": 0.15},
+        "spectrum": spectrum,
+        "given": {"profile": "measured.csv", "noise": 0.01 * unit},
+    }
+    if name == "strength":
+        field["of"] = "friction_coefficient"
+    study["problem"]["load"] = {"normal_pressure": 2e6}
+    study["random"][name] = field
+    table = np.column_stack([[10.0, 20.0], [0.45, 0.55]])
+    np.savetxt("measured.csv", table, delimiter=",", header=f"x (mm),{heading}", comments="")
+    read = st.Study.from_dict(study, folder=".")
+    values = read.random.properties[name].conditions.values
+    np.testing.assert_allclose(values, [0.45 * unit, 0.55 * unit], rtol=1e-12)
+
+
 def test_noise_and_scatter_can_be_swept(study):
     found = st.Study.from_dict(study | {"sweep": SWEEP}, folder=".").run(progress=False)
     assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 30}

@@ -53,7 +53,9 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
         return value
     read = (info.context or {}).get("read")
     if read is not None and not isinstance(value, xr.DataArray):
-        value = read(value, "strength")
+        table = dict(value) if isinstance(value, dict) else {"file": value}
+        quantity = table.pop("quantity", "strength")
+        value = read(table, quantity)
     if isinstance(value, dict) and "dims" in value:
         value = xr.DataArray.from_dict(value)
     if isinstance(value, dict) and "values" in value:

@@ -147,6 +147,20 @@ class RandomInterface:
     correlation: Correlation | None = None
     between: dict[str, AnyMarginal] | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _name_quantities(cls, given: Any) -> Any:
+        """Name the quantity that a measured profile in a study file holds, for its reader."""
+        found = dict(given) if isinstance(given, dict) else {}
+        for name, field in found.items():
+            known = field.get("given") if isinstance(field, dict) else None
+            if isinstance(known, dict) and isinstance(known.get("profile"), str | dict):
+                quantity = {"quantity": "friction_coefficient" if field.get("of") else name}
+                profile = known["profile"]
+                profile = {"file": profile} if isinstance(profile, str) else profile
+                found[name] = field | {"given": known | {"profile": quantity | profile}}
+        return found or given
+
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
         problems = [
