@@ -52,14 +52,14 @@ class Specimen(NamedTuple):
         peaks = onsets if local is None else moved(onsets, local)
         return cls(onsets, local, bound, peaks, tabulate(peaks, bound))
 
-    def without(self, batch: int) -> Densities:
-        """Return the densities from all samples but those of one batch."""
+    def without(self, batch: int) -> Self:
+        """Return the same from all samples but those of one batch."""
 
         def kept(values: Array) -> Array:
             return values[:, np.arange(values.shape[1]) % BATCHES != batch]
 
         local = None if self.local is None else kept(self.local)
-        return self.of(kept(self.onsets), local, self.bound).densities
+        return self.of(kept(self.onsets), local, self.bound)
 
 
 class Model(NamedTuple):
@@ -75,15 +75,10 @@ class Model(NamedTuple):
     high: Array
 
     def log_densities(
-        self,
-        number: int,
-        theta: Array,
-        peaks: Array,
-        densities: Densities | None = None,
-        floor: float = -np.inf,
+        self, number: int, theta: Array, peaks: Array, floor: float = -np.inf
     ) -> Array:
         """Return logarithms of the density of peaks of specimen `number`, (points, peaks)."""
-        used = self.specimens[number].densities if densities is None else densities
+        used = self.specimens[number].densities
         index, weight = corners(self.axes, theta)
         shift, stretch = map(np.ascontiguousarray, self.scaling.of(theta))
         own, out = np.ascontiguousarray(peaks), np.empty((theta.shape[0], peaks.size))
@@ -189,14 +184,10 @@ class Likelihood(NamedTuple):
     model: Model
     peaks: tuple[Array, ...]
 
-    def each(self, u: Array, floor: float = -np.inf) -> Array:
-        """Return the logarithm of the likelihood of each test at points u (points, parameters)."""
-        theta = self.model.prior.theta(u)
-        found = [
-            self.model.log_densities(number, theta, peaks, floor=floor)
-            for number, peaks in enumerate(self.peaks)
-        ]
-        return np.concatenate(found, axis=1)
+    def parts(self, u: Array, floor: float = -np.inf) -> list[Array]:
+        """Return logarithms of the likelihood of each test at points u, (points, tests) each."""
+        theta, densities = self.model.prior.theta(u), self.model.log_densities
+        return [densities(i, theta, peaks, floor) for i, peaks in enumerate(self.peaks)]
 
     def __call__(self, u: Array, floor: float = -np.inf) -> Array:
         """Return the logarithm of the likelihood at points u (points, parameters).
@@ -208,14 +199,10 @@ class Likelihood(NamedTuple):
         inside = np.all((u >= self.model.low) & (u <= self.model.high), axis=1)
         result = np.full(u.shape[0], -np.inf)
         if inside.any():
-            result[inside] = self.each(u[inside], floor).sum(axis=1)
+            result[inside] = np.concatenate(self.parts(u[inside], floor), axis=1).sum(axis=1)
         return result
 
-    def without(self, u: Array, batch: int) -> Array:
+    def without(self, batch: int) -> Self:
         """Return the same from all simulated samples but those of one batch."""
-        theta = self.model.prior.theta(u)
-        result = np.zeros(u.shape[0])
-        for number, peaks in enumerate(self.peaks):
-            densities = self.model.specimens[number].without(batch)
-            result += self.model.log_densities(number, theta, peaks, densities).sum(axis=1)
-        return result
+        specimens = tuple(one.without(batch) for one in self.model.specimens)
+        return self._replace(model=self.model._replace(specimens=specimens))

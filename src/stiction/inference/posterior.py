@@ -164,7 +164,7 @@ class Posterior:
         return arviz.from_dict(
             posterior={key: own[None] for key, own in self.draws.items()},
             prior={key: before[None, :, i] for i, key in enumerate(self.names)},
-            log_likelihood={name: self.likelihood.each(self.u)[None]},
+            log_likelihood={name: np.concatenate(self.likelihood.parts(self.u), axis=1)[None]},
             posterior_predictive={name: predicted[None]},
             observed_data={name: measured},
             coords={"test": np.arange(measured.size)},
@@ -219,7 +219,8 @@ def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
     theta = likelihood.model.prior.theta(u)
     means = []
     for batch in range(BATCHES):
-        change = likelihood.without(u, batch) - whole
+        parts = likelihood.without(batch).parts(u)
+        change = sum(part.sum(axis=1) for part in parts) - whole
         weight = np.exp(change - change.max())
         means.append(weight @ theta / weight.sum())
     spread = np.array(means) - np.mean(means, axis=0)
