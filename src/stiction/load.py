@@ -1,6 +1,7 @@
 """The load: a profile that grows, on top of an initial stress.
 
-A load of your own is a class that derives from `LoadShape`, as `GradientLoad` and `EdgeLoad` do.
+A load of your own is a class that derives from `LoadShape`, as `GradientLoad` and
+`EdgeLoad` do.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 class LoadShape(ABC):
     """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
 
-    To add one, decorate a class that derives from it with `stiction.model.model`, so that its
-    parameters are checked, and with `register`, so that study files know its `type`.
+    To add one, decorate a class that derives from it with `stiction.model.model`, so that
+    its parameters are checked, and with `register`, so that study files know its `type`.
     """
 
     @abstractmethod
@@ -104,8 +105,9 @@ class GradientLoad(LoadShape):
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
 
-    The profile is proportional to 1 + excess exp(-distance/decay). The interface is periodic, so
-    that both sides of the edge are loaded, like a specimen and its mirror image.
+    The profile is proportional to 1 + excess exp(-distance/decay). The interface is
+    periodic, so that both sides of the edge are loaded, like a specimen and its mirror
+    image.
 
     Parameters
     ----------

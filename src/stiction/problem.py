@@ -53,9 +53,10 @@ class Sample(NamedTuple):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Without the
-        first axis for `one` sample. Strength may be infinite for methods that accept barriers.
-        Where it is at or below the residual strength, both are equal and W has no effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Without
+        the first axis for `one` sample. Strength may be infinite for methods that accept
+        barriers. Where it is at or below the residual strength, both are equal and W has
+        no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
@@ -142,8 +143,8 @@ class Problem:
     Raises
     ------
     InputError
-        Naming all that does not fit, such as arrays of another shape than the interface, or fewer
-        than four nodes in the nucleation length.
+        Naming all that does not fit, such as arrays of another shape than the interface,
+        or fewer than four nodes in the nucleation length.
 
     Examples
     --------
@@ -254,7 +255,8 @@ class Problem:
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
 
-        An `InputError` if the rate varies along the interface or follows from other parameters.
+        An `InputError` if the rate varies along the interface or follows from other
+        parameters.
         """
         if self.uniform_rate is None:
             raise InputError(
@@ -314,20 +316,20 @@ class Problem:
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by name:
-            'strength', and any others of `PROFILES`, of 'weakening_rate', 'critical_slip' and
-            'fracture_energy' one. They may also be (samples, 1) or a number and replace the
-            problem's own.
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles
+            by name: 'strength', and any others of `PROFILES`, of 'weakening_rate',
+            'critical_slip' and 'fracture_energy' one. They may also be (samples, 1) or a
+            number and replace the problem's own.
         accept : collection of {"barriers", "overstress", "constant"}
-            What the method at hand can do besides: infinite strength where nothing breaks; an
-            initial stress above the strength. "constant": the caller has warned of nodes that do
-            not weaken.
+            What the method at hand can do besides: infinite strength where nothing breaks;
+            an initial stress above the strength. "constant": the caller has warned of
+            nodes that do not weaken.
 
         Raises
         ------
         InputError
-            Naming all that is wrong: names, shapes, values that are not finite, strength not above
-            the initial stress, or nowhere above the residual strength.
+            Naming all that is wrong: names, shapes, values that are not finite, strength
+            not above the initial stress, or nowhere above the residual strength.
 
         Notes
         -----
@@ -425,9 +427,10 @@ def profiles_of(
 ) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError` naming it.
 
-    A single profile (*shape) is one sample; where `samples` is given, a number, a profile or one
-    number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays the names of
-    dimensions, the coordinates and the units decide. Positive infinity passes if `infinite`.
+    A single profile (*shape) is one sample; where `samples` is given, a number, a profile
+    or one number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays
+    the names of dimensions, the coordinates and the units decide. Positive infinity passes
+    if `infinite`.
     """
     shape = interface.shape
     nodes = ", ".join(map(str, shape))

@@ -1,18 +1,21 @@
 """A field that is known in part: measured values with errors, and what follows for the rest.
 
-A Gaussian field on an interface is a linear function of its draws a, z(x) = phi(x)^T a, with a
-standard normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
+A Gaussian field on an interface is a linear function of its draws a, z(x) = phi(x)^T a,
+with a standard normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose
+posterior is
 
-    a | z ~ N(mu, P),  P = (1 + Psi^T Psi)^-1,  mu = P Psi^T (z_k/error_k),  Psi = phi(x_k)/error_k,
+    a | z ~ N(mu, P),  P = (1 + Psi^T Psi)^-1,  mu = P Psi^T (z_k/error_k)
 
-and mu + P^(1/2) a with the symmetric root turns the usual draws into conditioned ones; the
-distribution is that of Matheron's rule (Journel and Huijbregts, 1978; Doucet, 2010). With the
-singular values of Psi = U s V^T, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V^T is well conditioned
-however densely a smooth field was measured.
+with Psi = phi(x_k)/error_k. So mu + P^(1/2) a with the symmetric root turns the usual
+draws into conditioned ones, of the distribution that Matheron's rule gives (Journel and
+Huijbregts, 1978; Doucet, 2010). With the singular values of Psi = U s V^T, P^(1/2) =
+1 + V ((1 + s^2)^(-1/2) - 1) V^T is well conditioned however densely a smooth field was
+measured.
 
-Values are measured of the marginal and not of z. Their likelihood, a function of z at each place,
-is replaced by the Gaussian of the same mean and variance, in turns with the regression
-(expectation propagation; Minka, 2001), which holds near bounds of the marginal, too.
+Values are measured of the marginal and not of z. Their likelihood, a function of z at each
+place, is replaced by the Gaussian of the same mean and variance, in turns with the
+regression (expectation propagation; Minka, 2001), which holds near bounds of the marginal,
+too.
 """
 
 from collections.abc import Sequence
@@ -227,9 +230,9 @@ class Conditioning:
 
         log p(u | values) = -u^2/2 + log scale(u) - chi^2(u)/2 - sum log(1 + s^2(u))/2,
 
-    with the Gaussians for one place at a time. It is tabulated, and u mapped to it quantile by
-    quantile. The regression is made at its mean; elsewhere values of z move by as much as the
-    Gaussians for one place at a time do.
+    with the Gaussians for one place at a time. It is tabulated, and u mapped to it
+    quantile by quantile. The regression is made at its mean; elsewhere values of z move by
+    as much as the Gaussians for one place at a time do.
     """
 
     def __init__(self, measured: Sequence[Measured]) -> None:

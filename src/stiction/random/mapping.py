@@ -2,10 +2,10 @@
 correlation.
 
 The map is tabulated, which is a thousand times faster than scipy's quantile: cubic Hermite
-pieces on a uniform grid of [-8, 8]. Every piece is checked when the table is built; those that
-miss the tolerance (at a kink of the density, say) and all z outside are left to scipy. So the
-result is accurate everywhere: to 1e-9 of the value, or of a millionth of the standard
-deviation where the value is smaller than that.
+pieces on a uniform grid of [-8, 8]. Every piece is checked when the table is built; those
+that miss the tolerance (at a kink of the density, say) and all z outside are left to
+scipy. So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the
+standard deviation where the value is smaller than that.
 """
 
 from functools import lru_cache
@@ -107,11 +107,11 @@ def from_normal(marginal: Any, z: Array) -> Array:
 def hermite_coefficients(marginal: Any) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
-    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By a fine
-    trapezoidal rule on |z| <= 8, which stays accurate where the map has kinks. Heavy tails have
-    their variance further out and in high orders: then on |z| <= 37, and up to order 1000. The
-    last coefficient stands for all the rest of the variance, so that the correlation is 1 at
-    zero lag. An `InputError` if scipy's quantile and moments disagree.
+    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By a
+    fine trapezoidal rule on |z| <= 8, which stays accurate where the map has kinks. Heavy
+    tails have their variance further out and in high orders: then on |z| <= 37, and up to
+    order 1000. The last coefficient stands for all the rest of the variance, so that the
+    correlation is 1 at zero lag. An `InputError` if scipy's quantile and moments disagree.
     """
     coefficients, tail = _expand(marginal.distribution, REACH)
     if tail > SMALL:

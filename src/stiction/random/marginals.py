@@ -214,8 +214,8 @@ class TruncatedNormal(_ByMoments):
     Raises
     ------
     InputError
-        If no cut normal distribution has these moments: it scatters less than an exponential,
-        between two bounds less than a uniform, distribution.
+        If no cut normal distribution has these moments: it scatters less than an
+        exponential, between two bounds less than a uniform, distribution.
 
     Examples
     --------

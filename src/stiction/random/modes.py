@@ -25,13 +25,13 @@ class Modes:
     Attributes
     ----------
     sigma : (J + 1,) array
-        Standard deviations of modes 0..J; their squares sum to 1. The first is zero without the
-        mean mode.
+        Standard deviations of modes 0..J; their squares sum to 1. The first is zero
+        without the mean mode.
     numbers : (dimensions, J + 1) array of int
         Their wave vectors in units of 2 pi/length; of k and -k, one.
     ranks : (J,) array of int
-        Places of modes 1..J in the order of draws, rising, whatever the spectrum leaves out. On
-        a line these are the numbers of the waves.
+        Places of modes 1..J in the order of draws, rising, whatever the spectrum leaves
+        out. On a line these are the numbers of the waves.
     dimension : int
         Number of standard normal draws a sample.
     """

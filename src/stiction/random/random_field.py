@@ -51,8 +51,8 @@ class RandomField:
         On a plane, the correlation length along y over that along x, which is that of the
         spectrum; 1 if left out.
     of : {"friction_coefficient"}, optional
-        The field holds friction coefficients: the strength (or another stress, where the field
-        stands for one) is their product with the normal pressure.
+        The field holds friction coefficients: the strength (or another stress, where the
+        field stands for one) is their product with the normal pressure.
     conditions : Conditions, optional
         What was measured of it, as `given` enters it; in a study file the table ``given``.
 
@@ -173,8 +173,8 @@ class RandomField:
         Returns
         -------
         RandomField
-            Like any other, for one interface: the one that was measured. Its samples have the
-            draws of those of this field, and tend to them as the noise grows.
+            Like any other, for one interface: the one that was measured. Its samples have
+            the draws of those of this field, and tend to them as the noise grows.
 
         Examples
         --------
@@ -304,7 +304,8 @@ class RandomField:
     def efolding_length(self, *, of: Of = "strength") -> float:
         """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
-        That of the mapped field or of the Gaussian one, z, with truncation; on a plane along x.
+        That of the mapped field or of the Gaussian one, z, with truncation; on a plane
+        along x.
         """
         if of == "z":
             return float(self.spectrum.efolding_length)

@@ -98,8 +98,8 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which
-        the normal pressure turns into strength. So may be the other stresses.
+        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``,
+        which the normal pressure turns into strength. So may be the other stresses.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Pa.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
@@ -107,11 +107,12 @@ class RandomInterface:
     correlation : mapping, optional
         Correlation coefficients of the Gaussian fields of two properties, mode by mode:
         ``{("strength", "residual_strength"): 0.8}``, in a study file
-        ``correlation.strength.residual_strength = 0.8``. Pairs that are not named are independent.
-        With 1 and the same spectrum one field is a function of the other.
+        ``correlation.strength.residual_strength = 0.8``. Pairs that are not named are
+        independent. With 1 and the same spectrum one field is a function of the other.
     between : mapping, optional
-        Marginals of factors that differ from specimen to specimen and are constant along each,
-        by property: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. Positive, with mean 1.
+        Marginals of factors that differ from specimen to specimen and are constant along
+        each, by property: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. Positive, with
+        mean 1.
 
     Notes
     -----

@@ -285,8 +285,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
-    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is kept if
-    nothing else is given, since every further nine takes ten times as many modes.
+    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is kept
+    if nothing else is given, since every further nine takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"

@@ -34,8 +34,8 @@ def standard_normal(
     Returns
     -------
     (samples, dimension) array
-        A, B of one mode after the other, of those of the given `ranks` (rising), with A_0 in
-        front if `mean_mode`. `block` samples share a generator.
+        A, B of one mode after the other, of those of the given `ranks` (rising), with A_0
+        in front if `mean_mode`. `block` samples share a generator.
     """
     modes = int(ranks[-1]) if ranks.size else 0
     kept: slice | NDArray[np.int64] = slice(2, None)

@@ -1,11 +1,11 @@
 """Estimates with standard errors: means, standard deviations and quantiles of samples.
 
-Also the mean of few expensive results with the help of ever more inexpensive ones, as control
-variates. Sample i is the same whatever the method. The expensive result of samples 0 .. n - 1 is
-Y, those of ever less expensive methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2 - 1 and so on,
-n <= N_1 <= N_2 ... What a method gets right about the next more expensive one is averaged over
-all of its own samples, what it gets wrong over those of the latter only (Peherstorfer, Willcox
-and Gunzburger, 2016).
+Also the mean of few expensive results with the help of ever more inexpensive ones, as
+control variates. Sample i is the same whatever the method. The expensive result of samples
+0 .. n - 1 is Y, those of ever less expensive methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2
+- 1 and so on, n <= N_1 <= N_2 ... What a method gets right about the next more expensive
+one is averaged over all of its own samples, what it gets wrong over those of the latter
+only (Peherstorfer, Willcox and Gunzburger, 2016).
 """
 
 from __future__ import annotations

@@ -69,9 +69,9 @@ def nucleation_statistics(
     the least over several shapes, which that takes, has no moments in closed form.
 
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the
-    double integral of the correlation of tau_p (by Hermite expansion; Grigoriu, 1995) against
-    the weights, on a periodic interface the sum over wave vectors of the spectrum of tau_p
-    times the squared transform of the weight.
+    double integral of the correlation of tau_p (by Hermite expansion; Grigoriu, 1995)
+    against the weights, on a periodic interface the sum over wave vectors of the spectrum
+    of tau_p times the squared transform of the weight.
 
     Examples
     --------

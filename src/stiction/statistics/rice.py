@@ -52,11 +52,11 @@ class RiceDistribution:
     relative_error : (m,) array
         Sampling error of the crossing rate, one over the root of the crossings seen.
     trusted : (m,) array of bool
-        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
-        or dips were seen, and on a line `1 - point_survival` is at most 4 % of P, since P is too
-        high by up to (1 - point_survival)/P where xi_0 is not short against the interface. On a
-        plane there are at most 1.1 dips for each sample that has any. Above P = 0.1 P is too
-        low, on a line by 4 to 9 % at the median.
+        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10
+        crossings or dips were seen, and on a line `1 - point_survival` is at most 4 % of
+        P, since P is too high by up to (1 - point_survival)/P where xi_0 is not short
+        against the interface. On a plane there are at most 1.1 dips for each sample that
+        has any. Above P = 0.1 P is too low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
