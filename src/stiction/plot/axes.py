@@ -62,14 +62,6 @@ def on_axes(
         yield figure.subplots()
 
 
-def add_legend(axes: Axes, given: Axes | None) -> None:
-    """Add a legend: below new axes, inside those of the caller, whose layout stays."""
-    if given is None:
-        axes.figure.legend(loc="outside lower center", ncols=2)
-    else:
-        axes.legend(fontsize="small")
-
-
 def problem_of(result: Any, problem: Problem | None = None) -> Problem:
     """Return the given problem, or the one in the attributes of a result; else an `InputError`."""
     if problem is not None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.model import check
 from stiction.plot import maps
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, color, series
@@ -61,10 +62,7 @@ def field(
     'strength $\\\\tau_p$ (MPa)'
     """
     interface = where.interface if isinstance(where, Problem) else where
-    if not isinstance(interface, Interface):
-        raise InputError(
-            f"where: must be a Problem or an Interface, got {type(where).__name__}"
-        )
+    check("where", interface, Interface)
     if quantity not in PROFILES:
         raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
     of_field = isinstance(profile, RandomField)
@@ -72,14 +70,13 @@ def field(
     factor, unit = unit_for(PROFILES[quantity].units, rows)
     name = " ".join(filter(None, (quantity.replace("_", " "), _SYMBOLS.get(quantity))))
     text = with_unit(name, unit)
+    scale, _ = unit_for("m", interface.lengths)
+    conditions = profile.conditions if of_field else None
     if interface.is_plane:
         with on_axes(ax, height=maps.height(interface)) as axes:
-            bar = maps.image(axes, interface, rows[0] * factor, cmap="cividis")
-            axes.figure.colorbar(bar, ax=axes, label=text, **maps.BAR)
-            maps.label(axes, interface)
-            if of_field and profile.conditions is not None:
-                near = unit_for("m", interface.lengths)[0] * profile.conditions.places
-                axes.plot(*near, ".", color="w", markersize=2.0)
+            maps.image(axes, interface, rows[0] * factor, text, cmap="cividis")
+            if conditions is not None:
+                axes.plot(*(scale * conditions.places), ".", color="w", markersize=2.0)
         return axes
     with on_axes(ax, width=PAGE, height=2.4) as axes:
         x = places(interface)
@@ -89,11 +86,9 @@ def field(
         if of_field:
             low, high = (profile.quantile(interface, share) * factor for share in (0.05, 0.95))
             axes.fill_between(x, low, high, color=INK, alpha=0.15, linewidth=0.0, label="90 %")
-        if of_field and profile.conditions is not None:
-            place = unit_for("m", interface.lengths)[0] * profile.conditions.places[0]
-            axes.plot(
-                place, profile.conditions.values * factor, ".", markersize=3.0, color=color(1)
-            )
+        if conditions is not None:
+            place, values = scale * conditions.places[0], conditions.values * factor
+            axes.plot(place, values, ".", color=color(1), markersize=3.0)
         finish_line(axes, interface, text)
         if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
             add_friction_scale(axes, where, "y", factor)
@@ -101,13 +96,7 @@ def field(
 
 
 def rows_of(interface: Interface, profile: Any) -> NDArray[np.float64]:
-    """Return a profile as (samples, *shape).
-
-    Raises
-    ------
-    InputError
-        If it does not fit the interface.
-    """
+    """Return a profile as (samples, *shape); one of another shape is an `InputError`."""
     values = np.asarray(getattr(profile, "values", profile), dtype=np.float64)
     shape = interface.shape
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:

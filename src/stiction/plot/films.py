@@ -143,15 +143,11 @@ def _plane_film(run: xr.Dataset) -> Frames:
     low, high = np.quantile(stress, [0.001, 0.999])
     figure = new_figure(PAGE * 1.15, 3.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    slip = maps.image(left, interface, masked(rate[0], norm), norm=norm, cmap=COLORS)
-    load = maps.image(right, interface, stress[0], vmin=low, vmax=high, cmap="cividis")
-    for axes, image, text in (
-        (left, slip, "slip rate (m/s)"),
-        (right, load, f"shear stress ({unit})"),
-    ):
-        figure.colorbar(image, ax=axes, label=text, location="bottom", shrink=0.9)
-        maps.label(axes, interface)
-        axes.label_outer()
+    slow = masked(rate[0], norm)
+    slip = maps.image(left, interface, slow, "slip rate (m/s)", norm=norm, cmap=COLORS)
+    text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}
+    load = maps.image(right, interface, stress[0], text, cmap="cividis", **ends)
+    right.label_outer()
     clock, tick = _clock(left, run)
 
     def show(i: int) -> None:

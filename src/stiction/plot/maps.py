@@ -12,24 +12,32 @@ from stiction.plot.axes import unit_for
 
 GREYS = LinearSegmentedColormap.from_list("pale greys", ["#6e6e6e", "#fbfbfb"])
 """Light enough for outlines to be seen on it."""
-BAR: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "pad": 0.02, "aspect": 40}
 
 
 def edges(interface: Interface) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of the map in the unit of its axes."""
     factor, _ = unit_for("m", interface.lengths)
     (x, y), (dx, dy) = interface.lengths, interface.spacings
-    return (
-        -0.5 * dx * factor, (x - 0.5 * dx) * factor, -0.5 * dy * factor, (y - 0.5 * dy) * factor
-    )  # fmt: skip
+    ends = -0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy
+    left, right, bottom, top = (end * factor for end in ends)
+    return left, right, bottom, top
 
 
-def image(axes: Axes, interface: Interface, field: NDArray[Any], **options: Any) -> Any:
-    """Draw a field (nx, ny) of a plane and return the image."""
-    return axes.imshow(
+def image(
+    axes: Axes, interface: Interface, field: NDArray[Any], text: str, **options: Any
+) -> Any:
+    """Draw a field (nx, ny) of a plane with its scale and names of the directions."""
+    drawn = axes.imshow(
         field.T, origin="lower", extent=edges(interface), interpolation="nearest", aspect="equal",
         **options,
     )  # fmt: skip
+    axes.figure.colorbar(
+        drawn, ax=axes, label=text, location="bottom", shrink=0.8, pad=0.02, aspect=40
+    )
+    _, unit = unit_for("m", interface.lengths)
+    axes.set_xlabel(f"$x$ ({unit}), direction of slip")
+    axes.set_ylabel(f"$y$ ({unit})")
+    return drawn
 
 
 def outline(
@@ -53,13 +61,6 @@ def keep_edges(axes: Axes, interface: Interface) -> None:
     left, right, bottom, top = edges(interface)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
-
-
-def label(axes: Axes, interface: Interface) -> None:
-    """Name the directions."""
-    _, unit = unit_for("m", interface.lengths)
-    axes.set_xlabel(f"$x$ ({unit}), direction of slip")
-    axes.set_ylabel(f"$y$ ({unit})")
 
 
 def height(interface: Interface, more: float = 1.0) -> float:

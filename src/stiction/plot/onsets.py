@@ -20,7 +20,6 @@ from stiction.placing import IN_GAP, stored_gaps
 from stiction.plot import maps
 from stiction.plot.axes import (
     add_friction_scale,
-    add_legend,
     named,
     need,
     on_axes,
@@ -101,14 +100,14 @@ def onset(
             " samples; they must have the same number"
         )
     chosen = {name: one.isel(sample=slice(sample, sample + 1)) for name, one in results.items()}
-    if problem.interface.is_plane:
-        with on_axes(ax, height=maps.height(problem.interface, 2.0)) as axes:
-            _draw_plane(axes, problem, rows[sample], chosen)
-            add_legend(axes, ax)
-        return axes
-    with on_axes(ax, width=PAGE, height=2.8) as axes:
-        _draw_line(axes, problem, rows[sample], chosen)
-        add_legend(axes, ax)
+    is_plane = problem.interface.is_plane
+    size = {"height": maps.height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
+    with on_axes(ax, **size) as axes:
+        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], chosen)
+        if ax is None:  # below new axes; inside those of the caller, whose layout stays
+            axes.figure.legend(loc="outside lower center", ncols=2)
+        else:
+            axes.legend(fontsize="small")
     return axes
 
 
@@ -141,16 +140,11 @@ def _draw_line(
         place = float(result["critical_position"][0]) * length
         remark = " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
         axes.plot(
-            place,
-            float(result["critical_load"][0]) * factor,
-            linestyle="none",
-            marker=marker(number),
-            markersize=7.0 - number,
-            markerfacecolor="none" if number else color(number + 1),
-            markeredgecolor=color(number + 1),
-            markeredgewidth=1.2,
+            place, float(result["critical_load"][0]) * factor, linestyle="none",
+            marker=marker(number), markersize=7.0 - number, markeredgecolor=color(number + 1),
+            markerfacecolor="none" if number else color(number + 1), markeredgewidth=1.2,
             label=f"{_label(name, result)} at {place:.2f} {length_unit}{remark}",
-        )
+        )  # fmt: skip
     finish_line(axes, interface, with_unit("shear stress", unit))
     axes.margins(y=0.08)
     add_friction_scale(axes, problem, "y", factor)
@@ -164,8 +158,7 @@ def _draw_plane(
     factor, unit = unit_for("Pa", tau_p)
     length, length_unit = unit_for("m", interface.lengths)
     shades = maps.GREYS if exact is not None else "cividis"
-    drawn = maps.image(axes, interface, tau_p * factor, cmap=shades)
-    axes.figure.colorbar(drawn, ax=axes, label=rf"strength $\tau_p$ ({unit})", **maps.BAR)
+    maps.image(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", cmap=shades)
     if exact is not None:
         inside, _ = critical_patch(exact["sensitivity"].values[0], interface.spacings)
         maps.outline(axes, interface, exact["slip"].values[0] > 0.0, color(1), 0.9)
@@ -182,7 +175,6 @@ def _draw_plane(
         if exact is None and "critical_aspect" in result:
             _ellipse(axes, interface, x, y, result["critical_patch_extent"].values[0] * length)
     maps.keep_edges(axes, interface)
-    maps.label(axes, interface)
 
 
 def _label(name: str, result: xr.Dataset) -> str:
@@ -246,13 +238,12 @@ def equilibrium_path(
         with on_axes(ax, height=maps.height(interface, 1.2)) as axes:
             # Slip grows steeply with the load: a root shows small patches beside large ones.
             norm = PowerNorm(0.4, vmin=0.0, vmax=max(float(slip.max()) * scale, 1e-300))
-            drawn = maps.image(axes, interface, slip * scale, cmap="viridis", norm=norm)
+            text = f"slip ({slip_unit})"
+            maps.image(axes, interface, slip * scale, text, cmap="viridis", norm=norm)
             maps.outline(axes, interface, slip > 0.0, "white", 0.4)
             share = 100.0 * (slip > 0.0).mean()
             title = rf"$\tau_0$ = {loads[number]:.4f} {unit}, {share:.2g} % slips"
             axes.set_title(title, fontsize=7.5)
-            maps.label(axes, interface)
-            axes.figure.colorbar(drawn, ax=axes, label=f"slip ({slip_unit})", **maps.BAR)
         return axes
     scale, slip_unit = unit_for("m", path["slip"].values[balanced])
     with on_axes(ax, width=PAGE, height=2.6) as axes:

@@ -177,8 +177,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface = problem.interface
     strength = finite_strength(run)
     factor, unit = unit_for("Pa", strength)
-    drawn = maps.image(axes, interface, strength * factor, cmap="Greys")
-    axes.figure.colorbar(drawn, ax=axes, label=rf"strength $\tau_p$ ({unit})", **maps.BAR)
+    maps.image(axes, interface, strength * factor, rf"strength $\tau_p$ ({unit})", cmap="Greys")
     since = run["arrival_time"].values - float(run["onset_time"])
     scale, time_unit = unit_for("s", since)
     later = since[np.isfinite(since) & (since > 0.0)]
@@ -194,4 +193,3 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
         axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)
     place = [length * float(one) for one in run["critical_position"]]
     axes.plot(*place, "o", color=ACCENT, markersize=4.0, markeredgecolor="white")
-    maps.label(axes, interface)
