@@ -135,13 +135,11 @@ class Save:
         reach = " x ".join(f"{length:g}" for length in interface.lengths)
         problems, numbers = [], []
         for name, place in self.stations.items():
-            each = list(zip(place, interface.lengths, strict=False))
-            if len(place) != len(interface.shape) or not all(
-                0.0 <= x <= end for x, end in each
-            ):
+            inside = [0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=False)]
+            if len(place) != len(interface.shape) or not all(inside):
                 problems.append(
-                    f"stations[{name!r}]: must be {wanted} in m on the interface of {reach} m,"
-                    f" from the first node, got {place}"
+                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; must be"
+                    f" {wanted} in m, from the first node"
                 )
                 continue
             cells = zip(place, interface.spacings, interface.shape, strict=True)
