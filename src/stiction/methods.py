@@ -245,7 +245,7 @@ def onset(
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
         method adds. Every variable has `units` and `long_name`. Of profiles with gaps that were
-        filled also `in_gap`: whether the onset lies in one.
+        filled also `in_gap`, whether the onset lies in one, and the coordinate `measured` of nodes.
 
     Raises
     ------

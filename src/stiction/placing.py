@@ -6,7 +6,6 @@ anywhere. What is missing stays NaN until somebody asks for it to be filled.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -28,8 +27,8 @@ TOLERANCE = 0.02
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
 SHOWN = 3
-IN_GAP, GAPS = "in_gap", "gaps"
-"""Variable and attribute of a result."""
+IN_GAP, MEASURED = "in_gap", "measured"
+"""Variable of a result; coordinate of results and profiles with gaps, False where none was."""
 OF_A_PLANE = (
     "; a map over x and y is read with the plane it belongs to,"
     " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
@@ -265,18 +264,6 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
     values[hole] = spsolve(matrix.tocsc()[:, own], right)
 
 
-def gaps_of(missing: Mask, interface: Interface) -> list[tuple[float, float]]:
-    """Return where nodes of a line lack a value: first and last, m; first > last across x = 0."""
-    x = interface.x
-    if missing.all():
-        return [(0.0, float(x[-1]))]
-    starts = np.flatnonzero(missing & ~np.roll(missing, 1))
-    ends = np.flatnonzero(missing & ~np.roll(missing, -1))
-    if ends.size and ends[0] < starts[0]:  # one begins before x = 0 and ends behind it
-        ends = np.roll(ends, -1)
-    return list(zip(x[starts].tolist(), x[ends].tolist(), strict=True))
-
-
 def describe_gaps(missing: Mask, interface: Interface) -> str:
     """Return 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
     maps = missing.reshape(-1, *interface.shape)
@@ -285,13 +272,17 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
     if len(maps) > 1:
         count += f" of sample {row}"
     if interface.is_plane:
-        first = interface.describe_node(int(np.argmax(maps[row])))
-        return f"are no values (NaN) at {count}, the first at {first}"
-    spans = gaps_of(maps[row], interface)
-    at = ", ".join(
-        f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in spans[:SHOWN]
-    )
-    more = f" and {len(spans) - SHOWN} more gaps" if len(spans) > SHOWN else ""
+        place = interface.describe_node(int(np.argmax(maps[row])))
+        return f"are no values (NaN) at {count}, the first at {place}"
+    first = np.flatnonzero(maps[row] & ~np.roll(maps[row], 1))
+    last = np.flatnonzero(maps[row] & ~np.roll(maps[row], -1))
+    if maps[row].all():
+        first, last = np.array([0]), np.array([-1])
+    elif last[0] < first[0]:  # a gap begins before x = 0 and ends behind it
+        last = np.roll(last, -1)
+    ends = zip(interface.x[first][:SHOWN], interface.x[last][:SHOWN], strict=True)
+    at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in ends)
+    more = f" and {first.size - SHOWN} more gaps" if first.size > SHOWN else ""
     return f"are no values (NaN) at x = {at}{more} ({count})"
 
 
@@ -318,9 +309,11 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     dims = tuple(dim for dim in position.dims if dim != "direction")
     attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
     result[IN_GAP] = (dims, inside.reshape([position.sizes[dim] for dim in dims]), attributes)
-    if not interface.is_plane and np.all(measured == measured[:1]):
-        result.attrs[GAPS] = json.dumps(gaps_of(~measured[0], interface))
-    return result
+    one = measured.shape[0] == 1
+    along = interface.dims if one else ("sample", *interface.dims)
+    nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
+    mask = {MEASURED: (along, measured[0] if one else measured)}
+    return result.assign_coords(nodes | mask)
 
 
 def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[float]) -> Mask:
@@ -336,8 +329,3 @@ def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[f
             near.append(apart < (1.0 - 1e-9) * most)
         found[i] = not maps[i][np.ix_(*near)].all()
     return found
-
-
-def stored_gaps(result: xr.Dataset) -> list[tuple[float, float]]:
-    """Return the gaps that all profiles have: first and last node without a value, m."""
-    return [(float(a), float(b)) for a, b in json.loads(result.attrs.get(GAPS, "[]"))]

@@ -17,7 +17,7 @@ import numpy as np
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.interface import Interface
 from stiction.model import FilePath, Flag, check, checked, describe, real_array
-from stiction.placing import OF_A_PLANE, Gaps, Points, close_gaps, place
+from stiction.placing import MEASURED, OF_A_PLANE, Gaps, Points, close_gaps, place
 from stiction.tables import load, read_npy
 from stiction.units import factor_to, is_in, parse
 
@@ -51,8 +51,6 @@ NAMES = {
 }
 PLACES = ("x", "position", "pos", "distance", "coordinate")
 SAMPLES = ("sample", "samples")
-MEASURED = "measured"
-"""Coordinate of a profile with gaps: False where there was no value."""
 
 Column = str | int | None
 

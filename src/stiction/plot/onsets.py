@@ -16,7 +16,7 @@ from stiction.criterion.local import nucleation_stress
 from stiction.equilibrium.patches import critical_patch
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.placing import IN_GAP, stored_gaps
+from stiction.placing import IN_GAP, MEASURED
 from stiction.plot import maps
 from stiction.plot.axes import (
     add_friction_scale,
@@ -118,12 +118,12 @@ def _draw_line(
     x = places(interface)
     factor, unit = unit_for("Pa", tau_p)
     length, length_unit = unit_for("m", interface.lengths)
-    spans = stored_gaps(next(iter(results.values())))
+    found = next(iter(results.values()))
     missing = np.zeros(x.size, dtype=bool)
-    for begin, end in spans:
-        missing |= _between(interface, begin, end)
+    if MEASURED in found.coords:
+        missing = ~found[MEASURED].values.reshape(-1)
     measured = np.where(missing, np.nan, tau_p)
-    if spans:
+    if missing.any():
         axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
         beside = np.roll(missing, 1) | np.roll(missing, -1)
         axes.fill_between(
@@ -192,13 +192,6 @@ def _ellipse(axes: Axes, interface: Interface, x: float, y: float, extent: Array
     for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
         place = (x + i * lengths[0], y + j * lengths[1])
         axes.add_patch(Ellipse(place, *extent, fill=False, edgecolor="white", linewidth=0.9))
-
-
-def _between(interface: Interface, begin: float, end: float) -> Any:
-    """Return the nodes of a gap, which may lie across x = 0."""
-    x, half = interface.x, 0.5 * interface.spacing
-    after, before = x > begin - half, x < end + half
-    return after & before if begin <= end else after | before
 
 
 def equilibrium_path(
