@@ -180,8 +180,7 @@ def posterior(found: Posterior) -> Figure:
         Each parameter before (grey) and after the tests on the diagonal, with the information
         gained (nats); pairs below; on the right the measured and predicted peaks.
     """
-    names = found.names
-    count = len(names)
+    names, count = found.names, len(found.names)
     size = max(2.0 * count, 4.0)
     drawn = found.prior.theta(np.random.default_rng(0).random((20_000, count)))
     before, after, labels = [], [], []
@@ -239,11 +238,9 @@ def _is_wide(values: Array) -> bool:
 def _draw_marginal(axes: Axes, before: Array, after: Array) -> None:
     low, high = np.quantile(before, [0.002, 0.998])
     bins: Any = (np.geomspace if _is_wide(before) else np.linspace)(low, high, 46)
-    styles: tuple[dict[str, Any], ...] = (
-        {"color": PALE, "histtype": "stepfilled", "label": "prior"},
-        {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2},
-    )
-    for values, style in zip((before, after), styles, strict=True):
+    prior: Any = {"color": PALE, "histtype": "stepfilled", "label": "prior"}
+    own: Any = {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2}
+    for values, style in ((before, prior), (after, own)):
         axes.hist(values, bins=bins, weights=np.full(values.size, 1.0 / values.size), **style)
     axes.set_yticks([])
     if _is_wide(before):

@@ -58,6 +58,7 @@ class Descent(NamedTuple):
     threshold: float
     evaluations: int
     complete: bool
+    first_stage_evaluations: int = 0
 
     @property
     def extent(self) -> tuple[float, float]:

@@ -66,10 +66,9 @@ class Tail(NamedTuple):
     @property
     def attributes(self) -> dict[str, Any]:
         """What an answer holds of it."""
-        firsts = (getattr(one, "first_stage_evaluations", 0) for one in self.repetitions)
         return {
             "evaluations": self.spent,
-            "first_stage_evaluations": sum(firsts),
+            "first_stage_evaluations": sum(o.first_stage_evaluations for o in self.repetitions),
             "algorithm": self.algorithm,
             "reason": self.reason,
         }
