@@ -98,33 +98,29 @@ def _quantiles(axes: Axes, found: FieldFit) -> None:
     factor, unit = unit_for(UNITS[found.quantity], values)
     share = (np.arange(200) + 0.5) / 200
     expected = found.field.marginal.distribution.ppf(share) * factor
-    spread = [one.marginal.distribution.ppf(share) for one in found.repetitions[:SHOWN]]
-    _band(axes, expected, np.array(spread) * factor)
-    ends = [expected[0], expected[-1]]
-    axes.plot(ends, ends, color=color(1), linewidth=1.0)
-    axes.plot(expected, np.quantile(values, share) * factor, ".", color=INK, markersize=3)
+    spread = [
+        one.marginal.distribution.ppf(share) * factor for one in found.repetitions[:SHOWN]
+    ]
+    _compare(axes, expected, np.quantile(values, share) * factor, expected, spread)
     axes.set_xlabel(with_unit("quantile of the fit", unit))
     axes.set_ylabel(with_unit("quantile of the data", unit))
 
 
 def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
-    model = found._estimate.model
-    spacing = one.window.spacings[0]
+    model, spacing = found._estimate.model, one.window.spacings[0]
     most = LAGS * model.spectrum.correlation_length
     count = int(np.clip(round(most / spacing), 12, one.window.shape[0] // 2))
     factor, unit = unit_for("m", count * spacing)
-    lag = np.arange(count) * spacing * factor
 
     def correlation(power: Array) -> Array:
         covariance = fft.irfftn(power, one.window.shape)
-        along = covariance.reshape(covariance.shape[0], -1)[:count, 0]
-        scaled: Array = along / along[0]
-        return scaled
+        along: Array = covariance.reshape(covariance.shape[0], -1)[:count, 0]
+        return along / along[0]
 
-    _band(axes, lag, np.array([correlation(power) for power in simulated]))
-    measured = correlation(one.average)
-    axes.plot(lag, measured, ".", color=INK, markersize=3, label="measured")
-    axes.plot(lag, correlation(model.expectation(one.window)), color=color(1), label="fitted")
+    fitted = correlation(model.expectation(one.window))
+    spread = [correlation(power) for power in simulated]
+    lag = np.arange(count) * spacing * factor
+    _compare(axes, lag, correlation(one.average), fitted, spread, "measured", "fitted")
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
     axes.set_xlabel(with_unit("lag along x", unit))
     axes.set_ylabel("correlation in the window")
@@ -135,30 +131,30 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     scale, unit = unit_for(UNITS[found.quantity], np.concatenate(found._rows))
     model = found._estimate.model
     factor = float(np.prod(one.window.spacings)) * scale**2
-
-    def averaged(power: Array) -> Array:
-        """Return wavenumbers of bands, and a periodogram averaged over them."""
-        return bands(one, power, 4)[:, [0, 2]].T
-
-    k, expected = averaged(model.expectation(one.window))
-    measured = averaged(one.average)[1]
-    _band(
-        axes,
-        k,
-        factor * np.array([averaged(power)[1] for power in simulated], dtype=np.float64),
-    )
-    axes.plot(k, factor * expected, color=color(1), label="fitted, through the window")
-    axes.plot(k, factor * measured, ".", color=INK, markersize=4, label="measured, averaged")
-    if model.noise**2 > 1e-6 * expected.max():
-        style: dict[str, Any] = {"color": ACCENT, "linewidth": 0.8, "linestyle": "--"}
-        axes.axhline(factor * model.noise**2, label="noise", **style)
+    k, measured, fitted = bands(one, model.expectation(one.window), 4).T
+    spread = [factor * bands(one, power, 4)[:, 2] for power in simulated]
+    labels = "measured, averaged", "fitted, through the window"
+    _compare(axes, k, factor * measured, factor * fitted, spread, *labels)
+    if model.noise**2 > 1e-6 * fitted.max():
+        level = factor * model.noise**2
+        axes.axhline(level, label="noise", color=ACCENT, linewidth=0.8, linestyle="--")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_ylim(bottom=0.1 * factor * min(measured.min(), expected.min()))
+    axes.set_ylim(bottom=0.1 * factor * min(measured.min(), fitted.min()))
     dimension = "m" if len(one.window.shape) == 1 else "m²"
     axes.set_xlabel("wavenumber (rad/m)")
     axes.set_ylabel(f"spectral density ({f'{unit}² ' if unit else ''}{dimension})")
     axes.legend()
+
+
+def _compare(
+    axes: Axes, at: Any, measured: Any, fitted: Any, spread: Any, *labels: str
+) -> None:
+    """Draw data as points, the fit as a line, and 90 % of what repetitions give."""
+    of_data, of_fit = labels or (None, None)
+    _band(axes, at, spread)
+    axes.plot(at, fitted, color=color(1), label=of_fit)
+    axes.plot(at, measured, ".", color=INK, markersize=3, label=of_data)
 
 
 def _band(axes: Axes, at: Any, rows: Any) -> None:
