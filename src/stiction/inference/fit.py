@@ -234,15 +234,15 @@ def fit_field(
     Raises
     ------
     InputError
-        Naming all that does not fit: unknown units, points that repeat or are not equally spaced,
-        constant or short records, values outside the bounds of the marginal.
+        If units are unknown, points repeat or are not equally spaced, records are constant or
+        short, or values lie outside the bounds of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If the records hold fewer than ten correlation lengths, the p-value of the marginal or of
-        the spectrum is below 1 %, the noise hides the cut-off of the spectrum, a parameter lies at
-        the end of the range that is searched, or values are outliers.
+        If values are outliers, and of each reason in `doubts`: records hold fewer than ten
+        correlation lengths, a p-value is below 1 %, the noise hides the cut-off of the spectrum, or
+        a parameter lies at the end of the range that is searched.
 
     Notes
     -----

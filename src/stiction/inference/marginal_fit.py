@@ -39,6 +39,8 @@ MOST_NOISE = 0.95
 
 Parameters: TypeAlias = tuple[float, ...]
 """Those of scipy: shapes, loc and scale."""
+Search: TypeAlias = tuple[Array, Any, Callable[[Array], Parameters]]
+"""Where to begin, between which limits, and the parameters of a vector."""
 
 
 class Kind(NamedTuple):
@@ -89,14 +91,6 @@ SCIPYS = {"normal": "norm"}
 """Names of ours for families of scipy."""
 
 
-class Search(NamedTuple):
-    """Where to begin, between which limits, and the parameters of a vector."""
-
-    start: Any
-    limits: Any
-    parameters: Callable[[Array], Parameters]
-
-
 @dataclass(frozen=True)
 class Family:
     """A family of marginals, and those of its parameters that are fixed."""
@@ -114,13 +108,14 @@ class Family:
             return self._by_scipy(quiet)
         if noise**2 <= NEGLIGIBLE * values.var():
             noise, values = 0.0, quiet
-        kind, search = KINDS[self.name], self._search(values, quiet, noise, start)
-        limits = np.array(search.limits)
+        kind = KINDS[self.name]
+        first, ranges, parameters = self._search(values, quiet, noise, start)
+        limits = np.array(ranges)
         bins = _bins(values, noise) if noise else None
         counts, at = (np.ones(values.size), values) if bins is None else bins[:2]
 
         def terms(v: Array) -> Array:
-            *shapes, low, scale = search.parameters(v)
+            *shapes, low, scale = parameters(v)
             u = (at - low) / scale
             if bins is None:
                 found: Array = kind.log_density(u, *shapes) - math.log(scale)
@@ -137,8 +132,8 @@ class Family:
             slopes = np.stack(moved)
             return slopes @ counts, (slopes * counts) @ slopes.T
 
-        best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
-        return self._member(search.parameters(best))
+        best = climb(first, limits, value_of, derivatives, longest=0.5, settled=1e-4)
+        return self._member(parameters(best))
 
     def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Search:
         if self.name == "beta":
@@ -151,13 +146,13 @@ class Family:
                 middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
                 return (low - middle) / width, (high - middle) / width, middle, width
 
-            return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
+            return np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters
         if start is None:
             start = MARGINALS[self.name](mean=mean, cv=unit / mean, low=low)
         shape, _, scale = start.distribution.args
         limits = [(-700.0, 700.0), (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)]
         first = np.log([scale, shape])
-        return Search(first, limits, lambda v: (math.exp(v[1]), low, math.exp(v[0])))
+        return first, limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
 
     def _member(self, parameters: Parameters) -> Any:
         """The marginal of scipy's parameters; most of ours have a mean and a cv instead."""
@@ -282,7 +277,7 @@ def _beta(
         most = (room[name] + WIDEST * float(np.ptp(values))) / unit
         limits.append((math.log(least), math.log(most)))
     first = np.log([start.alpha, start.beta, *np.maximum(distances, 1e-3)])
-    return Search(first, limits, parameters)
+    return first, limits, parameters
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:

@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -232,6 +232,10 @@ class SpectrumFamily:
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
 
 
+State: TypeAlias = tuple[Model, list[Array]]
+"""A model, and the expected periodograms without noise."""
+
+
 class Whittle(NamedTuple):
     """The likelihood of periodograms, in terms of the vector of a family."""
 
@@ -275,20 +279,21 @@ class Whittle(NamedTuple):
             start, self.family.limits, self.value, self.score, longest=LONGEST, settled=SETTLED
         )
 
-    def value(self, at: Array) -> tuple[float, list[Array]]:
-        """Return the log likelihood, and the expected periodograms without noise."""
+    def value(self, at: Array) -> tuple[float, State]:
+        """Return the log likelihood, and what its derivatives need."""
         model = self.family.model(at, self.shares)
         signals = [model.signal(one.window) for one in self.observed]
         pairs = zip(self.observed, signals, strict=True)
-        return -self.loss([model.expectation(one.window, s) for one, s in pairs]), signals
+        loss = self.loss([model.expectation(one.window, signal) for one, signal in pairs])
+        return -loss, (model, signals)
 
-    def score(self, at: Array, signals: Sequence[Array]) -> tuple[Array, Array]:
+    def score(self, at: Array, state: State) -> tuple[Array, Array]:
         """Return derivatives of the log likelihood, (parameters,), and Fisher's information.
 
         With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d d^T.
         """
         family, limits = self.family, self.family.limits
-        model = family.model(at, self.shares)
+        model, signals = state
         moved = {}
         for i, name in enumerate(family.free):
             if name not in ("variance", "noise_share"):
@@ -319,8 +324,8 @@ class Whittle(NamedTuple):
         The information takes ordinates for independent, so that the error is somewhat too small;
         what a bootstrap needs is that it grows and shrinks as the true one.
         """
-        model = self.family.model(at, self.shares)
-        _, information = self.score(at, [model.signal(one.window) for one in self.observed])
+        state = self.value(at)[1]
+        model, (_, information) = state[0], self.score(at, state)
         slope = np.zeros(at.size)
         slope[self.family.free.index("variance")] = model.noise_share * model.variance
         slope[self.family.free.index("noise_share")] = model.variance
