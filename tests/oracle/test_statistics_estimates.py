@@ -112,10 +112,10 @@ def test_a_density_that_vanishes_at_its_bound_is_estimated_so(shape):
     assert found.value[0] < 0.2 * found.value.max()
     near = found.x < np.quantile(sample, 0.02)
     width = found.x[1] - found.x[0]
-    for share_below in (0.002, 0.01):  # 40 and 200 values lie below: to 16 and 7 %
+    for share_below in (0.002, 0.01):  # smoothing adds to the 40 and 200 values that lie below
         end = truth.ppf(share_below)
         mass = found.value[found.x < end].sum() * width
-        assert mass == pytest.approx(share_below, rel=0.3)
+        assert mass == pytest.approx((sample < end).mean(), rel=0.2)
     slopes = np.diff(found.value[near])
     assert np.mean(slopes > 0.0) > 0.95
 

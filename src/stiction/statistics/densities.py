@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import scipy.fft
 from scipy.optimize import brentq
-from scipy.special import betainc
-from scipy.stats import beta
 
 from stiction.arrays import Array
 from stiction.errors import InputError
@@ -18,8 +16,7 @@ from stiction.statistics.estimates import as_sample
 
 CELLS = 4096
 STAGES = 7
-STEEPEST = 3.0
-"""Largest exponent with which a distribution function is taken to rise from its bound."""
+FEW = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +61,10 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
 
     A density that vanishes at a bound would be made positive there. So the share of values
     within a distance d of a bound is first fitted by d^b (Hill, 1975). If b is significantly
-    above 1, the estimate is that of the values mapped by the beta distribution function with
-    these exponents, for which the density of the mapped values neither vanishes nor has a
-    slope. Where there is no bound the grid reaches beyond the sample.
+    above 1, the estimate is that of d + c log(1 - exp(-(d + e)/c)), with the median distance c
+    and the distance e of the eighth nearest value: near the bound a logarithm, for which the
+    kernel narrows towards the bound, and far from it d itself. Where there is no bound the
+    grid reaches beyond the sample.
 
     Examples
     --------
@@ -78,13 +76,26 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     """
     sample = as_sample(values, 16)
     low, high = _ends(sample, bounds)
-    shape = tuple(
-        _exponent(np.abs(sample - end)) if bound == end else 1.0
-        for end, bound in zip((low, high), bounds, strict=True)
+    ends = []
+    for end, bound, sign in ((low, bounds[0], 1.0), (high, bounds[1], -1.0)):
+        distances = np.abs(sample - end)
+        if bound == end and _vanishes(distances):
+            ends.append((end, sign, np.median(distances), np.partition(distances, FEW)[FEW]))
+
+    def mapped(x: Any) -> Any:
+        terms = [s * c * np.log(-np.expm1(-(np.abs(x - end) + e) / c)) for end, s, c, e in ends]
+        return x + sum(terms)
+
+    def slope(x: Any) -> Any:
+        return 1.0 + sum(1.0 / np.expm1((np.abs(x - end) + e) / c) for end, _, c, e in ends)
+
+    y = mapped(sample)
+    reach = 0.5 * float(np.ptp(y))
+    first = max(mapped(low), y.min() - reach)
+    width = min(mapped(high), y.max() + reach) - first
+    counts = np.bincount(
+        np.minimum(((y - first) / width * CELLS).astype(int), CELLS - 1), minlength=CELLS
     )
-    width = high - low
-    mapped = betainc(*shape, np.clip((sample - low) / width, 0.0, 1.0))
-    counts = np.bincount(np.minimum((mapped * CELLS).astype(int), CELLS - 1), minlength=CELLS)
     cosine = scipy.fft.dct(counts / sample.size, type=2)  # a_k, k = 0..cells-1
     time = _diffusion_time(cosine, float(sample.size))
     k = np.arange(CELLS)
@@ -92,24 +103,25 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     # Where the bandwidth is down to a cell the cosine series rings below zero.
     cumulative = np.append(0.0, np.cumsum(np.maximum(smooth, 0.0)))
     edges = np.linspace(0.0, 1.0, CELLS + 1)
-    below = np.interp(betainc(*shape, edges), edges, cumulative / cumulative[-1])
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    stretch = beta.pdf(middles, *shape) / width  # of the mapped values
-    value, bandwidth = np.diff(below) * (CELLS / width), math.sqrt(time)
+    x = low + edges * (high - low)
+    below = np.interp(mapped(x), first + edges * width, cumulative / cumulative[-1])
+    middles = 0.5 * (x[1:] + x[:-1])
+    value, bandwidth = np.diff(below) / np.diff(x), math.sqrt(time) * width
     # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
-    error = np.sqrt(value * stretch / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
-    at_median = float(beta.pdf((float(np.median(sample)) - low) / width, *shape))
-    return Density(low + middles * width, value, error, bandwidth * width / at_median)
+    error = np.sqrt(
+        value * slope(middles) / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size)
+    )
+    return Density(middles, value, error, float(bandwidth / slope(np.median(sample))))
 
 
-def _exponent(distances: Array) -> float:
-    """Return b of a share d^b of values within a distance d of a bound; 1 unless surely above."""
-    count = max(8, int(distances.size**0.6))
-    nearest = np.partition(distances, count)[: count + 1]
-    nearest = nearest[nearest > 0.0]
-    logarithms = float(np.mean(np.log(nearest.max() / nearest))) if nearest.size else 0.0
-    found = 1.0 / logarithms if logarithms > 0.0 else 1.0
-    return min(found, STEEPEST) if found > 1.0 + 3.0 / math.sqrt(count) else 1.0
+def _vanishes(distances: Array) -> bool:
+    """Return whether the share d^b of values within a distance d of a bound surely has b > 1."""
+    count = max(FEW, int(distances.size**0.6))
+    nearest = np.sort(distances)[: count + 1]
+    if nearest[FEW] == 0.0:
+        return False
+    inverse = float(np.mean(np.log(nearest[-1] / nearest[nearest > 0.0])))
+    return 0.0 < inverse * (1.0 + 3.0 / math.sqrt(count)) < 1.0
 
 
 def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:
