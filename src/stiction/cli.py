@@ -175,7 +175,7 @@ def run(
 
 
 def status(run: RunPath) -> None:
-    """Say how far a run is, which samples failed and which chunks are damaged."""
+    """Show what of a run is done, failed or damaged."""
     from stiction.study.study import open_run
     from stiction.study.sweep import name_point
 
@@ -235,7 +235,7 @@ def report(
 
 
 def check(study: StudyFile) -> None:
-    """Say what a study file would do, how long and how big, or everything that is wrong with it.
+    """Validate a study file and estimate its time and size, or list all mistakes.
 
     Solves a few samples: for the time, and for the error of the local criterion.
     """
@@ -404,9 +404,9 @@ def onset(
 
     Takes the problem from a study file, which needs nothing else, and the strength from PROFILE:
     .npy, text (.csv, .txt, ...) or NetCDF, with or without x, in Pa and m unless it states units,
-    as in 'x (mm); strength (MPa)'; of a plane .npy of shape (nx, ny). Asks every method that
-    applies. That of the study keeps its options; the others take their defaults, and a rupture a
-    loading rate of 2e7 Pa/s.
+    as in 'x (mm); strength (MPa)'; on a plane .npy of shape (nx, ny). Every method that applies
+    is used: that of the study with its options, the others with their defaults, and `rupture` with
+    a loading rate of 2e7 Pa/s.
     """
     import pandas as pd
 

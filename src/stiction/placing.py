@@ -60,7 +60,12 @@ def place(
     if not places:
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
-            raise InputError(_other_shape(shape, interface))
+            hint = (
+                "; give a value for each node, or x beside the values (x=... names its column),"
+                " with interpolate=True where points lie elsewhere than the nodes"
+            )
+            hint = turned(shape, interface.shape) if interface.is_plane else hint
+            raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
@@ -102,17 +107,6 @@ def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
     if len(shape) == 2 and given == shape[::-1]:
         return "; x and y have changed places: the first axis of a profile is x"
     return ""
-
-
-def _other_shape(shape: tuple[int, ...], interface: Interface) -> str:
-    if interface.is_plane:
-        hint = turned(shape, interface.shape)
-        return f"must have shape {interface.shape}, got shape {shape}{hint}"
-    return (
-        f"has {shape[-1] if shape else 1} values, the interface has {interface.size} nodes; give a"
-        " value for each node, or x beside the values (x=... names its column), with"
-        " interpolate=True where points lie elsewhere than the nodes"
-    )
 
 
 def _offset(dim: str, x: Array, interface: Interface) -> float | None:

@@ -77,38 +77,35 @@ def read_profile(
         semicolons, tabs, commas or blanks, with or without a line of names, such as
         ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate.
     x, value : str or int, optional
-        Name, heading or number (from 0) of the column, coordinate or variable. By default those
-        called so (``x``, ``position``; ``strength``, ``tau_p``), the only ones in a unit of length
-        and of `quantity`, or the two columns of a table; one column has no x.
+        Name, heading or number (from 0) of the column, coordinate or variable. By default the one
+        with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
+        length or of `quantity`, or the first and second of two columns; one column has no x.
     unit, x_unit : str, optional
-        Units of the values and of x, where the source does not state them; SI if nobody does. One
-        that contradicts the source is refused.
+        Units of the values and of x if the source states none; SI by default.
     quantity : str
-        What it is: 'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
-        'weakening_rate' (Pa/m), 'critical_slip', 'height' (m), 'load_profile' or
-        'friction_coefficient' (1). A strength made of heights states its unit:
-        ``(1e12 * heights).assign_attrs(units="Pa")``.
+        'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa), 'critical_slip',
+        'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or 'friction_coefficient' (1).
     interface : Interface, optional
-        Put the profile on its nodes x_i = i L/n, modulo L, in whatever order its points come. On a
-        plane from ``.npy`` of shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y', or text
-        with the columns x, y and value.
+        Put the profile on its nodes x_i = i L/n, modulo L, in any order of its points. For a plane
+        from ``.npy`` of shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y', or text with
+        the columns x, y and value.
     interpolate : bool
-        Whether points of a line may lie elsewhere than the nodes; then linearly between them.
+        Interpolate linearly between points of a line that lie elsewhere than the nodes.
     gaps : {"refuse", "fill", "skip"}
-        Whether missing values (NaN, empty cells, missing points) are an error, are filled with
-        straight lines between their ends (on a plane with the smoothest surface over their rim), or
-        stay NaN, for `stiction.fit_field` to leave out. Without an interface they stay in any case.
+        Refuse missing values (NaN, empty cells, missing points), fill them with straight lines (on
+        a plane with the smoothest surface over their rim), or leave NaN, for `stiction.fit_field`.
+        Without an interface they stay in any case.
 
     Returns
     -------
     xarray.DataArray
-        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has a coordinate
-        'measured', False there, from which `stiction.onset` and its figure know them.
+        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the coordinate
+        'measured', False in a gap, which `stiction.onset` and its figure take over.
 
     Raises
     ------
     InputError
-        If the source cannot be read, is in an unknown or unsuitable unit, does not say which of
+        If the source cannot be read, is in an unknown or unsuitable unit, leaves open which of
         several columns is meant, or does not fit the interface.
 
     Warns
