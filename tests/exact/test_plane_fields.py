@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from importance import Mixture
 from scipy.integrate import quad
 
 import stiction as st
@@ -193,25 +192,6 @@ def test_line_with_anisotropy_is_refused():
     field = field_of(st.PowerLawSpectrum(correlation_length=0.3), anisotropy=2.0)
     with pytest.raises(st.InputError, match=r"anisotropy: .*a line has no y; got 2"):
         field.sample(LINE)
-
-
-def test_draws_move_along_the_plane():
-    """Shift and weights of importance sampling, against sums over all nodes."""
-    plane = st.Interface(length=(1.0, 1.5), nodes=(16, 12))
-    field = field_of(st.PowerLawSpectrum(correlation_length=0.25), mean_mode=True)
-    rng = np.random.default_rng(1)
-    modes = field.modes(plane)
-    shift = rng.standard_normal(modes.dimension)
-    mixture = Mixture(shift, plane.shape, modes.numbers[:, 1:], True)
-    nodes = np.array([0, 1, 100])
-    z = field.gaussian(plane, np.vstack([shift, mixture.moved(nodes)]))
-    for moved, node in zip(z[1:], nodes, strict=True):
-        np.testing.assert_allclose(
-            moved, np.roll(z[0], np.unravel_index(node, plane.shape), (0, 1)), atol=1e-12
-        )
-    draws = rng.standard_normal((3, shift.size))
-    direct = draws @ mixture.moved(np.arange(plane.size)).T
-    np.testing.assert_allclose(mixture.projections(draws), direct, atol=1e-10)
 
 
 def test_a_plane_that_is_short_across_against_its_anisotropy_is_warned_of():
