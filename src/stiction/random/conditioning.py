@@ -86,7 +86,7 @@ def _in_si(array: Any) -> Array:
     unit = parse(stated)
     if unit is None:
         raise ValueError(f"must be in SI or state a known unit, not {stated!r}")
-    return np.asarray(array.values) * unit.factor
+    return np.asarray(array.values, dtype=np.float64) * unit.factor
 
 
 def _table(points: Array) -> dict[str, list[float]]:
