@@ -31,7 +31,7 @@ from scipy.special import ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import PROFILE_SCHEMA, Positive, check_memory, model
+from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 from stiction.random.synthesis import condition
@@ -86,7 +86,7 @@ def _in_si(array: Any) -> Array:
     unit = parse(stated)
     if unit is None:
         raise ValueError(f"must be in SI or state a known unit, not {stated!r}")
-    return np.asarray(array.values, dtype=np.float64) * unit.factor
+    return np.asarray(check("values", array.values, Numbers)) * unit.factor
 
 
 def _table(points: Array) -> dict[str, list[float]]:
