@@ -8,7 +8,7 @@ from functools import partial
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError
@@ -43,15 +43,10 @@ def _node_count(value: Any) -> int:
     return _count(value)
 
 
-def _schema(kind: str) -> WithJsonSchema:
-    pair = {"type": "array", "items": {"type": kind}, "minItems": 2, "maxItems": 2}
-    return WithJsonSchema({"anyOf": [{"type": kind}, pair]})
-
-
 _lengths = BeforeValidator(partial(_one_or_two, read=_length))
 _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
-Length: TypeAlias = Annotated[float | tuple[float, float], _lengths, _schema("number")]
-Nodes: TypeAlias = Annotated[int | tuple[int, int], _counts, _schema("integer")]
+Length: TypeAlias = Annotated[float | tuple[float, float], _lengths]
+Nodes: TypeAlias = Annotated[int | tuple[int, int], _counts]
 
 
 @model

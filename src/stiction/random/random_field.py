@@ -15,12 +15,12 @@ from scipy.special import ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import Flag, Number, Numbers, Positive, Real, check_memory, checked, model
+from stiction.model import Flag, Number, Numbers, Positive, check_memory, checked, model
 from stiction.random.conditioning import Conditioning, Conditions, Measured, basis
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
-from stiction.random.spectra import CustomSpectrum, Spectrum, lag_of_correlation
+from stiction.random.spectra import CustomSpectrum, Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import block_of, standard_normal
 
 ENOUGH_ACCOUNTED = 0.01
@@ -29,7 +29,6 @@ FEWEST_LENGTHS = 8.0 * math.pi
 LOST, FALLEN = 1e-4, 0.02
 """What is worth a warning: a share of the variance, and a negative correlation."""
 
-Probability: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 Of: TypeAlias = Literal["strength", "z"]
 
 
@@ -192,7 +191,7 @@ class RandomField:
         return dataclasses.replace(self, conditions=known)
 
     @checked
-    def quantile(self, interface: Interface, probability: Probability) -> Array:
+    def quantile(self, interface: Interface, probability: Share) -> Array:
         """Return the quantile of the field at each node, given what was measured, (*shape)."""
         mean, deviation = np.zeros(interface.size), np.ones(interface.size)
         if self.conditions is not None:

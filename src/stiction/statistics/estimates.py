@@ -13,15 +13,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 import scipy.stats
+from pydantic import Field
 from scipy.special import stdtrit
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import Numbers, Real, brief, check, checked, describe
+from stiction.model import Numbers, Real, brief, check, checked
+
+Share: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
 @dataclass(frozen=True)
@@ -183,7 +186,7 @@ class Quantiles:
 
 
 @checked
-def quantiles(values: Any, probability: Numbers, *, confidence: Real = 0.95) -> Quantiles:
+def quantiles(values: Any, probability: Numbers, *, confidence: Share = 0.95) -> Quantiles:
     """Estimate quantiles of independent values, with distribution-free confidence intervals.
 
     Parameters
@@ -212,13 +215,8 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Real = 0.95) -> 
     """
     ordered = np.sort(as_sample(values, 1))
     p = np.atleast_1d(probability)
-    problems = [
-        f"{name}: must be between 0 and 1, exclusive, got {describe(value)}"
-        for name, value in (("probability", probability), ("confidence", confidence))
-        if not np.all((np.asarray(value) > 0.0) & (np.asarray(value) < 1.0))
-    ]
-    if problems:
-        raise InputError(problems)
+    if (wrong := p[~((p > 0.0) & (p < 1.0))]).size:
+        raise InputError(f"probability: must be between 0 and 1, exclusive, got {wrong[0]:g}")
     n, tail = ordered.size, 0.5 * (1.0 - confidence)
     # Rank r is a lower end if fewer than r values lie below the quantile with probability <= tail.
     low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)
