@@ -8,10 +8,11 @@ there are none of (Adler, 1981). Low dips come as a Poisson process.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.criterion.local import nucleation_stress
@@ -24,7 +25,6 @@ from stiction.statistics.moments import stationary
 
 LEVELS = 1024
 BATCH = 256
-FEWEST_PROFILES, MOST_PROFILES = 16, 10**7
 TRUSTED_PROBABILITY = 0.1
 FEWEST_CROSSINGS = 10
 MOST_BELOW = 0.04
@@ -93,7 +93,7 @@ def rice_distribution(
     problem: Problem,
     strength: RandomField,
     *,
-    profiles: Count = 512,
+    profiles: Annotated[Count, Field(ge=16, le=10**7)] = 512,
     seed: Number = 0,
     stress: Numbers | None = None,
 ) -> RiceDistribution:
@@ -128,10 +128,6 @@ def rice_distribution(
     True
     """
     unit, load, initial = stationary(problem, strength)
-    if not FEWEST_PROFILES <= profiles <= MOST_PROFILES:
-        raise InputError(
-            f"profiles: must be from {FEWEST_PROFILES} to {MOST_PROFILES:.0e}, got {profiles}"
-        )
     if stress is not None and not (
         stress.ndim == 1 and stress.size and (np.diff(stress) > 0).all()
     ):
