@@ -106,6 +106,11 @@ REFUSED = {
     "40 measured points, too short": labelled(VALUES[:40], PIECE.x[:40]),
     "is constant, 1e+06 everywhere": labelled(np.full(COUNT, 1e6)),
     "must be finite; entry 3": labelled(INFINITE),
+    "x or y repeats": xr.DataArray(
+        VALUES.reshape(20, 20),
+        {"x": PIECE.x[[*range(19), 18]], "y": PIECE.x[:20]},
+        ("x", "y"),
+    ),
     "must be numbers": "profile.csv",
     "none were given": [],
     "400 of 400 values ... do not lie between the bounds": labelled(-VALUES),

@@ -11,7 +11,7 @@ faster than any power of the step once that is below the narrower of error and d
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,8 @@ ERRORS, SPREADS = 4.0, 6.0
 
 
 class Densities(NamedTuple):
-    """Tabulated densities of standardised v.
-
-    Attributes
-    ----------
-    bound : (nodes,) array
-        Least possible onset at the reference, Pa; -inf where there is none.
-    mean, spread : (nodes,) arrays
-        Of v.
-    table : (nodes, points) array
-        Logarithm of the density of the standardised v, in steps of `STEP` from -`REACH`.
+    """Densities of standardised v at nodes: least possible onset (-inf where there is none, Pa),
+    mean and spread of v, (nodes,), and logarithms in steps of `STEP` from -`REACH`, (nodes, steps).
     """
 
     bound: Array
@@ -139,15 +131,17 @@ def _blend(values: Array, index: NDArray[np.int64], weight: Array) -> float:
 def _with_error(
     y: float,
     error: float,
-    bounded: bool,
-    bound: float,
-    mean: float,
-    spread: float,
+    of_v: tuple[float, float, float],
     table: Array,
-    near: NDArray[np.int64],
+    near: Any,
     share: Array,
 ) -> float:
-    """Logarithm of the density of an onset and the error of the load cell together, at y."""
+    """Logarithm of the density of an onset and the error of the load cell together, at y.
+
+    `of_v` are its bound, mean and spread.
+    """
+    bound, mean, spread = of_v
+    bounded = bound > -np.inf
     low, high = y - ERRORS * error, y + ERRORS * error
     if bounded:
         high = math.log(max(y, bound) + ERRORS * error - bound)
@@ -188,15 +182,15 @@ def log_likelihoods(
     density. A point whose sum would fall below `floor` even if all peaks to come were at the mode
     is given up, and the rest of its row is -inf.
     """
-    bounded, table = np.isfinite(densities.bound[0]), densities.table
+    table = densities.table
     for i in range(index.shape[0]):
         near, share = index[i], weight[i]
+        bound = _blend(densities.bound, near, share)
         mean, spread = (
             _blend(densities.mean, near, share),
             _blend(densities.spread, near, share),
         )
-        bound = _blend(densities.bound, near, share) if bounded else 0.0
-        own = error / stretch[i]
+        bounded, own = bound > -np.inf, error / stretch[i]
         typical = spread * math.exp(mean) if bounded else spread
         at_mode = MODE - math.log(stretch[i] * math.hypot(typical, own))
         out[i] = -np.inf
@@ -205,8 +199,8 @@ def log_likelihoods(
             y = (peaks[j] - shift[i]) / stretch[i]
             value = -np.inf
             if own > 0.0:
-                value = _with_error(y, own, bounded, bound, mean, spread, table, near, share)
-            elif not bounded or y > bound:
+                value = _with_error(y, own, (bound, mean, spread), table, near, share)
+            elif y > bound:
                 v = math.log(y - bound) if bounded else y
                 value = _interpolated(table, near, share, (v - mean) / spread)
                 value -= math.log(spread) + (v if bounded else 0.0)
