@@ -1,7 +1,7 @@
 """I have measured the strength along my interface: at which load does it begin to slide, and where?
 
 The file states its units and has a point each half millimetre; `read_profile` converts, and
-interpolates between the points because it is told to.
+interpolates between the points on request.
 """
 
 from pathlib import Path

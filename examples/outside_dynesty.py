@@ -1,4 +1,4 @@
-"""What do twenty-five peaks tell, by a nested sampler of others (dynesty)?
+"""What do twenty-five peaks reveal, with the nested sampler dynesty?
 
 `st.external.simulator` gives the peaks of tests at given parameters; prior, likelihood and sampler
 are the user's own. Nothing of `st.infer` is used, so that the two check each other.

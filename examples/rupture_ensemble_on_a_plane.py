@@ -2,7 +2,7 @@
 
 Sample i is the same whatever the method. Equilibrium, which takes a tenth of the time, is computed
 for many samples, and ruptures only for the first of them: what inertia adds is nearly the same in
-all, so eight differences say as much as hundreds of ruptures.
+all, so eight differences are worth hundreds of ruptures.
 """
 
 import stiction as st

@@ -12,7 +12,7 @@ SIGMAS = 3.0
 
 
 class Verdict(Enum):
-    """What the numbers say of a statement."""
+    """The verdict on a statement."""
 
     HOLDS = "holds"
     CORRECTED = "holds with a correction"

@@ -29,7 +29,7 @@ MEAN = MARGINAL.distribution.mean()
 DEVIATION = MARGINAL.distribution.std()
 
 LOADING_RATE = 2e7
-"""Of the ruptures, Pa/s; the paper does not say its own."""
+"""Of the ruptures, Pa/s; the paper does not give its own."""
 WHAT_IF = Path(__file__).parent / "what_if"
 
 

@@ -714,7 +714,7 @@ STUDIES = (
 
 
 def jobs(size: Size):
-    """Yield the name, what a reader is told, and the function of every study."""
+    """Yield the name, the progress line and the function of every study."""
     for study in (*STUDIES, dynamic) if size.dynamic else STUDIES:
         yield study.__name__, study.__doc__.partition(".")[0], study
     for name, text in WHAT_IFS.items():

@@ -1,4 +1,4 @@
-"""What the page says of the numbers; what it says besides is in `page.toml`."""
+"""Texts of the page that contain results; all others are in `page.toml`."""
 
 import numpy as np
 
@@ -101,8 +101,8 @@ def _bound(d: Data) -> str:
         other = float((d.excess(ratio) < 0).mean())
         parts.append(f"{below:.1%} and {other:.0%} at {ratio:g}")
     return (
-        "The exact onset exceeds the bound in no sample, and the continuous criterion, which knows"
-        " nothing of the grid, by a little in some: " + "; ".join(parts) + "."
+        "The exact onset exceeds the bound in no sample, and the continuous criterion, which does"
+        " not depend on the grid, slightly in some: " + "; ".join(parts) + "."
     )
 
 
