@@ -61,17 +61,6 @@ class Experiment:
     ------
     InputError
         Naming everything that does not fit.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> from stiction.ensemble.experiment import Experiment
-    >>> problem = st.paper.problem(nodes=256)
-    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> experiment = Experiment(problem, strength, st.LocalCriterion())
-    >>> draws = experiment.draws(seed=0, first=0, count=3)
-    >>> experiment.onset(experiment.profiles(draws))["critical_stress"].shape
-    (3,)
     """
 
     problem: Problem
@@ -272,7 +261,3 @@ class Ensemble:
     seed: Number = 0
     first: Annotated[Number, Field(le=2**62)] = 0
     keep: Names = ()
-
-    def of(self, problem: Problem, random: Any, method: Any) -> Experiment:
-        """Return the experiment whose samples these are."""
-        return Experiment(problem, random, method, self.keep, self.seed)

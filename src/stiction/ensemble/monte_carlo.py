@@ -205,7 +205,7 @@ def monte_carlo(
     (('sample',), 'Pa')
     """
     ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
-    experiment = ensemble.of(problem, random, method)
+    experiment = Experiment(problem, random, method, keep, seed)
     about = study_attributes(
         problem=problem, random=experiment.random, method=experiment.method, ensemble=ensemble
     )

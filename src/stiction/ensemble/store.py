@@ -26,6 +26,7 @@ from stiction.ensemble.batches import versions
 from stiction.ensemble.table import Failure, Table, joined
 from stiction.errors import StoreError, warn_user
 from stiction.files import PART, UNREADABLE, cannot, write_whole
+from stiction.model import describe
 
 FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
@@ -203,7 +204,8 @@ class Store:
             data = encode(table, self._mark)
             name = f"{digest(data)}.npz"
             write_whole(self.path / CHUNKS / name, data)
-            self._small[name] = table
+            if len(data) < LARGE:
+                self._small[name] = table
 
     def _join(self) -> None:
         """Replace small chunks by larger ones; they go when the larger ones are whole."""
@@ -218,9 +220,6 @@ class Store:
         for name in small.keys() - self._small.keys():
             with suppress(OSError):
                 (self.path / CHUNKS / name).unlink()
-        self._small = {
-            name: table for name, table in self._small.items() if table.rows.nbytes < LARGE
-        }
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store what the pilot has found."""
@@ -331,5 +330,4 @@ def flat(content: Any, path: str = "") -> dict[str, Any]:
 
 
 def _shown(value: Any) -> str:
-    text = "nothing" if value is None else json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return "nothing" if value is None else describe(value)

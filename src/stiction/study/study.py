@@ -166,10 +166,10 @@ class Study:
         problems: dict[str, list[Point]] = {}
         for point in self.points:
             try:
-                *parts, ensemble = (part(name, point.values) for name in _PARTS)
-                key = tuple(map(id, parts))
+                problem, random, method, ensemble = (part(n, point.values) for n in _PARTS)
+                key = id(problem), id(random), id(method)
                 if key not in made:
-                    made[key] = self.ensemble.of(*parts)
+                    made[key] = Experiment(problem, random, method, self.ensemble.keep)
                 found.append(made[key].with_seed(ensemble.seed))
             except InputError as error:
                 for text in error.problems:
