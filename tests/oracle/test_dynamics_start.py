@@ -205,5 +205,5 @@ def test_runaway_on_a_plane_is_refused():
     plane = st.Interface(length=(0.1, 0.1), nodes=(32, 32))
     problem = st.Problem(SOLID, plane, st.LinearWeakening(weakening_rate=5e10))
     method = Rupture(loading_rate=1e7, stop="runaway")
-    with pytest.raises(st.InputError, match="stop: 'runaway' is known of lines only"):
+    with pytest.raises(st.InputError, match="stop: 'runaway' works on lines only"):
         st.onset(problem, np.full((32, 32), 1e6), method=method)
