@@ -92,10 +92,3 @@ def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, run):
     assert run(edited, cache) == ["[6. 6. 6.]", "[0.5 0.5 0.5]"]
     assert list(cache.rglob("*.nbc"))
     assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))
-
-
-def test_functions_of_no_module_compile():
-    """As libraries make them by exec; the package looks at the module of what is compiled."""
-    made: dict = {"__name__": None}
-    exec("def one_more(x):\n    return x + 1", made)
-    assert jit.jit(made["one_more"])(1) == 2

@@ -92,12 +92,6 @@ def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(heigh
     )
 
 
-def test_a_grid_too_coarse_for_the_steepest_weakening_warns():
-    problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=2e-6))
-    with pytest.warns(AccuracyWarning, match=r"spans .* nodes .better 15 or more"):
-        simulate(TAU_P, problem, stop="onset")
-
-
 def arrested(nodes):
     """A weak half that breaks and is stopped by a strong one, in which waves go round."""
     problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=LENGTH, nodes=nodes))
@@ -115,21 +109,6 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
         slips.append(float(run["mean_slip"][-1]))
     # What creep by implicit steps may put wrong before the event: 2e-4 at 1e8 Pa/s.
     assert slips[0] == pytest.approx(slips[1], rel=4e-4)
-
-
-def test_one_node_of_no_strength_costs_next_to_nothing():
-    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
-    problem = dataclasses.replace(PROBLEM, friction=friction)
-    tau_p = TAU_P + 0.3e6
-    plain = st.onset(problem, tau_p, method=METHOD)
-    tau_p[200] = 0.3e6 * (1 + 1e-5)
-    found = st.onset(problem, tau_p, method=dataclasses.replace(METHOD, max_steps=20_000))
-    exact = st.onset(problem, tau_p, method=st.Equilibrium())
-    # It was not done after 400,000 steps.
-    steps = [int(f.implicit_steps[0] + f.explicit_steps[0]) for f in (plain, found)]
-    assert steps[1] < 6 * steps[0]
-    expected = float(exact.critical_stress[0])
-    assert float(found.critical_stress[0]) == pytest.approx(expected, rel=5e-4)
 
 
 def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps():

@@ -97,16 +97,15 @@ def test_a_folder_with_another_run_is_refused(tmp_path):
     save = st.Save(to=tmp_path / "run")
     method = st.Rupture(loading_rate=1e7, stop="onset")
     simulate_rupture(PROBLEM, TAU_P, method=method, save=save)
-    changes = [
+    for change in (
         {"load": dataclasses.replace(PROBLEM.load, profile=1.2)},
         {"load": dataclasses.replace(PROBLEM.load, initial_stress=5e4)},
         {"friction": dataclasses.replace(PROBLEM.friction, residual_strength=3e5)},
         {"friction": dataclasses.replace(PROBLEM.friction, weakening_rate=2e11)},
-    ]
-    for change in changes:
-        other = dataclasses.replace(PROBLEM, **change)
+        {"profiles": TAU_P + 1.0},
+        {"method": st.Rupture(loading_rate=2e7)},
+    ):
+        profiles, other = change.pop("profiles", TAU_P), change.pop("method", method)
+        problem = dataclasses.replace(PROBLEM, **change)
         with pytest.raises(InputError, match="holds another run"):
-            simulate_rupture(other, TAU_P, method=method, save=save)
-    for tau_p, rate in ((TAU_P + 1.0, 1e7), (TAU_P, 2e7)):
-        with pytest.raises(InputError, match="holds another run"):
-            simulate_rupture(PROBLEM, tau_p, method=st.Rupture(loading_rate=rate), save=save)
+            simulate_rupture(problem, profiles, method=other, save=save)

@@ -9,7 +9,6 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.pilot import compare
 
 SOLID = st.Solid(shear_modulus=5e9, poisson_ratio=0.4, density=1170.0)
 
@@ -75,14 +74,6 @@ def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
     assert found.attrs["pilot_samples"] == 32
     assert found.attrs["pilot_bias"] == pytest.approx(difference.mean(), rel=1e-9)
     assert found.attrs["pilot_scatter"] == pytest.approx(difference.std(ddof=1), rel=1e-9)
-
-
-def test_methods_without_a_counterpart_have_no_pilot():
-    problem, strength = far_from_the_criterion()
-    experiment = Experiment(problem, strength, st.Equilibrium())
-    assert compare(experiment) is None
-    found = st.monte_carlo(problem, strength, method=st.Equilibrium(), samples=2)
-    assert "pilot_bias" not in found.attrs
 
 
 def test_coefficients_are_stresses_times_the_pressure():

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.study.export import SUFFIXES, export, table_of
+from stiction.study.export import SUFFIXES
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +64,3 @@ def test_other_suffixes_are_refused(run, command, tmp_path, name):
     assert not (tmp_path / name).exists()
     with pytest.raises(st.InputError, match="suffix"):
         st.open_run(run).export(tmp_path / name)
-
-
-def test_missing_samples_are_nan_and_nothing_is_left_half_written(tmp_path):
-    result = xr.Dataset(
-        {"critical_stress": ("sample", [1.5, np.nan], {"units": "Pa"})},
-        coords={"sample": ("sample", [0, 1])},
-    )
-    export(result, tmp_path / "out.csv")
-    text = (tmp_path / "out.csv").read_text().splitlines()
-    assert text == ["sample (1),critical_stress (Pa)", "0,1.5", "1,nan"]
-    assert list(table_of(result)) == ["sample (1)", "critical_stress (Pa)"]
-    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]

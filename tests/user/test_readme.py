@@ -34,9 +34,9 @@ def test_every_block_of_python_runs(monkeypatch, tmp_path):
     assert len(blocks) >= 2
     scope: dict = {}
     for block in blocks:  # on a coarser grid, and less far out in the tail
-        block = block.replace("nodes=1024", "nodes=256").replace(
-            "probability=1e-3", "probability=0.1"
-        )
+        for text in ("nodes=1024", "nodes=512"):
+            block = block.replace(text, "nodes=256")
+        block = block.replace("probability=1e-3, method=", "probability=0.1, method=")
         exec(compile(block, "README.md", "exec"), scope)
     assert scope["result"].sizes["sample"] == 10_000
 

@@ -100,7 +100,10 @@ def test_two_levels_need_a_uniform_weakening_rate(system):
         st.failure_probability(varying, field, 0.67e6, method=EXACT, algorithm="two_level")
     with pytest.raises(st.InputError, match="names no less expensive method"):
         st.failure_probability(problem, field, 0.67e6, method=LOCAL, algorithm="two_level")
-    result = st.failure_probability(varying, field, 0.675e6, method=EXACT, target_cv=0.4)
+    with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
+        result = st.failure_probability(
+            varying, field, 0.675e6, method=EXACT, max_evaluations=1200
+        )
     assert result.algorithm == "subset"
     assert 0.0 < result.probability < 0.01
 
