@@ -286,17 +286,13 @@ class PiecewiseWeakening(FrictionLaw):
     def _falling(self) -> PiecewiseWeakening:
         slip, strength = self.corners
         if slip.size != strength.size or slip.size < 2:
-            raise InputError(
-                "slip and strength: must have one entry for each corner, got"
-                f" {slip.size - 1} and {strength.size - 1}"
-            )
+            given = f"{slip.size - 1} and {strength.size - 1}"
+            raise InputError(f"slip and strength: give one number for each corner, got {given}")
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
             raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
-            raise InputError(
-                "strength: must fall from below 1 to exactly 0 (the residual strength), got"
-                f" {self.strength}"
-            )
+            words = "must fall from below 1 to exactly 0 (the residual strength)"
+            raise InputError(f"strength: {words}, got {self.strength}")
         return self
 
     @property
@@ -305,22 +301,25 @@ class PiecewiseWeakening(FrictionLaw):
         return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
 
     @property
+    def _pieces(self) -> tuple[Array, Array]:
+        """-f' of each piece, and the area under it."""
+        u, f = self.corners
+        return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
+
+    @property
     def steepest_slope(self) -> float:
         """-f' of the steepest piece."""
-        u, f = self.corners
-        return float((-np.diff(f) / np.diff(u)).max())
+        return float(self._pieces[0].max())
 
     @property
     def integral(self) -> float:
         """Area under f."""
-        u, f = self.corners
-        return float(np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(u)))
+        return float(np.sum(self._pieces[1]))
 
     def area(self, u: Any) -> Array:
         """Return the area under the polygon up to u."""
-        corners, f = self.corners
-        slopes = -np.diff(f) / np.diff(corners)
-        at_corners = np.append(0.0, np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(corners)))
+        (corners, f), (slopes, areas) = self.corners, self._pieces
+        at_corners = np.append(0.0, np.cumsum(areas))
         u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
         piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
         into = u - corners[piece]
@@ -334,9 +333,9 @@ class PiecewiseWeakening(FrictionLaw):
     @property
     def parameters(self) -> Polygon | Linear:
         """For kernels; a single piece is the linear law to the bit."""
-        u, f = self.corners
-        first = (f[0] - f[1]) / (u[1] - u[0])
-        return Linear() if len(self.slip) == 1 else Polygon(u, f, float(first))
+        if len(self.slip) == 1:
+            return Linear()
+        return Polygon(*self.corners, float(self._pieces[0][0]))
 
     @classmethod
     @checked
