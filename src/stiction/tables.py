@@ -42,17 +42,14 @@ def load(path: Path, dims: tuple[str, ...]) -> xr.Dataset | xr.DataArray:
         try:
             # Times are not decoded: a variable in seconds is refused by its unit, like any other.
             with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
-                kept = [
-                    name
-                    for name, one in opened.data_vars.items()
-                    if one.dtype.kind in "fiu" and one.squeeze().ndim == len(dims)
-                ]
-                return opened[kept].squeeze(drop=True).load()
+                flat = opened.squeeze(drop=True)
+                some = [name for name, one in flat.items() if one.ndim == len(dims)]
+                return flat[[name for name in some if flat[name].dtype.kind in "fiu"]].load()
         except (
             OSError,
             ValueError,
             RuntimeError,
-            KeyError,
+            LookupError,
             AttributeError,
             TypeError,
         ) as error:
@@ -137,9 +134,10 @@ def read_table(path: Path) -> xr.Dataset:
             )
         for column, cell in enumerate(cells):
             value = _number(cell, separator)
-            if value is None and cell.lower() not in _EMPTY:
+            if value is not None:
+                columns[column, place] = value
+            elif cell.lower() not in _EMPTY:
                 raise InputError(f"line {number}: {describe(cell)} is no number")
-            columns[column, place] = np.nan if value is None else value
     if not header and comment:
         cells = [comment] if width == 1 else _split(comment, separator)
         header = [(0, cells)] if len(cells) == width else []

@@ -15,21 +15,13 @@ class Unit(NamedTuple):
 
 _NUMBER, _LENGTH, _STRESS = (0, 0, 0), (0, 1, 0), (1, -1, -2)
 _BASE = {
-    "m": Unit(1.0, _LENGTH),
-    "s": Unit(1.0, (0, 0, 1)),
-    "g": Unit(1e-3, (1, 0, 0)),
-    "N": Unit(1.0, (1, 1, -2)),
-    "J": Unit(1.0, (1, 2, -2)),
-    "Pa": Unit(1.0, _STRESS),
-    "bar": Unit(1e5, _STRESS),
-}
-_WORDS = {
-    "meter": "m",
-    "metre": "m",
-    "second": "s",
-    "newton": "N",
-    "joule": "J",
-    "pascal": "Pa",
+    ("m", "meter", "metre"): Unit(1.0, _LENGTH),
+    ("s", "second"): Unit(1.0, (0, 0, 1)),
+    ("N", "newton"): Unit(1.0, (1, 1, -2)),
+    ("J", "joule"): Unit(1.0, (1, 2, -2)),
+    ("Pa", "pascal"): Unit(1.0, _STRESS),
+    ("bar",): Unit(1e5, _STRESS),
+    ("g",): Unit(1e-3, (1, 0, 0)),
 }
 _PREFIXES = {
     "": ("", 1.0), "T": ("tera", 1e12), "G": ("giga", 1e9), "M": ("mega", 1e6),
@@ -46,10 +38,9 @@ _UNITS = {
     "ksi": Unit(6894757.293168, _STRESS),
 }
 for _short, (_long, _scale) in _PREFIXES.items():
-    for _name, _unit in _BASE.items():
-        _UNITS[_short + _name] = Unit(_scale * _unit.factor, _unit.dimension)
-    for _word, _name in _WORDS.items():
-        _UNITS[_long + _word] = _UNITS[_long + _word + "s"] = _UNITS[_short + _name]
+    for (_name, *_words), _unit in _BASE.items():
+        _names = [_short + _name, *(_long + word + s for word in _words for s in ("", "s"))]
+        _UNITS |= dict.fromkeys(_names, Unit(_scale * _unit.factor, _unit.dimension))
 _KNOWN = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
 _MEANING = {"Pa": "stress", "m": "length", "Pa/m": "a weakening rate", "1": "a pure number"}
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
