@@ -108,6 +108,18 @@ def test_two_levels_need_a_uniform_weakening_rate(system):
     assert 0.0 < result.probability < 0.01
 
 
+def test_warnings_point_at_the_caller(system):
+    """Also those of threads, which came from concurrent.futures before."""
+    with pytest.warns(st.AccuracyWarning, match="spans") as caught:
+        st.failure_probability(*system, 0.665e6, method=LOCAL, target_cv=0.3, workers=2)
+    assert {one.filename for one in caught} == {__file__}
+    with pytest.warns(st.AccuracyWarning, match="spans") as caught:
+        st.infer(
+            *system, [0.69e6, 0.7e6, 0.71e6], prior={"marginal.low": (5e5, 8e5)}, method=LOCAL
+        )
+    assert {one.filename for one in caught} == {__file__}
+
+
 def test_auto_says_why(system):
     often = st.failure_probability(*system, 0.7e6, method=LOCAL)
     assert (often.algorithm, often.evaluations >= 1000) == ("plain", True)

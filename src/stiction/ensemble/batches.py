@@ -4,10 +4,12 @@ import os
 import socket
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
+from contextvars import Context, copy_context
 from functools import cache
+from itertools import repeat
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numba
@@ -19,7 +21,7 @@ from stiction import __version__
 from stiction.arrays import one_blas_thread
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.table import Failure, Table, rows_of
-from stiction.errors import InputError, WorkerError
+from stiction.errors import InputError, WorkerError, collect_warnings, warn_user
 from stiction.random.synthesis import BLOCK, block_of
 
 SECONDS = 0.5
@@ -53,6 +55,16 @@ def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
+    """Return what a function makes of each job; its warnings come once, at the caller's line."""
+    with collect_warnings() as caught, ThreadPoolExecutor(workers) as pool:
+        contexts = [copy_context() for _ in jobs]
+        found = list(pool.map(Context.run, contexts, repeat(function), jobs))
+    for text, category in dict.fromkeys(caught):
+        warn_user(text, category)
+    return found
 
 
 @cache

@@ -1,15 +1,13 @@
 """A pilot: some samples of an inexpensive method solved by its exact counterpart too."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
-from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.equilibrium.method import Equilibrium
 from stiction.errors import InputError, collect_warnings, warn_accuracy
@@ -68,10 +66,8 @@ def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pi
         except (InputError, RuntimeError, ArithmeticError):
             return [float("nan")] * 2
 
-    # The ensemble itself warns; each in the context of the caller, which collects warnings.
-    with collect_warnings(), ThreadPoolExecutor(usable_cores()) as pool:
-        tasks = [pool.submit(copy_context().run, both, row) for row in draws]
-        found = np.array([task.result() for task in tasks])
+    with collect_warnings():  # the ensemble itself warns
+        found = np.array(in_threads(both, list(draws), usable_cores()))
     near, true = found[np.isfinite(found).all(axis=1)].T
     if near.size < 2:
         return None

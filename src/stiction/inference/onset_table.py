@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.inference.prior import Prior
@@ -127,6 +126,5 @@ def simulate(
         peaks[number, start - first : start - first + count] = values[variable]
         meter.advance(count)
 
-    with ThreadPoolExecutor(usable_cores()) as pool:
-        list(pool.map(work, jobs))
+    in_threads(work, jobs, usable_cores())
     return peaks

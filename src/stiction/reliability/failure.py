@@ -244,7 +244,7 @@ def _by_tail(
     if two and probability == 0.0:
         interval = 0.0, last.rarest
         doubts = [
-            f"{tail.short_of('a failure')}; the interval ends at the last level of the guide"
+            f"{tail.short_of('a failure')}; the interval ends at the last level of the first stage"
         ]
     elif two:
         covered = min(one.last for one in tail.repetitions)

@@ -1,7 +1,6 @@
 """The limit state: from standard normal draws to the stress at which the interface slides."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -10,7 +9,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.criterion.windows import windows_of
-from stiction.ensemble.batches import usable_cores
+from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.friction import SCALES
@@ -99,13 +98,11 @@ class LimitState:
         lowest = self.bounds[0]  # before the threads need it
         parts = draws.shape[0] // (1 if self._portions.slow else FEWEST)
         parts = min(self.workers, max(1, parts))
-        if parts == 1:
-            found = self._stress(draws)
-        else:
-            with ThreadPoolExecutor(parts) as pool:
-                found = np.concatenate(
-                    list(pool.map(self._stress, np.array_split(draws, parts)))
-                )
+        found = (
+            np.concatenate(in_threads(self._stress, np.array_split(draws, parts), parts))
+            if parts > 1
+            else self._stress(draws)
+        )
         result: Array = np.maximum(found, lowest)  # rounding may leave a stress a hair below
         return result
 
