@@ -112,6 +112,8 @@ def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(st
         field.given(3.0 * known, noise=1e3).sample(line)
     with pytest.raises(st.InputError, match="the interface is 0.1 m long"):
         field.given(known.assign_coords(x=known.x + 0.09), noise=1e3).sample(line)
+    with pytest.raises(st.InputError, match="is given one already"):
+        field.given(known, noise=1e3).given(known, noise=1e3)
     rough = known.copy(data=known.values[np.random.default_rng(0).permutation(known.size)])
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
         field.given(rough, noise=1e3).sample(line)

@@ -187,6 +187,8 @@ class RandomField:
         >>> bool(abs(tau_p.mean(axis=0)[26] - 0.8e6) < 50e3)
         True
         """
+        if self.conditions is not None:
+            raise InputError("profile: this field is given one already; join both into one")
         known: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=known)
 
