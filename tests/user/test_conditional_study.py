@@ -58,6 +58,18 @@ def test_measured_values_and_their_places_may_state_other_units():
         field.given(stated.assign_attrs(units="furlong"), noise=20e3)
 
 
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_values_that_were_filled_in_were_not_measured(study):
+    own = st.Study.from_dict(small_study())
+    profile = own.random.strength.sample(own.problem.interface, seed=9)[0]
+    profile[50:60] = np.nan
+    scan = xr.DataArray(profile, {"x": own.problem.interface.x}, "x")
+    filled = st.read_profile(scan, interface=own.problem.interface, gaps="fill")
+    assert not np.isnan(filled).any()
+    given = own.random.strength.given(filled, noise=20e3)
+    assert given.conditions.values.size == profile.size - 10
+
+
 @pytest.mark.parametrize(
     ("name", "heading", "unit"),
     [("strength", "mu", 1.0), ("critical_slip", "d_c (um)", 1e-6)],

@@ -32,6 +32,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
+from stiction.placing import MEASURED
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 from stiction.random.synthesis import condition
@@ -70,6 +71,8 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
+        if MEASURED in value.coords:  # what was filled in was not measured
+            value = value.where(value[MEASURED].astype(bool))
         places = np.meshgrid(*(_in_si(value[name]) for name in names), indexing="ij")
         rows = [*places, _in_si(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
