@@ -44,11 +44,11 @@ def scatter_between(
 ) -> tuple[float, tuple[float, float], float]:
     """Estimate the coefficient of variation of a log-normal factor between records.
 
-    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom less than
-    records at the true variance s of the logarithms L (Viechtbauer, 2007), whatever their number;
-    the estimate is where Q is as large as that (Paule and Mandel, 1982). `within` are the variances
-    v of the logarithms from the field alone, (records,). Returns the coefficient, its interval, and
-    half the width of that of the mean logarithm.
+    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
+    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
+    whatever their number; the estimate is where Q is as large as that (Paule and Mandel,
+    1982). `within` are the variances v of the logarithms from the field alone, (records,).
+    Returns the coefficient, its interval, and half the width of that of the mean logarithm.
     """
     freedom = logarithms.size - 1
 

@@ -57,10 +57,10 @@ class Setting:
 class Estimate:
     """The result of one fit.
 
-    `distance` is Kolmogorov's, between values and marginal, and `roughness` the mean square of the
-    logarithm of periodogram over expectation, both averaged over bands. `noise` holds the variance
-    of the noise, negative where even less than none would suit better, and its standard error; 0
-    where the noise is known.
+    `distance` is Kolmogorov's, between values and marginal, and `roughness` the mean square
+    of the logarithm of periodogram over expectation, both averaged over bands. `noise`
+    holds the variance of the noise, negative where even less than none would suit better,
+    and its standard error; 0 where the noise is known.
     """
 
     setting: Setting
@@ -114,8 +114,9 @@ def estimate(
 ) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
-    The marginal of noisy values is too wide. So the noise is found first, with the marginal of the
-    values as they are; then both are fitted again, the marginal to values less that noise.
+    The marginal of noisy values is too wide. So the noise is found first, with the marginal
+    of the values as they are; then both are fitted again, the marginal to values less that
+    noise.
     """
     family = setting.spectrum
     values = np.concatenate(rows)
@@ -175,8 +176,8 @@ def bootstrapped(
 ) -> tuple[list[Repetitions], int]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Returns the repetitions, as many as the family can be fitted to, and how many were asked for.
-    Repetition b depends on (seed, b) only.
+    Returns the repetitions, as many as the family can be fitted to, and how many were asked
+    for. Repetition b depends on (seed, b) only.
     """
 
     def one(field: Estimate, number: int) -> Estimate | None:
@@ -210,8 +211,8 @@ def bootstrapped(
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
     """Return the field with its correlation length at either end of a first interval.
 
-    Records of short correlation lengths hold more of them, and errors are smaller and more alike.
-    An estimate that is too short by chance therefore promises too much.
+    Records of short correlation lengths hold more of them, and errors are smaller and more
+    alike. An estimate that is too short by chance therefore promises too much.
     """
     found, family = around.truth, around.truth.setting.spectrum
     values, place = family.of(found.model), family.free.index("correlation_length")
@@ -260,8 +261,8 @@ class Scale(NamedTuple):
     def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
         """Return an estimate less a quantile of its error in units of its width.
 
-        Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by default,
-        it lies further inside.
+        Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by
+        default, it lies further inside.
         """
         (at, width), truth = self.of(found), repeated.truth
         true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
@@ -274,18 +275,20 @@ def intervals(
 ) -> dict[str, tuple[float, float]]:
     """Return studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
-    `repeated` are repetitions of the estimate, and of `at_ends`, shorter and longer. The error of
-    any parameter is as wide as the root of the correlation length, of which a record holds few, and
-    that of a place, such as the mean, also as the field's standard deviation; a repetition finds
-    both anew. What still changes with the correlation length is met by taking the error at an end
-    of an interval from a field that belongs there, with a longer or a shorter correlation (one step
-    of a test inversion; Carpenter, 1999): the longer one at the upper end of parameters whose
-    estimates rise with that of the correlation length, and else at the lower.
+    `repeated` are repetitions of the estimate, and of `at_ends`, shorter and longer. The
+    error of any parameter is as wide as the root of the correlation length, of which a
+    record holds few, and that of a place, such as the mean, also as the field's standard
+    deviation; a repetition finds both anew. What still changes with the correlation length
+    is met by taking the error at an end of an interval from a field that belongs there,
+    with a longer or a shorter correlation (one step of a test inversion; Carpenter, 1999):
+    the longer one at the upper end of parameters whose estimates rise with that of the
+    correlation length, and else at the lower.
 
-    Of the noise it is the variance that has an interval, with its own standard error, which follows
-    the correlation length as it is, and as if it could be negative: estimates that end at zero
-    would all have the same error, and an interval from them would hold nothing but zero. What is
-    below zero is cut off last. So is of other parameters what they cannot be, see `limits_of`.
+    Of the noise it is the variance that has an interval, with its own standard error, which
+    follows the correlation length as it is, and as if it could be negative: estimates that
+    end at zero would all have the same error, and an interval from them would hold nothing
+    but zero. What is below zero is cut off last. So is of other parameters what they cannot
+    be, see `limits_of`.
     """
     around, *ends = repeated
     found, estimated = around.truth, around.truth.parameters
@@ -317,8 +320,8 @@ def intervals(
 def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
     """Return the limits of parameters that have some: bounds of the marginal, ranges of the search.
 
-    Values lie inside the bounds of their marginal; `quiet` are the values as they would be without
-    the greatest noise that they may carry.
+    Values lie inside the bounds of their marginal; `quiet` are the values as they would be
+    without the greatest noise that they may carry.
     """
     estimated = found.parameters
     bottom, top = (float(end) for end in found.marginal.distribution.support())

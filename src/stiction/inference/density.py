@@ -1,13 +1,14 @@
 """Density of the peak that a test shows: that of the onset, with the error of the load cell.
 
-No onset is below the least possible strength, and where the correlation length is long many are
-just above it. A kernel density of the onsets would leak below, and find any strength possible whose
-bound is not far above the least peak. So the kernels stand on v = log(onset - bound), or on the
-onset itself where there is no bound (Wand, Marron and Ruppert, 1991). Their width is Silverman's
-(1986, section 3.4.2), and what it adds to the variance is taken from the sample (section 6.1.2).
-Densities are tabulated in units in which v has mean 0 and variance 1, where they hardly change from
-node to node. The error of the load cell is integrated over v by the midpoint rule, which converges
-faster than any power of the step once that is below the narrower of error and density.
+No onset is below the least possible strength, and where the correlation length is long many
+are just above it. A kernel density of the onsets would leak below, and find any strength
+possible whose bound is not far above the least peak. So the kernels stand on v = log(onset
+- bound), or on the onset itself where there is no bound (Wand, Marron and Ruppert, 1991).
+Their width is Silverman's (1986, section 3.4.2), and what it adds to the variance is taken
+from the sample (section 6.1.2). Densities are tabulated in units in which v has mean 0 and
+variance 1, where they hardly change from node to node. The error of the load cell is
+integrated over v by the midpoint rule, which converges faster than any power of the step
+once that is below the narrower of error and density.
 """
 
 import math
@@ -32,7 +33,8 @@ ERRORS, SPREADS = 4.0, 6.0
 
 class Densities(NamedTuple):
     """Densities of standardised v at nodes: least possible onset (-inf where there is none, Pa),
-    mean and spread of v, (nodes,), and logarithms in steps of `STEP` from -`REACH`, (nodes, steps).
+    mean and spread of v, (nodes,), and logarithms in steps of `STEP` from -`REACH`, (nodes,
+    steps).
     """
 
     bound: Array
@@ -44,8 +46,8 @@ class Densities(NamedTuple):
 def grouped(ordered: Array) -> tuple[Array, Array]:
     """Means and shares of groups of neighbouring sorted values, ever smaller ones in the tails.
 
-    Ends of groups are at equal steps of a normal variable, so that no group of a sample that is
-    nearly normal is wide against the kernel. Values on an end are shared out.
+    Ends of groups are at equal steps of a normal variable, so that no group of a sample
+    that is nearly normal is wide against the kernel. Values on an end are shared out.
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -178,9 +180,9 @@ def log_likelihoods(
 ) -> None:
     """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
 
-    Bound, mean and spread are linear between nodes, and so is the logarithm of the standardised
-    density. A point whose sum would fall below `floor` even if all peaks to come were at the mode
-    is given up, and the rest of its row is -inf.
+    Bound, mean and spread are linear between nodes, and so is the logarithm of the
+    standardised density. A point whose sum would fall below `floor` even if all peaks to
+    come were at the mode is given up, and the rest of its row is -inf.
     """
     table = densities.table
     for i in range(index.shape[0]):

@@ -72,9 +72,10 @@ Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 class Goodness(NamedTuple):
     """How well a family of marginals describes the values: its best member, and two measures.
 
-    `distance` is the largest difference of the distribution functions (Kolmogorov). `score` is the
-    log likelihood of as many independent values as the records hold correlation lengths, less the
-    number of parameters, and less that of the best family; differences below about 2 mean nothing.
+    `distance` is the largest difference of the distribution functions (Kolmogorov). `score`
+    is the log likelihood of as many independent values as the records hold correlation
+    lengths, less the number of parameters, and less that of the best family; differences
+    below about 2 mean nothing.
     """
 
     marginal: Any
@@ -290,13 +291,7 @@ def fit_field(
     repeated, asked = bootstrapped(found, bootstrap, confidence, seed, cores, progress)
     p_values = {"marginal": _p_value("distance", *repeated[0])}
     p_values["spectrum"] = _p_value("roughness", *repeated[0])
-    doubts = _doubts(found, p_values)
     done = sum(len(one.fits) for one in repeated)
-    if done < asked:
-        doubts.append(
-            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
-            " the others"
-        )
     points = sum(record.values.size for record in records)
     fit = FieldFit(
         field=found.field(quantity),
@@ -309,7 +304,7 @@ def fit_field(
         lengths_held=_lengths_held(found),
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
-        doubts=tuple(doubts),
+        doubts=tuple(_doubts(found, p_values, done, asked)),
         _estimate=found,
         _rows=rows,
     )
@@ -394,7 +389,7 @@ def _with_between(fit: FieldFit, levels: Array) -> FieldFit:
     )
 
 
-def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
+def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: int) -> list[str]:
     """Reasons not to trust a fit."""
     doubts = []
     held, noise = _lengths_held(found), found.model.noise
@@ -421,6 +416,11 @@ def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
                 f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
                 " st.plot.fit"
             )
+    if done < asked:
+        doubts.append(
+            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
+            " the others"
+        )
     return doubts
 
 

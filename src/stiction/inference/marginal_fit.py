@@ -1,10 +1,10 @@
 """Marginals by maximum likelihood, with the measurement noise that values carry.
 
-Without noise the likelihood is the density at the values. Values with noise are counted in bins;
-the probability of a bin is that of the marginal, its distribution function convolved with that of
-the noise, so that values beyond a bound of the marginal are no trouble. Values along a record are
-correlated; the likelihood takes them for independent, which leaves the estimate consistent (a
-composite likelihood) and its error to the bootstrap.
+Without noise the likelihood is the density at the values. Values with noise are counted in
+bins; the probability of a bin is that of the marginal, its distribution function convolved
+with that of the noise, so that values beyond a bound of the marginal are no trouble. Values
+along a record are correlated; the likelihood takes them for independent, which leaves the
+estimate consistent (a composite likelihood) and its error to the bootstrap.
 """
 
 import math
@@ -283,9 +283,9 @@ def _beta(
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
     """Counts of values in bins, and how their probabilities follow from a distribution function.
 
-    That function, of the values without noise, is needed at the second array. The convolution with
-    the noise is a sum in steps of half its deviation or less; far below the width of a bin it does
-    not count.
+    That function, of the values without noise, is needed at the second array. The
+    convolution with the noise is a sum in steps of half its deviation or less; far below
+    the width of a bin it does not count.
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])

@@ -25,8 +25,8 @@ def climb(
 
     Fisher scoring with the damping of Levenberg and Marquardt. `value_of` returns the log
     likelihood and what its derivatives need; `derivatives` returns the score and Fisher's
-    information. No parameter moves by more than `longest` in a step, and a gain below `settled`
-    ends the search.
+    information. No parameter moves by more than `longest` in a step, and a gain below
+    `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)

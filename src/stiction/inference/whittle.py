@@ -1,14 +1,15 @@
 """Whittle likelihood of records whose field is mapped from a Gaussian one, with noise on top.
 
-The likelihood is in terms of the measured values themselves: their correlation follows from that
-of the Gaussian field z by the Hermite expansion of the marginal's map, and white noise of the
-measurement, which is added to values and not to z, adds its share at zero lag. The variance is
-free, so that what a short record does to it does not disturb the shape of the spectrum.
+The likelihood is in terms of the measured values themselves: their correlation follows from
+that of the Gaussian field z by the Hermite expansion of the marginal's map, and white noise
+of the measurement, which is added to values and not to z, adds its share at zero lag. The
+variance is free, so that what a short record does to it does not disturb the shape of the
+spectrum.
 
 A spectrum that is cut off, or falls fast, has next to nothing at high wavenumbers, where a
-likelihood would weigh the logarithm of what is left: higher orders of the map, rounding of the
-data. A floor of a thousandth of the highest power is therefore added to periodogram and expectation
-alike. The score stays unbiased; what lies below the floor ceases to count.
+likelihood would weigh the logarithm of what is left: higher orders of the map, rounding of
+the data. A floor of a thousandth of the highest power is therefore added to periodogram and
+expectation alike. The score stays unbiased; what lies below the floor ceases to count.
 """
 
 import itertools
@@ -62,8 +63,9 @@ LONGEST = 1.5
 def hermite_shares(marginal: Any) -> Array:
     """Return the shares of the variance in the Hermite orders 0, 1, ..., which sum to 1.
 
-    As `stiction.random.mapping.hermite_coefficients`, with fewer points and orders: a hundredth of
-    its cost and an error below 1e-4, the last order standing for all that are left out.
+    As `stiction.random.mapping.hermite_coefficients`, with fewer points and orders: a
+    hundredth of its cost and an error below 1e-4, the last order standing for all that are
+    left out.
     """
     z = np.linspace(-REACH, REACH, POINTS)
     weight = np.exp(-0.5 * z * z)
@@ -107,10 +109,11 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
 class Model(NamedTuple):
     """What a spectrum, the Hermite shares of a marginal and noise predict of records.
 
-    `noise_share` is of `variance`, which is that of the values, noise included; it is negative only
-    on the way to an estimate. `end_seen` is whether the truncation of the spectrum is a property of
-    the field, which records may show. Otherwise it only makes simulation finite: at a multiple of
-    1/xi_0 it would, among the wavenumbers of a record, determine the correlation length.
+    `noise_share` is of `variance`, which is that of the values, noise included; it is
+    negative only on the way to an estimate. `end_seen` is whether the truncation of the
+    spectrum is a property of the field, which records may show. Otherwise it only makes
+    simulation finite: at a multiple of 1/xi_0 it would, among the wavenumbers of a record,
+    determine the correlation length.
     """
 
     spectrum: Any
@@ -167,8 +170,8 @@ def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
 class SpectrumFamily:
     """A family of spectra with fixed parameters, and what else is estimated (None) with it.
 
-    `noise` is the standard deviation of the measurement noise, and `lengths` (m) are those between
-    which correlation lengths are looked for.
+    `noise` is the standard deviation of the measurement noise, and `lengths` (m) are those
+    between which correlation lengths are looked for.
     """
 
     name: str
@@ -290,7 +293,8 @@ class Whittle(NamedTuple):
     def score(self, at: Array, state: State) -> tuple[Array, Array]:
         """Return derivatives of the log likelihood, (parameters,), and Fisher's information.
 
-        With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d d^T.
+        With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d
+        d^T.
         """
         family, limits = self.family, self.family.limits
         model, signals = state
@@ -321,8 +325,8 @@ class Whittle(NamedTuple):
     def noise_variance(self, at: Array) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The information takes ordinates for independent, so that the error is somewhat too small;
-        what a bootstrap needs is that it grows and shrinks as the true one.
+        The information takes ordinates for independent, so that the error is somewhat too
+        small; what a bootstrap needs is that it grows and shrinks as the true one.
         """
         state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)

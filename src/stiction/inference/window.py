@@ -1,14 +1,15 @@
 """What a finite window does to a spectrum: taper, gaps and the removal of a trend, exactly.
 
-A record is no period of the interface. Its periodogram, tapered and with a trend removed, has an
-expectation that is linear in the correlation,
+A record is no period of the interface. Its periodogram, tapered and with a trend removed,
+has an expectation that is linear in the correlation,
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
-with h the taper (zero where nothing was measured), P the projection that removes the trend and a_k
-the autocorrelation of u_k. Leakage, gaps, aliasing and the loss of low wavenumbers to the trend are
-all in it (the debiased Whittle likelihood of Sykulski, Olhede, Guillaumin, Lilly and Early, 2019,
-and of Guillaumin, Sykulski, Olhede and Simons, 2022, here with the trend as well).
+with h the taper (zero where nothing was measured), P the projection that removes the trend
+and a_k the autocorrelation of u_k. Leakage, gaps, aliasing and the loss of low wavenumbers
+to the trend are all in it (the debiased Whittle likelihood of Sykulski, Olhede, Guillaumin,
+Lilly and Early, 2019, and of Guillaumin, Sykulski, Olhede and Simons, 2022, here with the
+trend as well).
 """
 
 import itertools
@@ -42,9 +43,10 @@ class Window:
     """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
     Lags are 0, 1, ..., n - 1, -n, ..., -1 in each direction; (*half) is the shape of a real
-    transform. `basis` holds orthonormal polynomials of the trend, (points, terms), and `white` the
-    expected periodogram of white noise of unit variance. `weights` of wave vectors are 1, a half
-    where k and -k are both among them or k is its own opposite, and 0 for the mean.
+    transform. `basis` holds orthonormal polynomials of the trend, (points, terms), and
+    `white` the expected periodogram of white noise of unit variance. `weights` of wave
+    vectors are 1, a half where k and -k are both among them or k is its own opposite, and 0
+    for the mean.
     """
 
     def __init__(
@@ -117,10 +119,10 @@ class Window:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
 
-        The spectrum fades out at its truncation; what lies above the sampling wavenumber is folded
-        back, and what lies above `FOLDS` times that, which is flat by then, evenly. With
-        `end_seen` false it is not truncated: what a truncation leaves out of a rough spectrum
-        would be taken for noise.
+        The spectrum fades out at its truncation; what lies above the sampling wavenumber is
+        folded back, and what lies above `FOLDS` times that, which is flat by then, evenly.
+        With `end_seen` false it is not truncated: what a truncation leaves out of a rough
+        spectrum would be taken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
