@@ -19,22 +19,17 @@ def system():
     return problem, st.paper.strength(problem, 0.5)
 
 
-@pytest.mark.parametrize("algorithm", ["plain", "subset"])
-def test_the_same_seed_gives_the_same_numbers_for_any_workers(system, algorithm):
-    stress = 0.68e6 if algorithm == "plain" else 0.665e6
+def tail(system, stress, algorithm="subset", target_cv=0.4, method=LOCAL, **options):
+    options |= {"algorithm": algorithm, "target_cv": target_cv, "method": method}
+    return st.failure_probability(*system, stress, **options)
 
-    def run(seed, workers):
-        return st.failure_probability(
-            *system,
-            stress,
-            method=LOCAL,
-            algorithm=algorithm,
-            target_cv=0.4,
-            seed=seed,
-            workers=workers,
-        )
 
-    one, three, other = run(4, 1), run(4, 3), run(5, 1)
+@pytest.mark.parametrize(("algorithm", "stress"), [("plain", 0.68e6), ("subset", 0.665e6)])
+def test_the_same_seed_gives_the_same_numbers_for_any_workers(system, algorithm, stress):
+    one, three, other = (
+        tail(system, stress, algorithm, seed=seed, workers=workers)
+        for seed, workers in ((4, 1), (4, 3), (5, 1))
+    )
     assert one.probability == three.probability
     assert one.cv == three.cv
     assert one.evaluations == three.evaluations
@@ -45,26 +40,16 @@ def test_the_same_seed_gives_the_same_numbers_for_any_workers(system, algorithm)
 
 
 def test_two_levels_are_reproducible(system):
-    runs = [
-        st.failure_probability(
-            *system,
-            0.665e6,
-            method=Equilibrium(),
-            algorithm="two_level",
-            target_cv=0.5,
-            seed=2,
-            workers=workers,
-        )
+    one, two = (
+        tail(system, 0.665e6, "two_level", 0.5, Equilibrium(), seed=2, workers=workers)
         for workers in (1, 2)
-    ]
-    assert runs[0].probability == runs[1].probability
-    assert runs[0].first_stage_evaluations == runs[1].first_stage_evaluations
+    )
+    assert one.probability == two.probability
+    assert one.first_stage_evaluations == two.first_stage_evaluations
 
 
 def test_plain_monte_carlo_counts_the_samples_of_the_ensemble(system):
-    result = st.failure_probability(
-        *system, 0.69e6, method=LOCAL, algorithm="plain", target_cv=0.2, seed=7
-    )
+    result = tail(system, 0.69e6, "plain", 0.2, seed=7)
     ensemble = st.monte_carlo(*system, method=LOCAL, samples=result.evaluations, seed=7)
     below = ensemble["critical_stress"].values < 0.69e6
     assert result.probability == below.mean()
@@ -73,9 +58,7 @@ def test_plain_monte_carlo_counts_the_samples_of_the_ensemble(system):
 
 
 def test_failing_profiles_fail(system):
-    result = st.failure_probability(
-        *system, 0.665e6, method=LOCAL, algorithm="subset", target_cv=0.4
-    )
+    result = tail(system, 0.665e6)
     failing = result.failing_profiles
     again = st.onset(system[0], failing["strength"].values, method=LOCAL)
     assert failing.sizes["sample"] > 5
@@ -107,12 +90,8 @@ def test_weak_places_are_spread_over_the_interface(system):
     """The failing patch is as likely anywhere: its phase 2 pi x/L averages out."""
     positions, runs = [], []
     for seed in range(12):
-        result = st.failure_probability(
-            *system, 0.667e6, method=LOCAL, algorithm="subset", target_cv=0.3, seed=seed
-        )
-        places = (
-            result.failing_profiles["critical_position"].values / system[0].interface.length
-        )
+        failing = tail(system, 0.667e6, target_cv=0.3, seed=seed).failing_profiles
+        places = failing["critical_position"].values / system[0].interface.length
         positions.append(places)
         runs.append(np.exp(2j * np.pi * places).mean())
     # L/h_n is about 32: a single run's few failures lie in many different places.
@@ -124,13 +103,8 @@ def test_weak_places_are_spread_over_the_interface(system):
 
 
 def test_curve_and_design_stress_agree_and_are_monotone(system):
-    curve = st.failure_curve(
-        *system,
-        method=LOCAL,
-        smallest=1e-5,
-        points_per_decade=2,
-        target_cv=0.3,
-    )
+    options = {"smallest": 1e-5, "points_per_decade": 2, "target_cv": 0.3}
+    curve = st.failure_curve(*system, method=LOCAL, **options)
     stress, chance = curve["stress"].values, curve["probability"].values
     assert np.all(np.diff(stress) < 0.0)
     assert np.all(np.diff(chance) < 0.0)
@@ -157,42 +131,19 @@ def test_curve_and_design_stress_agree_and_are_monotone(system):
 
 def test_more_that_is_random_is_sampled_with_it(system):
     problem, strength = system
-    base = strength
-    residual = st.RandomField(
-        st.Beta(alpha=2.0, beta=2.0, low=0.0, high=0.3e6), base.spectrum, mean_mode=True
+    residual, initial = (
+        st.RandomField(
+            st.Beta(alpha=2.0, beta=2.0, low=low, high=high), strength.spectrum, mean_mode=True
+        )
+        for low, high in ((0.0, 0.3e6), (-0.05e6, 0.05e6))
     )
-    initial = st.RandomField(
-        st.Beta(alpha=2.0, beta=2.0, low=-0.05e6, high=0.05e6), base.spectrum, mean_mode=True
+    random = st.RandomInterface(
+        strength=strength, residual_strength=residual, initial_stress=initial
     )
-    result = st.failure_probability(
-        problem,
-        st.RandomInterface(
-            strength=strength, residual_strength=residual, initial_stress=initial
-        ),
-        0.68e6,
-        method=LOCAL,
-        algorithm="plain",
-        target_cv=0.2,
-    )
-    ensemble = st.monte_carlo(
-        problem,
-        st.RandomInterface(
-            strength=strength, residual_strength=residual, initial_stress=initial
-        ),
-        method=LOCAL,
-        samples=result.evaluations,
-    )
+    result = tail((problem, random), 0.68e6, "plain", 0.2)
+    ensemble = st.monte_carlo(problem, random, method=LOCAL, samples=result.evaluations)
     assert result.probability == (ensemble["critical_stress"].values < 0.68e6).mean()
     assert set(result.failing_profiles.data_vars) >= {"strength", "residual_strength"}
-    rare = st.failure_probability(
-        problem,
-        st.RandomInterface(
-            strength=strength, residual_strength=residual, initial_stress=initial
-        ),
-        0.68e6,
-        method=LOCAL,
-        algorithm="subset",
-        target_cv=0.15,
-    )
+    rare = tail((problem, random), 0.68e6, target_cv=0.15)
     error = math.hypot(rare.cv, result.cv)
     assert abs(math.log(rare.probability / result.probability)) < 4.0 * error
