@@ -25,12 +25,7 @@ BEFORE = 0.11
 KEEP = "; keep it with simulate_rupture(save=st.Save(...))"
 
 
-def rupture(
-    run: xr.Dataset,
-    *,
-    problem: Problem | None = None,
-    ax: Axes | None = None,
-) -> Axes:
+def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
     """Draw slip rate in space and time; on a plane the advance of the front.
 
     Parameters
@@ -45,9 +40,9 @@ def rupture(
     Returns
     -------
     matplotlib.axes.Axes
-        A dot marks the onset, from which time counts. On a line, what slips seven decades slower
-        than the fastest point is white; on a plane, the front is drawn at equal intervals of time
-        on a map of the strength.
+        A dot marks the onset, from which time counts. On a line, time begins shortly before the
+        onset, and what slips seven decades slower than the fastest point is white; on a plane, the
+        front is drawn at equal intervals of time on a map of the strength.
 
     Raises
     ------
