@@ -77,7 +77,9 @@ def design_stress(
         refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    problem, random, seed, max_evaluations, confidence, event, workers, progress
+    problem, random, seed, workers, progress
+        As in `monte_carlo`.
+    max_evaluations, confidence, event
         As in `failure_probability`.
 
     Returns
@@ -85,10 +87,16 @@ def design_stress(
     DesignStress
         With `stress` and `interval`, Pa.
 
+    Raises
+    ------
+    InputError
+        Naming everything that does not fit.
+
     Warns
     -----
     AccuracyWarning
-        As `failure_probability`, and if the onset piles up on the bound.
+        If the evaluations allowed do not suffice, the onset piles up on the bound, or samples
+        about the stress fail otherwise by equilibrium than by the local criterion.
 
     Examples
     --------
@@ -159,8 +167,12 @@ def failure_curve(
         Stresses a factor of ten in probability.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
-    problem, random, method, seed, max_evaluations, confidence, event, workers, progress
+    problem, random, seed, workers, progress
+        As in `monte_carlo`.
+    method
         As in `design_stress`.
+    max_evaluations, confidence, event
+        As in `failure_probability`.
 
     Returns
     -------
@@ -170,10 +182,16 @@ def failure_curve(
         `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
         the attribute `lower_bound` is zero or less.
 
+    Raises
+    ------
+    InputError
+        Naming everything that does not fit.
+
     Warns
     -----
     AccuracyWarning
-        As `failure_probability`, for the end of the curve.
+        If the evaluations allowed do not suffice, or samples at the end of the curve fail
+        otherwise by equilibrium than by the local criterion.
 
     Examples
     --------

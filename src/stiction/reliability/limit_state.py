@@ -172,7 +172,9 @@ def limit_state(
 
     Parameters
     ----------
-    problem, random, method, event, workers
+    problem, random, workers
+        As in `monte_carlo`.
+    method, event
         As in `failure_probability`.
 
     Returns
