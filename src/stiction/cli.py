@@ -33,11 +33,6 @@ RUPTURE = (
     "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
 )  # fmt: skip
 """What is printed of a rupture."""
-ONSET = (
-    "critical_stress", "friction_coefficient", "critical_load", "first_instability",
-    "critical_position",
-)  # fmt: skip
-"""What is printed of an onset."""
 
 StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
@@ -412,6 +407,7 @@ def onset(
 
     from stiction.methods import methods
     from stiction.methods import onset as find
+    from stiction.results import ONSET_VARIABLES
     from stiction.study.export import table_of
     from stiction.study.study import read_setup
 
@@ -422,6 +418,7 @@ def onset(
     profile = read_strength(strength, problem, **reading)
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
+    printed = (*ONSET_VARIABLES, "friction_coefficient")
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     for name in method or methods():
@@ -430,7 +427,7 @@ def onset(
             one = own if own is not None and own.type == name else methods()[name](**options)
             with Meter(f"onset by {name}"):
                 found = table_of(find(problem, profile, method=one))
-            rows[name] = {key: v[0] for key, v in found.items() if key.startswith(ONSET)}
+            rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
             refused.append(f"{name} does not apply: {error}")
     if rows:
