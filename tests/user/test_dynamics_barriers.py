@@ -202,3 +202,18 @@ def test_poisson_ratios_that_waves_allow(plane, ratio):
     exact = float(st.onset(problem, TAU_P, method=st.Equilibrium()).critical_stress[0])
     found = st.onset(problem, TAU_P, method=dataclasses.replace(METHOD, loading_rate=1e5))
     assert float(found.critical_stress[0]) == pytest.approx(exact, rel=2e-5)
+
+
+def test_one_node_of_no_strength_costs_next_to_nothing():
+    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
+    problem = dataclasses.replace(PROBLEM, friction=friction)
+    tau_p = TAU_P + 0.3e6
+    plain = st.onset(problem, tau_p, method=METHOD)
+    tau_p[200] = 0.3e6 * (1 + 1e-5)
+    found = st.onset(problem, tau_p, method=dataclasses.replace(METHOD, max_steps=20_000))
+    exact = st.onset(problem, tau_p, method=st.Equilibrium())
+    # It was not done after 400,000 steps.
+    steps = [int(f.implicit_steps[0] + f.explicit_steps[0]) for f in (plain, found)]
+    assert steps[1] < 6 * steps[0]
+    expected = float(exact.critical_stress[0])
+    assert float(found.critical_stress[0]) == pytest.approx(expected, rel=5e-4)

@@ -1,5 +1,7 @@
 """`st.fit_field` as a laboratory uses it: units, gaps, order, bad records, the command."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -258,3 +260,19 @@ def test_a_field_of_coefficients_says_so():
     assert fit.field.of == "friction_coefficient"
     assert {field.of for field in fit.repetitions} == {"friction_coefficient"}
     assert st.fit_field(VALUES, PIECE, **QUICK).field.of is None
+
+
+@pytest.mark.slow
+def test_intervals_hold_nothing_that_cannot_be():
+    values, fit = bounded(noise=True)
+    interval = fit.interval
+    # Noise may have carried values beyond the bounds: as far as the estimate has it, or as the most
+    # there may be of it does.
+    share = 1.0 - (interval["noise"][1] / values.std()) ** 2
+    quiet = values.mean() + np.sqrt(share) * (values - values.mean())
+    low, high = fit.parameters["marginal.low"], fit.parameters["marginal.high"]
+    assert interval["marginal.low"][1] <= max(low, quiet.min()) * (1.0 + 1e-9)
+    assert interval["marginal.high"][0] >= min(high, quiet.max()) * (1.0 - 1e-9)
+    # The estimate is the end of the range; repetitions end there too, which tells nothing.
+    assert interval["spectrum.exponent"] == (0.65, 16.0)
+    assert re.search(r"exponent +16 +0.65 to 16 \(searched from 0.65 to 16\)", str(fit))

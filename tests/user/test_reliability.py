@@ -364,3 +364,16 @@ def test_command_writes_table_data_and_figure(app, system, tmp_path):
         again = st.failure_curve(*system, method=LOCAL, smallest=1e-4, seed=3)
         np.testing.assert_array_equal(curve["probability"], again["probability"])
     assert "probability" in done.output
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_small_runs_whose_states_tie(seed):
+    """Of twenty samples two go on, and chains repeat them."""
+    problem = st.paper.problem(nodes=136)
+    field = st.paper.strength(problem, 0.5)
+    with pytest.warns(st.AccuracyWarning):
+        found = st.failure_probability(
+            problem, field, 0.66001e6, method=LOCAL, algorithm="subset",
+            max_evaluations=100 + 50 * (seed % 2), seed=seed // 2,
+        )  # fmt: skip
+    assert found.interval[0] < 1e-12 < found.interval[1]
