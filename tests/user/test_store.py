@@ -201,16 +201,19 @@ def swapped(path):
 def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
     before = {path: path.stat().st_mtime_ns for path in chunks(run)}
     victim = chunks(run)[1]
+    # How many samples a chunk holds depends on how long they took.
+    with np.load(victim) as stored:
+        lost = len(stored["rows"])
     damage(victim)
     gone = not victim.exists()
     state = st.open_run(run).status()
     assert [victim.name in text for text in state.damaged] == ([] if gone else [True])
-    assert state.done == ALL - 20
+    assert state.done == ALL - lost
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         part = st.open_run(run).dataset()
     assert any("samples are missing" in str(w.message) for w in caught) != gone
-    assert int(part["critical_stress"].isnull().sum()) == 20
+    assert int(part["critical_stress"].isnull().sum()) == lost
     assert again(run, None if gone else ["its samples are computed again"]).identical(reference)
     after = {path: path.stat().st_mtime_ns for path in chunks(run)}
     kept = [path for path in before if path != victim]
