@@ -30,7 +30,7 @@ from stiction.load import GradientLoad as GradientLoad
 from stiction.load import Load as Load
 from stiction.methods import onset as onset
 from stiction.problem import Problem as Problem
-from stiction.profiles import read_profile as read_profile
+from stiction.profiles.reading import read_profile as read_profile
 from stiction.random.marginals import Beta as Beta
 from stiction.random.marginals import Gamma as Gamma
 from stiction.random.marginals import Lognormal as Lognormal

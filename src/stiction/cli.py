@@ -362,7 +362,7 @@ def read_strength(
     gaps: Annotated[Literal["refuse", "fill"], Option(help="Of missing values.")] = "refuse",
 ) -> Any:
     """Return the strength in a file, on the nodes of a problem."""
-    from stiction.profiles import read_profile
+    from stiction.profiles.reading import read_profile
 
     def column(text: str | None) -> int | str | None:
         return int(text) if text is not None and text.isdecimal() else text

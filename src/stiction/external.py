@@ -1,6 +1,6 @@
 """Functions for the samplers and reliability codes of others: OpenTURNS, UQpy, dynesty, sbi."""
 
+from stiction.ensemble.limit_state import limit_state
 from stiction.inference.simulator import simulator
-from stiction.reliability.limit_state import limit_state
 
 __all__ = ["limit_state", "simulator"]

@@ -15,9 +15,9 @@ from pydantic import BeforeValidator
 
 from stiction.errors import InputError
 from stiction.model import Progress, checked, to_plain
-from stiction.placing import with_gaps
 from stiction.problem import Problem, Sample, named_profiles, refusals
-from stiction.profiles import gather
+from stiction.profiles.placing import with_gaps
+from stiction.profiles.reading import gather
 from stiction.progress import Meter, Portions, Show
 from stiction.results import (
     DIRECTION,

@@ -16,8 +16,8 @@ from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, describe, is_unplaced, model, real_array
-from stiction.placing import describe_gaps, turned
-from stiction.profiles import at_nodes, on_nodes
+from stiction.profiles.placing import describe_gaps, turned
+from stiction.profiles.reading import at_nodes, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
 

@@ -6,7 +6,7 @@ import xarray as xr
 from refusals import refuses
 
 import stiction as st
-from stiction.profiles import at_nodes
+from stiction.profiles.reading import at_nodes
 
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(32, 16))
 VALUES = 1e6 + 1e5 * np.sin(2.0 * np.pi * PLANE.x / 0.02)[:, None] * np.ones(16)

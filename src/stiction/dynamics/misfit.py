@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.units import factor_to
+from stiction.profiles.units import factor_to
 
 if TYPE_CHECKING:
     import xarray as xr

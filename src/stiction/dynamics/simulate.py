@@ -22,9 +22,9 @@ from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, StoreError, warn_accuracy
 from stiction.model import Progress, checked, to_plain
-from stiction.placing import with_gaps
 from stiction.problem import Problem, named_profiles, refusals
-from stiction.profiles import gather
+from stiction.profiles.placing import with_gaps
+from stiction.profiles.reading import gather
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
 

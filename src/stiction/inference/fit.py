@@ -26,7 +26,7 @@ from stiction.inference.whittle import RANGES, SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
-from stiction.profiles import UNITS
+from stiction.profiles.reading import UNITS
 from stiction.random.random_field import RandomField
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")

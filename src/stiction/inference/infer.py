@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
+from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, grid_of
@@ -20,11 +21,10 @@ from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Progress, at_least, checked
 from stiction.problem import Problem
+from stiction.profiles.units import factor_to
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.reliability.limit_state import no_single_length
-from stiction.units import factor_to
 
 DRAWS = 4000
 TOLERABLE = 0.25

@@ -9,6 +9,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.inference.density import Densities, log_likelihoods, tabulate
 from stiction.inference.onset_table import (
     Axis,
@@ -21,7 +22,6 @@ from stiction.inference.onset_table import (
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.progress import SILENT, Meter
-from stiction.reliability.limit_state import LimitState, no_single_length
 
 BATCHES = 8
 """Parts of the sample, each left out once, by which the Monte Carlo error is estimated."""

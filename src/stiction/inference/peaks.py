@@ -9,8 +9,8 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.errors import InputError, prefixed
 from stiction.model import FilePath, Numbers, check, describe, is_finite
-from stiction.tables import read_table
-from stiction.units import factor_to, is_in
+from stiction.profiles.tables import read_table
+from stiction.profiles.units import factor_to, is_in
 
 FEWEST = 3
 """Peaks in all; of two numbers, one may be a mistake."""

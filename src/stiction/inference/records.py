@@ -8,7 +8,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, prefixed, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import real_array
-from stiction.profiles import is_labelled, points_of, simplified
+from stiction.profiles.reading import is_labelled, points_of, simplified
 
 FEWEST = 64
 """Measured points below which a record says nothing of a spectrum."""

@@ -26,7 +26,7 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
-from stiction.profiles import UNITS
+from stiction.profiles.reading import UNITS
 
 Array = NDArray[np.float64]
 

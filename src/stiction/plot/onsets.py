@@ -16,7 +16,6 @@ from stiction.criterion.local import nucleation_stress
 from stiction.equilibrium.patches import critical_patch
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.placing import IN_GAP, MEASURED
 from stiction.plot import maps
 from stiction.plot.axes import (
     add_friction_scale,
@@ -30,6 +29,7 @@ from stiction.plot.axes import (
 from stiction.plot.fields import finish_line, places, rows_of
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, marker, series
 from stiction.problem import Problem
+from stiction.profiles.placing import IN_GAP, MEASURED
 
 Array = NDArray[np.float64]
 

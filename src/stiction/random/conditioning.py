@@ -32,11 +32,11 @@ from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
-from stiction.placing import MEASURED
+from stiction.profiles.placing import MEASURED
+from stiction.profiles.units import parse
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
 from stiction.random.modes import Modes
 from stiction.random.synthesis import condition
-from stiction.units import parse
 
 NEGLIGIBLE = 1e-8
 """Singular values below which a direction of the draws stays as it is, to round-off."""

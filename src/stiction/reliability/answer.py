@@ -13,11 +13,11 @@ from pydantic import Field
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import Event, LimitState
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.model import Real, at_least
 from stiction.progress import Meter
-from stiction.reliability.limit_state import Event, LimitState
 from stiction.reliability.tail import two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6)]

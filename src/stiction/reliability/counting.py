@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.reliability.limit_state import LimitState
+from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.uncertainty import binomial_interval
 
 BATCH = 1024

@@ -8,6 +8,7 @@ import xarray as xr
 from pydantic import Field
 
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import Event
 from stiction.errors import warn_accuracy
 from stiction.methods import MethodObject, study_attributes
 from stiction.model import Count, Number, Progress, checked
@@ -26,7 +27,6 @@ from stiction.reliability.answer import (
     prepare,
 )
 from stiction.reliability.failure import FREQUENT
-from stiction.reliability.limit_state import Event
 from stiction.reliability.tail import sample_tail
 from stiction.reliability.uncertainty import lognormal_interval
 from stiction.results import Variable, to_dataset

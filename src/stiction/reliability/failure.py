@@ -7,6 +7,7 @@ import xarray as xr
 
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import Event, LimitState
 from stiction.errors import InputError, UnitWarning, warn_user
 from stiction.methods import MethodObject, label, study_attributes
 from stiction.model import Count, Number, Positive, Progress, Real, checked
@@ -26,7 +27,6 @@ from stiction.reliability.answer import (
     too_slow,
 )
 from stiction.reliability.counting import count_failures
-from stiction.reliability.limit_state import Event, LimitState
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
 from stiction.results import ONSET_VARIABLES, along

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.methods import methods
 from stiction.progress import SILENT, Meter
 from stiction.reliability.counting import Count
-from stiction.reliability.limit_state import LimitState, no_single_length
 from stiction.reliability.subset import MOST_LEVELS, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width

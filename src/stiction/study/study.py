@@ -40,7 +40,7 @@ from stiction.model import (
     to_plain,
 )
 from stiction.problem import Problem
-from stiction.profiles import profile_in_file
+from stiction.profiles.reading import profile_in_file
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import StoredRun, as_part

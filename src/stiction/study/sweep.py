@@ -22,7 +22,7 @@ from stiction.model import (
     model,
     to_plain,
 )
-from stiction.profiles import is_profile, profile_in_file
+from stiction.profiles.reading import is_profile, profile_in_file
 from stiction.results import Variable
 
 MOST_POINTS = 100_000

@@ -14,8 +14,8 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
-from stiction.placing import OF_A_PLANE
-from stiction.units import parse
+from stiction.profiles.placing import OF_A_PLANE
+from stiction.profiles.units import parse
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,9 +17,9 @@ import numpy as np
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.interface import Interface
 from stiction.model import FilePath, Flag, check, checked, describe, real_array
-from stiction.placing import MEASURED, OF_A_PLANE, Gaps, Points, close_gaps, place
-from stiction.tables import load, read_npy
-from stiction.units import factor_to, is_in, parse
+from stiction.profiles.placing import MEASURED, OF_A_PLANE, Gaps, Points, close_gaps, place
+from stiction.profiles.tables import load, read_npy
+from stiction.profiles.units import factor_to, is_in, parse
 
 if TYPE_CHECKING:
     import xarray as xr
