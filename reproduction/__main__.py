@@ -97,19 +97,17 @@ def _compute(run, figures) -> dict:
 
 def _draw(run, data, chosen, folder: Path) -> dict:
     import stiction as st
-    from reproduction.figures import beyond_arrest, beyond_onset, paper_1_to_4, paper_5_to_7
+    from reproduction.figures import beyond, paper
 
     folder.mkdir(parents=True, exist_ok=True)
     run.say("figures")
     started = time.monotonic()
     images = {}
     with st.plot.paper_style():
-        for module in (paper_1_to_4, paper_5_to_7, beyond_onset, beyond_arrest):
-            for name, function in vars(module).items():
-                number = int(name.removeprefix("figure_")) if name.startswith("figure_") else 0
-                if number and (not chosen or number in chosen):
-                    images[number] = folder / f"figure_{number:02}.png"
-                    function(data).savefig(images[number], dpi=200)
+        for number in chosen or NEEDS:
+            module = paper if number <= 7 else beyond
+            images[number] = folder / f"figure_{number:02}.png"
+            getattr(module, f"figure_{number}")(data).savefig(images[number], dpi=200)
     run.seconds["figures"] = time.monotonic() - started
     return images
 

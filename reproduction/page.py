@@ -13,17 +13,11 @@ from markupsafe import Markup, escape
 
 import stiction as st
 from reproduction import setting, texts
-from reproduction.claims import Data, Finding, rounded
+from reproduction.claims import Data, rounded
 from reproduction.modulus import compare
 from reproduction.rules import Verdict
 
 TEXTS = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
-STYLES = {
-    Verdict.FAILS: "fails",
-    Verdict.CORRECTED: "corrected",
-    Verdict.OPEN: "open",
-    Verdict.HOLDS: "holds",
-}
 _SYMBOLS = {
     "xi": "ξ",
     "tau": "τ",
@@ -52,6 +46,7 @@ def physics(text: str) -> Markup:
 def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     """Write the page: groups of findings by title, images by figure number, texts of warnings."""
     found = [finding for rows in groups.values() for finding in rows]
+    arithmetic = Counter(f.verdict.value for f in found if f.claim.kind == "arithmetic")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"physics": physics, "number": rounded}
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
@@ -65,13 +60,16 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
         samples=f"{data.size.samples:,}",
         ruptures=data.size.ruptures,
         short=texts.in_short(data),
-        counts=_counts(found),
+        total=len(found),
+        verdicts=Verdict,
+        findings=[f.verdict for f in found if f.claim.kind == "finding"],
+        arithmetic=", ".join(f"{count} {verdict}" for verdict, count in arithmetic.items()),
         departures=TEXTS["departure"],
         figures=[_figure(number, image, data) for number, image in images.items()],
         few=texts.few_and_many(data),
         readings=readings,
         best=max(reading.likelihood for reading in readings) or 1.0,
-        claims=[(title, [_claim(f) for f in rows], opened) for title, rows, opened in sections],
+        claims=sections,
         not_judged=TEXTS["not_judged"],
         errata=TEXTS["erratum"],
         provenance=_provenance(data, runner),
@@ -82,20 +80,6 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     unfinished.replace(path)
 
 
-def _counts(found) -> dict:
-    findings = [f for f in found if f.claim.kind == "finding"]
-    arithmetic = [f for f in found if f.claim.kind == "arithmetic"]
-    numbers = Counter(f.verdict for f in findings)
-    others = Counter(f.verdict for f in arithmetic)
-    return {
-        "total": len(found),
-        "findings": len(findings),
-        "arithmetic": len(arithmetic),
-        "rows": [(v.value, STYLES[v], numbers[v]) for v in STYLES],
-        "arithmetic_text": ", ".join(f"{n} {v.value}" for v, n in others.items()),
-    }
-
-
 def _figure(number: int, image: Path, data: Data) -> dict:
     encoded = base64.b64encode(image.read_bytes()).decode()
     about = TEXTS["figure"][str(number)]
@@ -103,21 +87,6 @@ def _figure(number: int, image: Path, data: Data) -> dict:
         "number": number,
         "ours": texts.OURS[number](data),
         "image": f"data:image/png;base64,{encoded}",
-    }
-
-
-def _claim(found: Finding) -> dict:
-    claim = found.claim
-    return {
-        "name": claim.name,
-        "says": claim.says,
-        "where": claim.where,
-        "rule": claim.rule.text,
-        "note": claim.note,
-        "verdict": found.verdict.value,
-        "style": STYLES[found.verdict],
-        "judged": [series.text() for series in found.judged] or ["nothing: too few samples"],
-        "beside": [series.text() for series in found.beside],
     }
 
 

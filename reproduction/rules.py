@@ -12,12 +12,12 @@ SIGMAS = 3.0
 
 
 class Verdict(Enum):
-    """The verdict on a statement."""
+    """The verdict on a statement, in the order in which the page counts them."""
 
-    HOLDS = "holds"
-    CORRECTED = "holds with a correction"
     FAILS = "does not hold"
+    CORRECTED = "holds with a correction"
     OPEN = "undecided"
+    HOLDS = "holds"
 
 
 Numbers = Sequence[Number]
