@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import hashlib
 import inspect
+import itertools
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -94,9 +95,32 @@ class Runner:
         return self.study(name, dataclasses.replace(study, ensemble=ensemble))
 
     def map(self, function, items) -> list:
-        """Return [function(item) for item in items], computed by all threads."""
+        """Return [function(*item) for item in items], computed by all threads."""
         with ThreadPoolExecutor(self.workers) as pool:
-            return list(pool.map(function, items))
+            return list(pool.map(function, *zip(*items, strict=True)))
+
+    def grid(self, function, **axes) -> xr.Dataset:
+        """Return the datasets function(*point) of all points of a grid, along its axes."""
+        parts = self.map(function, itertools.product(*axes.values()))
+        for name, values in reversed(axes.items()):
+            starts = range(0, len(parts), len(values))
+            parts = [along(name, values, parts[i : i + len(values)]) for i in starts]
+        return parts[0]
+
+    def batches(self, function, dim: str, values, samples: int, size: int = 250) -> xr.Dataset:
+        """Return function(value, first, count) of all samples at each value, by batches.
+
+        Variables along 'sample' are joined, others are added.
+        """
+        firsts = range(0, samples, size)
+        items = [(v, first, min(size, samples - first)) for v in values for first in firsts]
+        parts, rows = self.map(function, items), []
+        for i in range(0, len(parts), len(firsts)):
+            row = parts[i : i + len(firsts)]
+            own = [name for name in row[0] if "sample" in row[0][name].dims]
+            added = sum(part.drop_vars(own) for part in row)
+            rows.append(xr.concat([part[own] for part in row], dim="sample").merge(added))
+        return along(dim, values, rows)
 
 
 def kept(**inputs):

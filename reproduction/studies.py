@@ -7,11 +7,9 @@ import math
 
 import numpy as np
 import xarray as xr
-from scipy.stats import ks_2samp
 
 import stiction as st
 from reproduction import setting
-from reproduction.numbers_with_errors import mean
 from reproduction.runner import Runner, Size, along, kept
 from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
@@ -20,7 +18,7 @@ RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
 RUNAWAY = dataclasses.replace(RUPTURE, stop="runaway")
 CELLS = 2048
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
-WINDOWS = (1.0, 2.0, 4.0, 8.0)
+WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LEVELS = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
 RATES = (0.1, 0.3, 1.0, 3.0, 10.0)
 READINGS = {
@@ -66,46 +64,31 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
     transform = np.conj(np.fft.rfft(kernel))
     edges = np.linspace(setting.LOW, setting.HIGH, CELLS + 1)
 
-    def batch(item):
-        ratio, first = item
-        count = min(250, samples - first)
+    def batch(ratio, first, count):
         seed = run.seed_of(ratio)
         tau_p = strength(ratio).sample(interface, samples=count, seed=seed, first=first)
         tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)
         bound = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * transform, interface.size, axis=1)
         d = tau_n / MEAN - 1.0
         powers = [d.mean(axis=1), (d * d).mean(axis=1), (d * d * d).mean(axis=1)]
-        counts = np.histogram(tau_n[:, ::16], edges)[0]
-        weakest = tau_p.argmin(axis=1)
         # Least tau_n away from its minimum by more than h_n.
         where = tau_n.argmin(axis=1) * interface.spacing
         near = setting.distance(interface.x[None, :], where[:, None]) < H
-        second = np.where(near, np.inf, tau_n).min(axis=1)
-        return {
+        each = {
             "weakest_strength": tau_p.min(axis=1),
-            "weakest_position": weakest * interface.spacing,
+            "weakest_position": tau_p.argmin(axis=1) * interface.spacing,
             "largest_tau_n": tau_n.max(axis=1),
-            "second_tau_n": second,
+            "second_tau_n": np.where(near, np.inf, tau_n).min(axis=1),
             "least_tau_n": tau_n.min(axis=1),
             "bound": bound.min(axis=1),
-            "powers": np.array(powers).T,
-            "counts": counts,
         }
-
-    parts = []
-    for ratio in RATIOS:
-        found = run.map(batch, [(ratio, first) for first in range(0, samples, 250)])
-        part = {
-            name: ("sample", np.concatenate([each[name] for each in found]))
-            for name in found[0] if name not in ("powers", "counts")
-        }  # fmt: skip
-        part["powers"] = (
-            ("sample", "order"),
-            np.concatenate([each["powers"] for each in found]),
+        found = xr.Dataset({name: ("sample", values) for name, values in each.items()})
+        counts = np.histogram(tau_n[:, ::16], edges)[0]
+        return found.assign(
+            powers=(("sample", "order"), np.array(powers).T), counts=("cell", counts)
         )
-        part["counts"] = ("cell", sum(each["counts"] for each in found))
-        parts.append(xr.Dataset(part))
-    return along("correlation_ratio", RATIOS, parts)
+
+    return run.batches(batch, "correlation_ratio", RATIOS, samples)
 
 
 @kept()
@@ -247,26 +230,19 @@ def convergence(run: Runner, count: int) -> xr.Dataset:
     }
     ratio = SIMULATED[0]
 
-    def one(item):
-        (problem, method), sample = item
-        count_now = count if problem is PROBLEM and method is not half else min(count, 4)
-        if sample >= count_now:
-            return np.nan, np.nan, np.nan
+    def one(case, sample):
+        problem, method = cases[case]
+        names = ("critical_stress", "critical_position", "offset")
+        if sample >= 4 and (problem is not PROBLEM or method is half):
+            return xr.Dataset(dict.fromkeys(names, np.nan))
         tau_p = strength(ratio).sample(problem.interface, seed=run.seed_of(ratio), first=sample)
         found = st.onset(problem, tau_p, method=method, progress=False)
         static = st.onset(problem, tau_p, method=EXACT, progress=False)
-        stress = float(found["critical_stress"][0])
-        return (stress, float(found["critical_position"][0]),
-                stress / float(static["first_instability"][0]) - 1.0)  # fmt: skip
+        stress, place = (float(found[name][0]) for name in names[:2])
+        offset = stress / float(static["first_instability"][0]) - 1.0
+        return xr.Dataset(dict(zip(names, (stress, place, offset), strict=True)))
 
-    items = [(case, sample) for case in cases.values() for sample in range(count)]
-    found = np.array(run.map(one, items)).reshape(len(cases), count, 3)
-    names = ("critical_stress", "critical_position", "offset")
-    dims = ("case", "sample")
-    return xr.Dataset(
-        {name: (dims, found[:, :, i]) for i, name in enumerate(names)},
-        coords={"case": list(cases)},
-    )
+    return run.grid(one, case=list(cases), sample=range(count))
 
 
 def trend(run: Runner) -> xr.Dataset:
@@ -293,38 +269,19 @@ def trend(run: Runner) -> xr.Dataset:
 @kept(samples=lambda size: size.trend // 2)
 def window(run: Runner, samples: int) -> xr.Dataset:
     """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
-    ratio = RATIOS[-1]
     fine = setting.grid(PROBLEM, nodes=2.0)
+    field = strength(RATIOS[-1])
 
-    def batch(item):
-        factor, first = item
-        count = min(250, samples - first)
-        friction = dataclasses.replace(fine.friction, weakening_rate=setting.W * factor)
+    def batch(ratio, first, count):
+        rate = setting.W * ratio / RATIOS[-1]
+        friction = dataclasses.replace(fine.friction, weakening_rate=rate)
         problem = dataclasses.replace(fine, friction=friction)
-        tau_p = strength(ratio).sample(
-            fine.interface, samples=count, seed=run.seed, first=first
-        )
-        tau_n = st.theory.nucleation_stress(problem, tau_p)
-        return tau_n.min(axis=1), tau_p.min(axis=1)
+        tau_p = field.sample(fine.interface, samples=count, seed=run.seed, first=first)
+        least = st.theory.nucleation_stress(problem, tau_p).min(axis=1)
+        weakest = tau_p.min(axis=1)
+        return xr.Dataset({"stress": ("sample", least), "weakest": ("sample", weakest)})
 
-    firsts = range(0, samples, 250)
-    found = run.map(batch, [(factor, first) for factor in WINDOWS for first in firsts])
-    table = np.concatenate([np.array(each) for each in found], axis=1)
-    stress, weakest = table.reshape(2, len(WINDOWS), samples)
-    excess = [mean(row - low) for row, low in zip(stress, weakest, strict=True)]
-    half = samples // 2  # the two distributions from different samples
-    tests = [ks_2samp(row[:half], low[half:]) for row, low in zip(stress, weakest, strict=True)]
-    return xr.Dataset(
-        {
-            "excess": ("ratio", [each.value for each in excess]),
-            "excess_error": ("ratio", [each.error for each in excess]),
-            "distance": ("ratio", [float(each.statistic) for each in tests]),
-            "chance": ("ratio", [float(each.pvalue) for each in tests]),
-            "stress": (("ratio", "sample"), stress),
-            "weakest": ("sample", weakest[0]),
-        },
-        coords={"ratio": [ratio * factor for factor in WINDOWS]},
-    )
+    return run.batches(batch, "ratio", WINDOWS, samples)
 
 
 @kept()
@@ -366,8 +323,7 @@ def growth(run: Runner, count: int) -> xr.Dataset:
     """Slip patches that appear, grow and merge while the load rises to the onset."""
     interface = PROBLEM.interface
 
-    def one(item):
-        ratio, sample = item
+    def one(ratio, sample):
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
         onset = st.onset(PROBLEM, tau_p, method=EXACT, progress=False)
         load = float(onset["first_instability"][0])
@@ -383,24 +339,18 @@ def growth(run: Runner, count: int) -> xr.Dataset:
         slipping = np.flatnonzero(labels[-1] >= 0)
         if slipping.size == 0:  # the critical patch begins less than 0.1 % below its onset
             near = setting.distance(tau_p.argmin(), node, interface.size) * interface.spacing
-            return [row.max() + 1 for row in labels], mergers, False, near < 0.5 * H
-        away = setting.distance(slipping, node, interface.size)
-        critical = labels[-1] == labels[-1][slipping[away.argmin()]]
-        merged = any(np.unique(row[critical & (row >= 0)]).size > 1 for row in labels[:-1])
-        return [row.max() + 1 for row in labels], mergers, merged, critical[tau_p.argmin()]
+            merged, holds_weakest = False, near < 0.5 * H
+        else:
+            away = setting.distance(slipping, node, interface.size)
+            critical = labels[-1] == labels[-1][slipping[away.argmin()]]
+            merged = any(np.unique(row[critical & (row >= 0)]).size > 1 for row in labels[:-1])
+            holds_weakest = critical[tau_p.argmin()]
+        number = [row.max() + 1 for row in labels]
+        along_level = {"patches": ("level", number), "mergers": ("level", mergers)}
+        return xr.Dataset(along_level | {"merged": merged, "holds_weakest": holds_weakest})
 
-    items = [(ratio, sample) for ratio in RATIOS for sample in range(count)]
-    found = run.map(one, items)
-    dims, shape = ("correlation_ratio", "sample"), (len(RATIOS), count)
-    return xr.Dataset(
-        {
-            "patches": ((*dims, "level"), np.array([f[0] for f in found]).reshape(*shape, -1)),
-            "mergers": ((*dims, "level"), np.array([f[1] for f in found]).reshape(*shape, -1)),
-            "merged": (dims, np.array([int(f[2]) for f in found]).reshape(shape)),
-            "holds_weakest": (dims, np.array([int(f[3]) for f in found]).reshape(shape)),
-        },
-        coords={"correlation_ratio": list(RATIOS), "level": list(LEVELS)},
-    )
+    found = run.grid(one, correlation_ratio=RATIOS, sample=range(count))
+    return found.assign_coords(level=list(LEVELS))
 
 
 def dips(*places):
@@ -506,8 +456,7 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
             sides.append(tau_p[near].max())
         return min(sides)
 
-    def again(item):
-        ratio, number = item
+    def again(ratio, number):
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=number)[0]
         static = st.onset(PROBLEM, tau_p, method=st.Equilibrium(events=1), progress=False)
         length = float(static["event_length"][0, 0])
@@ -543,8 +492,7 @@ def driving(run: Runner, count: int) -> xr.Dataset:
     """Arrested fronts under non-uniform loads, by equilibrium and with inertia."""
     field = strength(RATIOS[1])
 
-    def one(item):
-        case, sample = item
+    def one(case, sample):
         problem = driven(case)
         tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
         found = st.onset(problem, tau_p, method=st.Equilibrium(events=12), progress=False)
@@ -561,23 +509,10 @@ def driving(run: Runner, count: int) -> xr.Dataset:
         dynamic = np.nan
         if case == "edge" and there[0]:
             dynamic = _held(problem, tau_p, float(stress[0]))
-        return length, griffith, dynamic
+        arrested = {"length": ("event", length), "griffith": ("event", griffith)}
+        return xr.Dataset(arrested | {"dynamic_length": dynamic})
 
-    found = run.map(one, [(case, sample) for case in DRIVING for sample in range(count)])
-    shape = (len(DRIVING), count)
-    return xr.Dataset(
-        {
-            "length": (("case", "sample", "event"), _table(found, 0, shape)),
-            "griffith": (("case", "sample", "event"), _table(found, 1, shape)),
-            "dynamic_length": (("case", "sample"), _table(found, 2, shape)),
-        },
-        coords={"case": list(DRIVING)},
-    )
-
-
-def _table(found, column: int, shape):
-    values = np.array([row[column] for row in found], dtype=float)
-    return values.reshape(*shape, *values.shape[1:])
+    return run.grid(one, case=list(DRIVING), sample=range(count))
 
 
 def _held(problem, tau_p, stress: float) -> float:
@@ -606,36 +541,23 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
     length = base.nucleation_length
     cases = [(ratio, 1.0) for ratio in RATIOS] + [(RATIOS[0], 0.25), (RATIOS[0], 0.5)]
 
-    def one(item):
-        (ratio, factor), first = item
+    def batch(case, first, count):
+        ratio, factor = cases[case]
         problem = setting.grid(base, length=factor, nodes=factor)
         double = setting.grid(base, length=2.0 * factor, nodes=2.0 * factor)
         field = strength(ratio, nucleation_length=length)
-        tau_p = field.sample(
-            problem.interface, samples=min(50, count - first), seed=run.seed, first=first
-        )
+        tau_p = field.sample(problem.interface, samples=count, seed=run.seed, first=first)
         mirrored = np.concatenate([tau_p, tau_p[:, ::-1]], axis=1)
         periodic = st.onset(problem, tau_p, method=EXACT, progress=False)
         free = st.onset(double, mirrored, method=EXACT, progress=False)
         extent = problem.interface.extent
         # Nodes are half a spacing from the mirror planes.
         place = (free["critical_position"].values + 0.5 * problem.interface.spacing) % extent
+        end = np.minimum(place, extent - place) / length
         change = free["first_instability"].values / periodic["first_instability"].values - 1.0
-        return change, np.minimum(place, extent - place) / length
+        return xr.Dataset({"change": ("sample", change), "end": ("sample", end)})
 
-    firsts = list(range(0, count, 50))
-    found = run.map(one, [(case, first) for case in cases for first in firsts])
-    rows = [found[i * len(firsts) : (i + 1) * len(firsts)] for i in range(len(cases))]
-    change, end = (
-        np.array([np.concatenate([part[k] for part in row]) for row in rows]) for k in (0, 1)
-    )
-    return xr.Dataset(
-        {"change": (("case", "sample"), change), "end": (("case", "sample"), end)},
-        coords={
-            "ratio": ("case", [c[0] for c in cases]),
-            "factor": ("case", [c[1] for c in cases]),
-        },
-    )
+    return run.batches(batch, "case", range(len(cases)), count, size=50)
 
 
 @kept()
