@@ -21,6 +21,7 @@ from stiction.profiles.reading import at_nodes, on_nodes
 from stiction.results import Variable
 from stiction.solid import Solid
 
+ACCEPTED = ("barriers", "overstress", "constant")
 FEWEST_NODES = 4
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
@@ -338,6 +339,9 @@ class Problem:
         """
         if isinstance(profiles, Sample):
             return profiles
+        if not isinstance(accept, Collection) or any(one not in ACCEPTED for one in accept):
+            names = ", ".join(map(repr, ACCEPTED))
+            raise InputError(f"accept: must be a collection of {names}, got {accept!r}")
         given, problems = named_profiles(profiles), []
         friction, load, interface = self.friction, self.load, self.interface
         scales = [name for name in SCALES if name in given]

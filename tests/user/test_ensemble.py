@@ -1,6 +1,10 @@
 """Ensembles: samples that cannot be solved, the pilot by the exact method, Dask and MPI."""
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -115,3 +119,37 @@ def test_a_dask_scheduler(tmp_path, command):
         )
     assert code == 0, errors
     assert st.open_run(tmp_path / "run").dataset().identical(reference)
+
+
+MPI = """
+import sys
+from mpi4py.futures import MPIPoolExecutor
+import stiction as st
+
+if __name__ == "__main__":
+    with MPIPoolExecutor() as executor:
+        assert executor.num_workers == 2
+        st.Study.from_toml("study.toml").run(out="run", executor=executor, progress=False)
+"""
+
+
+@pytest.mark.slow
+def test_an_mpi_pool(tmp_path):
+    """As docs/clusters.md starts it."""
+    pytest.importorskip("mpi4py")
+    if shutil.which("mpiexec") is None:
+        pytest.skip("there is no mpiexec")
+    study = st.Study.from_dict(small_study(sweep=lengths(4e-3, 6e-3)))
+    study.to_toml(tmp_path / "study.toml")
+    (tmp_path / "script.py").write_text(MPI)
+    open_mpi = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run(
+        ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py.futures", "script.py"],
+        cwd=tmp_path,
+        env=os.environ | open_mpi | {"OMPI_MCA_rmaps_base_oversubscribe": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert st.open_run(tmp_path / "run").dataset().identical(study.run(workers=1))
