@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction.equilibrium.sample import LINEAR, make_sample
-from stiction.equilibrium.transforms import Plane
+from stiction.equilibrium.transforms import AT_CORNER, Plane
 
 
 class Lattice(Plane):
@@ -37,4 +37,4 @@ def plane_sample(strength, residual, rate):
     whole = (
         np.broadcast_to(given, shape).flatten() for given in (strength, residual, 1.0, rate)
     )
-    return make_sample(*whole, LINEAR)
+    return make_sample(*whole, LINEAR._replace(at_corner=AT_CORNER))

@@ -11,6 +11,7 @@ from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_
 from stiction.equilibrium.cholesky import (
     append,
     back_substitute,
+    make_workspace,
     raise_diagonal,
     row_start,
     substitute,
@@ -49,29 +50,30 @@ def test_sparse_product_with_the_stiffness(problem):
     np.testing.assert_allclose(result, stiffness_times(problem, field), atol=1e-13 * column[0])
 
 
+def growing_factor(nodes, column, diagonal, groups):
+    """The factor of A on these nodes, appended group by group, and how many are in it."""
+    workspace = make_workspace(make_stiffness(column))
+    workspace.diagonal[:] = diagonal
+    size = 0
+    for group in groups:
+        workspace.order[:group] = nodes[size : size + group]
+        size = append(workspace, size, group)
+    return workspace.factor, size
+
+
+def as_matrix(factor, size):
+    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(size)]
+    return np.array([np.pad(row, (0, size - row.size)) for row in rows])
+
+
 @pytest.mark.parametrize("groups", [[41], [1] * 41, [5, 17, 2, 17]])
 def test_growing_factor_is_the_cholesky_factor(groups):
     column = stiffness_column(256, 0.1, 1e9)
     nodes = np.random.default_rng(2).permutation(256)[: sum(groups)]
     matrix = column[np.abs(nodes[:, None] - nodes)]
-    factor = np.empty(row_start(260))
-    members = np.empty(260, dtype=np.int64)
-    size = 0
-    for group in groups:
-        size = append(
-            factor,
-            size,
-            members,
-            nodes[size:].copy(),
-            group,
-            column,
-            np.full(256, column[0]),
-            0.0,
-        )
+    factor, size = growing_factor(nodes, column, column[0], groups)
     reference = np.linalg.cholesky(matrix)
-    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(size)]
-    ours = np.array([np.pad(row, (0, size - row.size)) for row in rows])
-    np.testing.assert_allclose(ours, reference, atol=1e-12 * reference.max())
+    np.testing.assert_allclose(as_matrix(factor, size), reference, atol=1e-12 * reference.max())
     forward, solution = np.empty(size), np.empty(size)
     substitute(factor, size, np.ones(size), forward)
     back_substitute(factor, size, forward, solution)
@@ -81,10 +83,7 @@ def test_growing_factor_is_the_cholesky_factor(groups):
 
 def test_factor_of_a_run_of_nodes():
     column = stiffness_column(256, 0.1, 1e9)
-    factor = block_factor(column, 60)
-    ours = np.zeros((60, 60))
-    for r in range(60):
-        ours[r, : r + 1] = factor[row_start(r) : row_start(r) + r + 1]
+    ours = as_matrix(block_factor(column, 60), 60)
     reference = np.linalg.cholesky(scipy.linalg.toeplitz(column[:60]))
     np.testing.assert_allclose(ours, reference, atol=1e-13 * reference.max())
 
@@ -93,16 +92,13 @@ def test_factor_of_a_run_of_nodes():
 def test_factor_of_a_matrix_with_a_raised_diagonal_entry(position):
     column = stiffness_column(256, 0.1, 1e9)
     nodes = np.random.default_rng(3).permutation(256)[:41]
-    factor, members = np.empty(row_start(260)), np.empty(260, dtype=np.int64)
-    append(factor, 0, members, nodes, 41, column, np.full(256, column[0]), 0.0)
+    factor, _ = growing_factor(nodes, column, column[0], [41])
     raise_diagonal(factor, 41, position, 0.3 * column[0], np.empty((2, 41)))
     matrix = column[np.abs(nodes[:, None] - nodes)]
     matrix[position, position] += 0.3 * column[0]
     reference = np.linalg.cholesky(matrix)
-    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(41)]
-    ours = np.array([np.pad(row, (0, 41 - row.size)) for row in rows])
     # Rotations are as stable as the factorisation itself.
-    np.testing.assert_allclose(ours, reference, atol=1e-12 * reference.max())
+    np.testing.assert_allclose(as_matrix(factor, 41), reference, atol=1e-12 * reference.max())
 
 
 def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
@@ -111,18 +107,7 @@ def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
     width = smallest_window(nodes, rate)
     assert window_mode(nodes, width)[0] <= rate < window_mode(nodes, width - 1)[0]
     column = stiffness_column(nodes, np.pi, 1.0)
-    factor = np.empty(row_start(nodes + 4))
-    members = np.empty(nodes + 4, dtype=np.int64)
-    size = append(
-        factor,
-        0,
-        members,
-        np.arange(nodes),
-        nodes,
-        column,
-        np.full(nodes, column[0] - rate),
-        0.0,
-    )
+    _, size = growing_factor(np.arange(nodes), column, column[0] - rate, [nodes])
     assert size == width - 1
 
 

@@ -112,58 +112,6 @@ def _solve_four(factor: Array, size: int) -> None:
 
 
 @jit
-def append(
-    factor: Array,
-    size: int,
-    members: Array,
-    nodes: Array,
-    count: int,
-    coupling: Array,
-    diagonal: Array,
-    tolerance: float,
-) -> int:
-    """Append nodes[:count] to the factor of A on members[:size], until done or a pivot fails.
-
-    A is coupling[|i - j|] off its `diagonal`. A pivot is not positive at or below the share
-    `tolerance` of it. Returns the members now: if they are less than size + count, the node after
-    the last one failed, and its row, without the pivot, follows the last one in the factor.
-    """
-    done = 0
-    while done < count:
-        group = min(GROUP, count - done)
-        for r in range(group):
-            node = nodes[done + r]
-            start = row_start(size + r)
-            row = factor[start : start + size]
-            for t in range(size):
-                row[t] = coupling[abs(node - members[t])]
-        if group == 1:
-            _solve_one(factor, row_start(size), size)
-        else:
-            for r in range(group, GROUP):
-                start = row_start(size + r)
-                factor[start : start + size] = 0.0
-            _solve_four(factor, size)
-        for r in range(group):
-            node = nodes[done + r]
-            start = row_start(size + r)
-            row = factor[start : start + size + r + 1]
-            for q in range(r):
-                base = row_start(size + q)
-                known = factor[base : base + size + q + 1]
-                entry = coupling[abs(node - members[size + q])]
-                row[size + q] = (entry - dot(known, row, size + q)) / known[size + q]
-            pivot = diagonal[node] - dot(row, row, size + r)
-            members[size + r] = node
-            if pivot <= tolerance * diagonal[node]:
-                return size + r
-            row[size + r] = np.sqrt(pivot)
-        size += group
-        done += group
-    return size
-
-
-@jit
 def raise_diagonal(
     factor: Array, size: int, position: int, amount: float, turns: Array
 ) -> None:
@@ -268,21 +216,55 @@ def make_workspace(stiffness: Stiffness) -> Workspace:
     )
 
 
-@jit_inside
-def add_members(workspace: Workspace, size: int, count: int) -> int:
-    """Append `order[:count]`; returns the members now, fewer if a pivot failed (see `append`)."""
-    return append(
-        workspace.factor, size, workspace.members, workspace.order, count,
-        workspace.stiffness.column, workspace.diagonal, PIVOT,
-    )  # fmt: skip
+@jit
+def append(workspace: Workspace, size: int, count: int) -> int:
+    """Append order[:count] to the factor of A on members[:size], until done or a pivot fails.
+
+    Returns the members now: if they are less than size + count, the node after the last one
+    failed, and its row, without the pivot, follows the last one in the factor.
+    """
+    factor, members, nodes = workspace.factor, workspace.members, workspace.order
+    coupling, diagonal = workspace.stiffness.column, workspace.diagonal
+    done = 0
+    while done < count:
+        group = min(GROUP, count - done)
+        for r in range(group):
+            node = nodes[done + r]
+            start = row_start(size + r)
+            row = factor[start : start + size]
+            for t in range(size):
+                row[t] = coupling[abs(node - members[t])]
+        if group == 1:
+            _solve_one(factor, row_start(size), size)
+        else:
+            for r in range(group, GROUP):
+                start = row_start(size + r)
+                factor[start : start + size] = 0.0
+            _solve_four(factor, size)
+        for r in range(group):
+            node = nodes[done + r]
+            start = row_start(size + r)
+            row = factor[start : start + size + r + 1]
+            for q in range(r):
+                base = row_start(size + q)
+                known = factor[base : base + size + q + 1]
+                entry = coupling[abs(node - members[size + q])]
+                row[size + q] = (entry - dot(known, row, size + q)) / known[size + q]
+            pivot = diagonal[node] - dot(row, row, size + r)
+            members[size + r] = node
+            if pivot <= PIVOT * diagonal[node]:
+                return size + r
+            row[size + r] = np.sqrt(pivot)
+        size += group
+        done += group
+    return size
 
 
 @jit_inside
 def substitute_members(
-    workspace: Workspace, first: int, last: int, values: Array, which: int
+    workspace: Workspace, first: int, last: int, values: Array, forward: Array
 ) -> None:
     """Extend one of the forward substitutions by the members first..last-1."""
-    forward = workspace.forward[which]
     for r in range(first, last):
         start = row_start(r)
         row = workspace.factor[start : start + r + 1]

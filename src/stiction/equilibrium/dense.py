@@ -22,7 +22,6 @@ from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import (
     SOLVED,
-    Solution,
     certificate,
     solve_program,
 )
@@ -37,7 +36,6 @@ from stiction.equilibrium.runaway import (
     unstoppable_length,
 )
 from stiction.equilibrium.sample import (
-    AT_CORNER,
     GAP,
     LENGTH,
     LOAD,
@@ -46,15 +44,15 @@ from stiction.equilibrium.sample import (
     POSITION,
     First,
     Jump,
-    Pieces,
+    Program,
     Sample,
     State,
     empty_first,
     exceeds,
-    make_sample,
     pieces_of,
     present_pieces,
     refused,
+    row_of,
     sample_of,
 )
 from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
@@ -88,19 +86,11 @@ class Line(NamedTuple):
 
     stiffness: Stiffness
     runs: Runs
-    pieces: Pieces
     usual_rate: float
     usual: Windows
 
 
 @jit_inside
-def copy(source: Array, target: Array) -> None:
-    """Copy a field; assigning to a slice compiles numpy's messages about shapes too."""
-    for i in range(source.size):
-        target[i] = source[i]
-
-
-@jit
 def judge(
     sample: Sample,
     line: Line,
@@ -116,78 +106,82 @@ def judge(
 
     Its load and multiplier are in their places; `slip` is changed.
     """
-    load = first.table[row, LOAD]
-    multiplier = first.multiplier[row]
+    multiplier, n = first.multiplier[row], slip.shape[0]
     gap = certificate(sample, slip, stiff, multiplier, workspace)
     _, length, centre = main_patch(multiplier)
-    spacing = line.runs.spacing
     outcome = UNDECIDED
-    for i in range(slip.shape[0]):
-        corner = line.pieces.ends[0] * sample.critical[i]
-        if slip[i] > corner * (2.0 - AT_CORNER) and sample.critical[i] > 0.0:
+    for i in range(n):
+        corner = sample.pieces.ends[0] * sample.critical[i]
+        if slip[i] > corner * (2.0 - sample.pieces.at_corner) and sample.critical[i] > 0.0:
             outcome = CORNER_REACHED
     if all_slips or outcome == UNDECIDED:
-        copy(slip, first.slip[row])
+        for i in range(n):
+            first.slip[row, i] = slip[i]
     first.table[row, PATCHES] = count_patches(slip)
     if outcome == UNDECIDED:
         outcome = runs_away(
-            sample, line.runs, load, slip, stiff, multiplier, workspace.vectors[2], work
-        )
+            sample, line.runs, first.table[row, LOAD], slip, stiff, multiplier,
+            workspace.vectors[2], work,
+        )  # fmt: skip
         if outcome == UNDECIDED:
-            copy(stiff, first.stiff[row])
-            copy(slip, first.ahead[row])
+            for i in range(n):
+                first.stiff[row, i] = stiff[i]
+                first.ahead[row, i] = slip[i]
     first.table[row, GAP] = gap
-    first.table[row, POSITION] = centre * spacing
-    first.table[row, LENGTH] = length * spacing
+    first.table[row, POSITION] = centre * line.runs.spacing
+    first.table[row, LENGTH] = length * line.runs.spacing
     first.table[row, OUTCOME] = outcome
 
 
 @jit
 def solve_batch(
-    excess: Array,
-    residual: Array,
-    profile: Array,
-    rate: Array,
+    samples: Sample,
     line: Line,
     others: Windows,
     all_slips: bool,
+    solved: bool,
     first: First,
     workspace: Workspace,
     work: Array,
 ) -> None:
     """Solve the programme for each row and test quickly whether its instability is arrested.
 
-    Arrays of the samples are (samples, n), as of `Sample`; `others` are the windows of samples with
-    another weakening rate than the usual one anywhere. `work` is (8, n) of work space.
+    `others` are the windows of samples with another weakening rate than the usual one anywhere;
+    `work` is (8, n) of work space. With `solved` load, slip, K d and multiplier are in their
+    places already.
     """
-    samples, n = excess.shape
+    count, n = samples.excess.shape
     slip, stiff = work[6], work[7]
-    for row in range(samples):
-        sample = make_sample(excess[row], residual[row], profile, rate[row], line.pieces)
-        windows, start = line.usual, np.inf
+    for row in range(count):
+        sample = row_of(samples, row)
+        multiplier = first.multiplier[row]
+        start = np.inf
         for i in range(n):
             workspace.diagonal[i] = line.stiffness.column[0] - sample.rate[i]
-            if rate[row, i] != line.usual_rate:
-                windows, start = others, -np.inf
-        multiplier = first.multiplier[row]
-        bound = window_bound(sample, windows, work[0], multiplier)
-        weak = 0
-        for i in range(n):
-            weak += excess[row, i] < bound * profile[i]
-        if weak > MANY_NODES:
-            first.table[row, OUTCOME] = CROWDED
-            continue
-        # If it does not succeed, the certificate says so.
-        slip[:] = 0.0
-        load, _ = solve_program(
-            sample, start, bound, np.inf, multiplier, slip, stiff, workspace
-        )
-        first.table[row, LOAD] = load
+            slip[i] = 0.0
+            if sample.rate[i] != line.usual_rate and sample.rate[i] != 0.0:
+                start = -np.inf
+        if solved:
+            for i in range(n):
+                slip[i], stiff[i] = first.slip[row, i], first.stiff[row, i]
+        else:
+            windows = line.usual if start == np.inf else others
+            bound = window_bound(sample, windows, work[0], multiplier)
+            weak = 0
+            for i in range(n):
+                weak += sample.excess[i] < bound * sample.profile[i]
+            if weak > MANY_NODES:
+                first.table[row, OUTCOME] = CROWDED
+                continue
+            # If it does not succeed, the certificate says so.
+            first.table[row, LOAD], _ = solve_program(
+                sample, start, bound, np.inf, multiplier, slip, stiff, workspace
+            )
         judge(sample, line, first, row, slip, stiff, all_slips, workspace, work)
 
 
-class LineProgram:
-    """Equilibria of a line; safe to use from several threads.
+class LineProgram(Program):
+    """Equilibria of a line.
 
     Parameters
     ----------
@@ -203,7 +197,6 @@ class LineProgram:
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, from which on there is a warning."""
-    at_corner = AT_CORNER
 
     def __init__(self, problem: Problem, every: int = 1) -> None:
         if reasons := refused(problem.friction):
@@ -221,14 +214,9 @@ class LineProgram:
         self.line = Line(
             stiffness,
             runs,
-            self.pieces,
             usual,
             exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
         )  # fmt: skip
-
-    def sample_of(self, rows: Samples, row: int) -> Sample:
-        """Return one row of a batch."""
-        return sample_of(rows, row, self.pieces)
 
     def _windows(self, rates: Array) -> Windows:
         """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""
@@ -249,17 +237,15 @@ class LineProgram:
 
     def programme(
         self, sample: Sample, cap: float = np.inf, state: State | None = None
-    ) -> Solution | None:
+    ) -> State | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
         Only the first piece of its law counts: `excess` and `rate`. The state is an equilibrium at
         a lower load, if one is known.
         """
         bound, multiplier = self.bound(sample)
-        if (
-            cap == np.inf
-            and np.count_nonzero(sample.excess < bound * sample.profile) > MANY_NODES
-        ):
+        weak = np.count_nonzero(sample.excess < bound * sample.profile)
+        if cap == np.inf and weak > MANY_NODES:
             found = self._by_transforms(sample, state)
             if found is not None:
                 return found
@@ -271,9 +257,9 @@ class LineProgram:
         load, status = solve_program(
             sample, start, bound, cap, multiplier, slip, stiff, workspace
         )
-        return Solution(load, slip, stiff, multiplier) if status == SOLVED else None
+        return State(load, slip, stiff, multiplier) if status == SOLVED else None
 
-    def _by_transforms(self, sample: Sample, state: State | None) -> Solution | None:
+    def _by_transforms(self, sample: Sample, state: State | None) -> State | None:
         """Solve a programme in which many nodes slip; None if its bounds stay apart."""
         plane = Plane((self.problem.interface.extent,), self.problem.effective_modulus, 0.0)
         found = plane_onset(
@@ -288,7 +274,7 @@ class LineProgram:
         multiplier /= multiplier @ sample.profile
         symbol = plane.symbol((self.nodes,))
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
-        return Solution(found.lower, found.slip, stiff, multiplier)
+        return State(found.lower, found.slip, stiff, multiplier)
 
     def _workspace(self, sample: Sample) -> Workspace:
         workspace = make_workspace(self.line.stiffness)
@@ -302,16 +288,28 @@ class LineProgram:
         is reached before; all others run away.
         """
         first = empty_first(rows.samples, 6, self.nodes)
-        rate = np.ascontiguousarray(rows.weakening_rate)
-        unusual = rate[np.any(rate != self.line.usual_rate, axis=1)]
-        solve_batch(
-            np.ascontiguousarray(rows.strength - rows.initial_stress),
-            np.ascontiguousarray(rows.residual_strength - rows.initial_stress),
-            np.array(rows.load_profile), rate, self.line, self._windows(unusual), slips, first,
-            make_workspace(self.line.stiffness), np.empty((8, self.nodes)),
-        )  # fmt: skip
+        samples = sample_of(rows, self.pieces)
+        unusual = samples.rate[np.any(samples.rate != self.line.usual_rate, axis=1)]
+        spaces = make_workspace(self.line.stiffness), np.empty((8, self.nodes))
+        others = self._windows(unusual)
+        solve_batch(samples, self.line, others, slips, False, first, *spaces)
         for row in map(int, np.flatnonzero(first.table[:, OUTCOME] == CROWDED)):
-            self._solve_crowded(self.sample_of(rows, row), row, slips, first)
+            found = self.programme(self.sample_of(rows, row))
+            if found is None:  # followed event by event instead
+                first.table[row] = 0.0
+                first.table[row, GAP] = np.nan
+                first.multiplier[row] = 0.0
+                first.table[row, OUTCOME] = CORNER_REACHED
+                continue
+            first.table[row, LOAD] = found.load
+            first.slip[row], first.stiff[row] = found.slip, found.stiff
+            first.multiplier[row] = found.direction
+            part = slice(row, row + 1)
+            one, table = (
+                sample_of(rows, self.pieces, part),
+                First(*(each[part] for each in first)),
+            )
+            solve_batch(one, self.line, others, slips, True, table, *spaces)
         states: dict[int, State | None] = {}
         for row in map(int, np.flatnonzero(first.table[:, OUTCOME] != SLIDING)):
             states[row] = None
@@ -321,27 +319,6 @@ class LineProgram:
                     first.multiplier[row].copy(), ahead=first.ahead[row],
                 )  # fmt: skip
         return first, states
-
-    def _solve_crowded(self, sample: Sample, row: int, slips: bool, first: First) -> None:
-        """Solve the programme of a row in which many nodes slip."""
-        found = self.programme(sample)
-        if found is None:  # followed event by event instead
-            first.table[row] = 0.0
-            first.table[row, GAP] = np.nan
-            first.multiplier[row] = 0.0
-            first.table[row, OUTCOME] = CORNER_REACHED
-            return
-        first.table[row, LOAD] = found.load
-        first.multiplier[row] = found.multiplier
-        judge(
-            sample, self.line, first, row, found.slip, found.stiff, slips, self._workspace(sample),
-            np.empty((6, self.nodes)),
-        )  # fmt: skip
-
-    def at_rest(self, sample: Sample) -> State:
-        """Return the state in which the first node is about to slip."""
-        load = float((sample.excess / sample.profile).min())
-        return State(load, *np.zeros((3, self.nodes)))
 
     def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
         """Return the next instability, or the state at a load before it.
@@ -356,7 +333,7 @@ class LineProgram:
             found = self.programme(present, state=state)
             straight = found is not None and found.load >= state.load
             if found is not None and straight and not exceeds(sample, found.slip, piece):
-                return State(found.load, found.slip, found.stiff, found.multiplier)
+                return found
             stuck = True
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
         workspace = make_workspace(self.line.stiffness)
@@ -373,7 +350,7 @@ class LineProgram:
         if fresh and not state.stuck:
             found = self.programme(sample, load)
             if found is not None and not exceeds(sample, found.slip):
-                return State(load, found.slip, found.stiff, state.direction, unstable=False)
+                return replace(found, load=load, direction=state.direction, unstable=False)
         there = self.next(sample, replace(state, stuck=True), load)
         return None if there.unstable or not there.known else there
 

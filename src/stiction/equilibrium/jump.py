@@ -13,7 +13,7 @@ from stiction.arrays import Array
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
-    add_members,
+    append,
     multiply_members,
     singular_direction,
     solve_first,
@@ -22,7 +22,6 @@ from stiction.equilibrium.cholesky import (
 from stiction.equilibrium.linear_program import overstressed, stress_tolerance
 from stiction.equilibrium.runaway import ARRESTED, SLIDING, UNDECIDED
 from stiction.equilibrium.sample import (
-    AT_CORNER,
     Sample,
     piece_at,
     step_to_corner,
@@ -49,7 +48,7 @@ def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
     count = 0
     for q in range(2 * n):
         i = q if q < n else q - n
-        residual = slip[i] > 0.0 and slip[i] >= AT_CORNER * sample.critical[i]
+        residual = slip[i] > 0.0 and slip[i] >= sample.pieces.at_corner * sample.critical[i]
         run = run + 1 if residual else 0
         if q < n and residual:
             count += sample.pieces.ends.shape[0]
@@ -72,7 +71,7 @@ def _join(
         return size
     if size + count > MOST_MEMBERS:
         return CROWDED
-    now = add_members(workspace, size, count)
+    now = append(workspace, size, count)
     if now < size + count:
         return ALL
     for t in range(size, now):
@@ -99,7 +98,7 @@ def _relax(
     for t in range(size):
         i = workspace.members[t]
         drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
-    substitute_members(workspace, ZERO, size, drive, 0)
+    substitute_members(workspace, ZERO, size, drive, workspace.forward[0])
     solve_first(workspace, size, solution)
     for t in range(size):
         i = workspace.members[t]
@@ -130,7 +129,7 @@ def _settle(
         other.order[t] = i
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
-    now = add_members(other, ZERO, size)
+    now = append(other, ZERO, size)
     direction = other.vectors[3]
     longest = 1.0
     if now < size:
@@ -140,7 +139,7 @@ def _settle(
         drive = other.vectors[2]
         for i in range(slip.shape[0]):
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-        substitute_members(other, ZERO, size, drive, 0)
+        substitute_members(other, ZERO, size, drive, other.forward[0])
         solution = other.vectors[1]
         solve_first(other, size, solution)
         direction[:] = 0.0
@@ -182,7 +181,7 @@ def jump(
             count += 1
     if count > MOST_MEMBERS:
         return UNDECIDED
-    size = add_members(workspace, ZERO, count)
+    size = append(workspace, ZERO, count)
     if size < count:
         return SLIDING
     waited = 0

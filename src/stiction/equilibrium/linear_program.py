@@ -7,15 +7,13 @@ bound (a cut). The same slipping nodes, less the few that do not slip at the low
 there. A load that is an upper bound and has an equilibrium is the critical one.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
-    add_members,
+    append,
     multiply_members,
     singular_direction,
     solve_first,
@@ -34,16 +32,6 @@ OVERSTRESS = 1e-12
 CLOSE = 0.02
 """Share of the bound by which a load with an equilibrium may lie below it to try the bound next."""
 PASSES = 10_000
-
-
-class Solution(NamedTuple):
-    """Critical load (Pa), slip (m), K times it (Pa), and the multiplier, <p, y> = 1."""
-
-    load: float
-    slip: Array
-    stiff: Array
-    multiplier: Array
-    status: int = SOLVED
 
 
 @jit_inside
@@ -183,9 +171,9 @@ def solve_program(
             status = OVERFULL
             break
         before = size
-        size = add_members(workspace, size, count)
-        substitute_members(workspace, before, size, sample.profile, 0)
-        substitute_members(workspace, before, size, sample.excess, 1)
+        size = append(workspace, size, count)
+        substitute_members(workspace, before, size, sample.profile, workspace.forward[0])
+        substitute_members(workspace, before, size, sample.excess, workspace.forward[1])
         for t in range(before, size):
             inside[members[t]] = True
         failed = size < before + count

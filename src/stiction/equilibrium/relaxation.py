@@ -23,14 +23,17 @@ from stiction.elasticity.linear import (
 )
 from stiction.elasticity.operator import Operator
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
-from stiction.equilibrium.sample import Present, Sample, present_pieces, residual_nodes
+from stiction.equilibrium.sample import (
+    Sample,
+    present_pieces,
+    residual_nodes,
+    step_to_corner,
+)
 
 BALANCED = 0
 SLIDING = 1
 UNDECIDED = 2
 
-AT_RESIDUAL = 1.0 - 1e-9
-"""Share of the slip at a corner from which on a node counts as beyond it."""
 RELEVANT = 1e-5
 """Share of the largest value below which a node is not part of an unstable direction."""
 STEPS = 2000
@@ -40,21 +43,6 @@ DRAG = 1e-3
 """Stiffness added to elastic steps, as a share of the largest W."""
 ROUGH = 2e-3
 """Largest residual stress as a share of the mean strength while slip grows faster than that."""
-
-
-def present(sample: Sample, slip: Array) -> Present:
-    """Return the pieces on which the nodes are after a slip."""
-    return present_pieces(sample, slip, AT_RESIDUAL)
-
-
-def step_to_corner(sample: Sample, now: Present, slip: Array, direction: Array) -> float:
-    """Return the length along a direction at which the first node reaches the next corner."""
-    ends = sample.pieces.ends
-    moving = (now.piece < ends.size) & (direction > 0.0)
-    if not moving.any():
-        return np.inf
-    corner = ends[now.piece[moving]] * sample.critical[moving]
-    return float(((corner - slip[moving]) / direction[moving]).min())
 
 
 def _solve(
@@ -79,7 +67,7 @@ def _weakening_step(
     have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
     forward or balanced, so the next equilibrium is not passed.
     """
-    now = present(sample, slip)
+    now = present_pieces(sample, slip)
     operator = operator._replace(rate=now.rate)
     drive = load * sample.profile - now.strength
     rest, new = np.empty_like(slip), slip.copy()
@@ -98,8 +86,9 @@ def _weakening_step(
         lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
         direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
         longest = np.inf
-    step = min(step_to_corner(sample, now, slip, direction), longest)
-    return slip + step * direction if np.isfinite(step) else slip
+    moved = slip.copy()
+    step_to_corner(sample, moved, direction, longest)
+    return moved
 
 
 class Relaxed(NamedTuple):
@@ -136,7 +125,7 @@ def least_equilibrium(
     slip = np.maximum(slip, 0.0)
     patient = False
     for _ in range(STEPS):
-        now = present(sample, slip)
+        now = present_pieces(sample, slip)
         drive = load * sample.profile - now.strength
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(SLIDING, slip)
@@ -146,10 +135,10 @@ def least_equilibrium(
                 return Relaxed(UNDECIDED, slip)
             if status == SOLVED:
                 new = np.maximum(new, slip)
-                if step_to_corner(sample, now, slip, new - slip) >= 1.0:
+                if step_to_corner(sample, slip.copy(), new - slip, 1.0) >= 1.0:
                     return Relaxed(BALANCED, new)
             slip = _weakening_step(operator, sample, load, slip, tolerance)
-            now = present(sample, slip)
+            now = present_pieces(sample, slip)
         # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
         rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
         strength = now.strength - now.rate * slip
@@ -158,7 +147,7 @@ def least_equilibrium(
         if status != SOLVED:
             return Relaxed(UNDECIDED, slip)
         new = np.maximum(new, slip)
-        weakening = ~residual_nodes(sample, new, AT_RESIDUAL) & (sample.critical > 0.0)
+        weakening = ~residual_nodes(sample, new) & (sample.critical > 0.0)
         patient = bool((new - slip > SETTLED * sample.critical)[weakening].any())
         slip = new
     return Relaxed(UNDECIDED, slip)

@@ -15,7 +15,6 @@ from stiction.elasticity.line import griffith_length
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.sample import (
-    AT_CORNER,
     Sample,
     step_to_corner,
     strength_at,
@@ -34,7 +33,6 @@ SHARE = 1e-3
 """Growth in a step, as a share of the largest slip, below which the test gives up."""
 
 
-@jit
 def block_factor(column: Array, width: int) -> Array:
     """Cholesky factor of the leading block of K, for runs of up to `width` nodes.
 
@@ -42,20 +40,18 @@ def block_factor(column: Array, width: int) -> Array:
     `width`^2 operations (the algorithm of Schur; Kailath and Sayed, 1999).
     """
     factor = np.empty(row_start(width + 4))
+    starts = np.array([row_start(r) for r in range(width)])
     upper = column[:width] / np.sqrt(column[0])
     lower = upper.copy()
     for k in range(width):
         if k > 0:
             # One step down, and the hyperbolic rotation that clears entry k of the second vector.
-            for r in range(width - 1, k - 1, -1):
-                upper[r] = upper[r - 1]
-            turn = lower[k] / upper[k]
+            shifted, rest = upper[k - 1 : -1], lower[k:]
+            turn = lower[k] / upper[k - 1]
             length = np.sqrt((1.0 - turn) * (1.0 + turn))
-            for r in range(k, width):
-                upper[r] = (upper[r] - turn * lower[r]) / length
-                lower[r] = length * lower[r] - turn * upper[r]
-        for r in range(k, width):
-            factor[row_start(r) + k] = upper[r]
+            upper[k:] = (shifted - turn * rest) / length
+            lower[k:] = length * rest - turn * upper[k:]
+        factor[starts[k:] + k] = upper[k:]
     return factor
 
 
@@ -164,7 +160,7 @@ def runs_away(
             grown[begin + t] += solution[t]
             largest = max(largest, slip[i])
             fastest = max(fastest, solution[t])
-            run = run + 1 if slip[i] >= AT_CORNER * sample.critical[i] else 0
+            run = run + 1 if slip[i] >= sample.pieces.at_corner * sample.critical[i] else 0
             longest = max(longest, run)
         if longest >= griffith or unsupported(sample, load, slip):
             return SLIDING

@@ -17,8 +17,6 @@ from stiction.friction.parameters import Linear, Polygon
 from stiction.jit import jit, jit_inside
 from stiction.problem import Sample as Samples
 
-AT_CORNER = 1.0 - 1e-12
-"""Share of the slip at a corner from which a node counts as beyond it."""
 TOGETHER = 1e-9
 """Share of the slip at a corner within which nodes reach their corners at once."""
 FLAT = 1e-11
@@ -31,14 +29,16 @@ class Pieces(NamedTuple):
 
     `ends` are the u at the end of each piece, the last 1. Of each piece and of the residual
     strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` how steeply it
-    falls in units of the first (1, ..., 0); `first` is -f' there, `area` the integral of f.
+    falls in units of the first (1, ..., 0); `first` is -f' there, `area` the integral of f. From
+    the share `at_corner` of the slip at a corner on a node counts as beyond it.
     """
 
     ends: Array
     starts: Array
     slopes: Array
-    first: float
-    area: float
+    first: float = 1.0
+    area: float = 0.5
+    at_corner: float = 1.0 - 1e-12
 
     @property
     def steepens(self) -> bool:
@@ -46,7 +46,7 @@ class Pieces(NamedTuple):
         return bool(np.any(np.diff(self.slopes) > 0.0))
 
 
-LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0, 0.5)
+LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
 
 
 def refused(law: FrictionLaw) -> list[str]:
@@ -88,35 +88,42 @@ class Sample(NamedTuple):
     pieces: Pieces
 
 
-@jit
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
 ) -> Sample:
-    """A sample in which nodes whose strength is residual, but for round-off, do not weaken."""
-    n = excess.shape[0]
-    scale = 0.0
-    for i in range(n):
-        scale += max(abs(excess[i]), abs(residual[i]))
-    critical = np.empty(n)
-    moving = rate.copy()
-    residual = residual.copy()
-    for i in range(n):
-        if excess[i] - residual[i] <= FLAT * scale / n:
-            residual[i] = excess[i]
-            moving[i] = 0.0
-            critical[i] = 0.0
-        else:
-            critical[i] = pieces.first * (excess[i] - residual[i]) / rate[i]
-    return Sample(excess, residual, profile, moving, critical, pieces)
+    """Return one sample, or many over the first axis.
+
+    Nodes whose strength is residual, but for round-off, do not weaken.
+    """
+    fall = excess - residual
+    largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
+    if not fall.min() > FLAT * largest:
+        scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
+        constant = ~(fall > FLAT * scale)
+        residual = np.where(constant, excess, residual)
+        fall, rate = np.where(constant, 0.0, (fall, rate))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
+    return Sample(excess, residual, profile, np.ascontiguousarray(rate), critical, pieces)
 
 
-def sample_of(rows: Samples, row: int, pieces: Pieces = LINEAR) -> Sample:
-    """Return one row of a batch as the kernels take it."""
+def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> Sample:
+    """Return one sample of a batch, or all of them, as the kernels take them."""
     initial = rows.initial_stress[row]
-    excess = (rows.strength[row] - initial).flatten()
-    residual = (rows.residual_strength[row] - initial).flatten()
-    rate = np.array(rows.weakening_rate[row]).flatten()
-    return make_sample(excess, residual, np.array(rows.load_profile).flatten(), rate, pieces)
+    shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
+    excess = (rows.strength[row] - initial).reshape(shape)
+    residual = (rows.residual_strength[row] - initial).reshape(shape)
+    rate = rows.weakening_rate[row].reshape(shape)
+    return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
+
+
+@jit_inside
+def row_of(samples: Sample, row: int) -> Sample:
+    """One sample of a batch."""
+    return Sample(
+        samples.excess[row], samples.residual[row], samples.profile,
+        samples.rate[row], samples.critical[row], samples.pieces,
+    )  # fmt: skip
 
 
 OUTCOME, LOAD, GAP, PATCHES, POSITION, LENGTH = range(6)
@@ -173,6 +180,21 @@ class State:
     ahead: Any = None
 
 
+class Program:
+    """What finds the equilibria of a problem, on lines and on planes; safe for several threads."""
+
+    pieces: Pieces
+
+    def sample_of(self, rows: Samples, row: int) -> Sample:
+        """Return one sample of a batch."""
+        return sample_of(rows, self.pieces, row)
+
+    def at_rest(self, sample: Sample) -> State:
+        """Return the state in which the first node is about to slip."""
+        load = float((sample.excess / sample.profile).min())
+        return State(load, *np.zeros((3, sample.excess.size)))
+
+
 class Jump(NamedTuple):
     """Where an instability ends: whether it is arrested, and counts; the state; if it is known.
 
@@ -185,35 +207,29 @@ class Jump(NamedTuple):
     counts: bool = True
 
 
-def present_pieces(sample: Sample, slip: Array, at_corner: float = AT_CORNER) -> Present:
-    """Return the pieces after a slip; from the share `at_corner` on a node is beyond a corner."""
+def present_pieces(sample: Sample, slip: Array) -> Present:
+    """Return the pieces on which the nodes are after a slip."""
     pieces = sample.pieces
-    corners = at_corner * (pieces.ends * sample.critical[:, None])
+    corners = pieces.at_corner * (pieces.ends * sample.critical[:, None])
     piece = np.count_nonzero(slip[:, None] >= corners, axis=1)
     share = pieces.starts[piece]
     strength = share * sample.excess + (1.0 - share) * sample.residual
     return Present(piece, strength, pieces.slopes[piece] * sample.rate)
 
 
-def residual_nodes(
-    sample: Sample, slip: Array, at_corner: float = AT_CORNER
-) -> NDArray[np.bool_]:
+def residual_nodes(sample: Sample, slip: Array) -> NDArray[np.bool_]:
     """Return which weakening nodes have reached their residual strength."""
-    reached: NDArray[np.bool_] = (slip >= at_corner * sample.critical) & (sample.critical > 0.0)
-    return reached
+    reached: NDArray[np.bool_] = slip >= sample.pieces.at_corner * sample.critical
+    return reached & (sample.critical > 0.0)
 
 
-def exceeds(
-    sample: Sample,
-    slip: Array,
-    piece: NDArray[np.int64] | None = None,
-    at_corner: float = AT_CORNER,
-) -> bool:
-    """Whether a slip goes beyond the piece of each node (by default the first) that it rests on."""
+def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | int = 0) -> bool:
+    """Whether a slip goes beyond the piece of each node that it rests on."""
     ends = np.append(sample.pieces.ends, np.inf)
     with np.errstate(invalid="ignore"):
-        end = ends[0 if piece is None else piece] * sample.critical
-    return bool(np.any((slip > (2.0 - at_corner) * end) & (sample.critical > 0.0)))
+        end = ends[piece] * sample.critical
+    beyond = slip > (2.0 - sample.pieces.at_corner) * end
+    return bool(np.any(beyond & (sample.critical > 0.0)))
 
 
 def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
@@ -232,7 +248,9 @@ def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """The piece on which a node of this d_c is after a slip."""
     piece = 0
-    while piece < pieces.ends.shape[0] and slip >= AT_CORNER * (pieces.ends[piece] * critical):
+    while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
+        pieces.ends[piece] * critical
+    ):
         piece += 1
     return piece
 

@@ -198,7 +198,7 @@ class Solver:
                 unproved[row] = not path.first.certified or np.isnan(first.table[row, GAP])
             last = path.last
             load[row], lost[row], arrested[row] = last.load, not path.known, len(path.events)
-            reached[row] = residual_nodes(sample, last.slip, self.program.at_corner).any()
+            reached[row] = residual_nodes(sample, last.slip).any()
             sliding[row] = first.table[row, places]
             if last.direction.any():
                 sliding[row] = self._patch(last.direction).centre
@@ -346,7 +346,7 @@ def _sensitivity(program: Program, sample: Sample, state: State, y: Array) -> Ar
 
     NaN where nodes begin to weaken more steeply as it comes, several at once or on a plane.
     """
-    piece = present_pieces(sample, state.slip, program.at_corner).piece
+    piece = present_pieces(sample, state.slip).piece
     if isinstance(program, PlaneProgram):
         if sample.pieces.steepens and not state.certified:
             return np.full(y.size, np.nan)

@@ -7,6 +7,8 @@ that reaches the next corner (a diagonal entry that rises as the strength falls 
 node whose slipping, or weakening more steeply, makes A singular: there the path ends.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from stiction.arrays import Array
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
-    add_members,
+    append,
     multiply_members,
     raise_diagonal,
     singular_direction,
@@ -29,6 +31,8 @@ REACHED = 0
 UNSTABLE = 1
 CROWDED = 2
 
+ONE: Any = np.int64(1)
+"""As `ZERO`: no literal."""
 REFRESH = 16
 """Events after which slip is solved for anew, lest round-off adds up."""
 
@@ -100,7 +104,7 @@ def _change_slope(
     # It weakens more steeply: the factor is made anew from there on.
     for t in range(member, size):
         workspace.order[t - member] = workspace.members[t]
-    return add_members(workspace, member, size - member)
+    return append(workspace, member, size - member)
 
 
 @jit
@@ -131,13 +135,13 @@ def advance(
     count = _begin(sample, slip, piece, strength, workspace)
     if count > MOST_MEMBERS:
         return load, CROWDED
-    size = add_members(workspace, ZERO, count)
+    size = append(workspace, ZERO, count)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
         return load, UNSTABLE
-    substitute_members(workspace, ZERO, size, sample.profile, 0)
-    substitute_members(workspace, ZERO, size, strength, 1)
+    substitute_members(workspace, ZERO, size, sample.profile, workspace.forward[0])
+    substitute_members(workspace, ZERO, size, strength, workspace.forward[1])
     # A node begins to slip, and passes each corner, once.
     for event in range((1 + pieces.ends.shape[0]) * n + 1):
         solve_first(workspace, size, rate)
@@ -172,7 +176,7 @@ def advance(
             if size == MOST_MEMBERS:
                 return load, CROWDED
             order[0] = starts
-            now = add_members(workspace, size, 1)
+            now = append(workspace, size, ONE)
             if now == size:
                 singular_direction(workspace, size, direction)
                 return load, UNSTABLE
@@ -180,6 +184,6 @@ def advance(
             size = now
         else:
             return load, REACHED
-        substitute_members(workspace, changed, size, sample.profile, 0)
-        substitute_members(workspace, changed, size, strength, 1)
+        substitute_members(workspace, changed, size, sample.profile, workspace.forward[0])
+        substitute_members(workspace, changed, size, strength, workspace.forward[1])
     return load, CROWDED

@@ -17,21 +17,20 @@ from stiction.elasticity.linear import inner, lowest_eigenvector
 from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
 from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
 from stiction.equilibrium.relaxation import (
-    AT_RESIDUAL,
     BALANCED,
     UNDECIDED,
     least_equilibrium,
-    present,
 )
 from stiction.equilibrium.sample import (
     First,
     Jump,
+    Program,
     Sample,
     State,
     empty_first,
     exceeds,
     pieces_of,
-    sample_of,
+    present_pieces,
 )
 from stiction.equilibrium.turning_point import close
 from stiction.problem import Problem
@@ -48,6 +47,8 @@ FIRST_STEP = 0.01
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
 DIRECTION_ITERATIONS = 300
+AT_CORNER = 1.0 - 1e-9
+"""Share of the slip at a corner from which on a node counts as beyond it."""
 ACCURACY = 1e-7
 """Of the slip at a given load: largest residual stress as a share of the mean strength."""
 
@@ -164,7 +165,7 @@ def plane_onset(
     )  # fmt: skip
 
 
-class PlaneProgram:
+class PlaneProgram(Program):
     """Equilibria of a plane; safe to use from several threads.
 
     Parameters
@@ -176,32 +177,21 @@ class PlaneProgram:
         Which nodes of the problem are taken along x and y: all, or every second one.
     """
 
-    at_corner = AT_RESIDUAL
-
     def __init__(self, problem: Problem, gap: float = 1e-6, every: int = 1) -> None:
         x, y = problem.interface.lengths
         solid = problem.solid
         self.plane = Plane((x, y), solid.shear_modulus, solid.poisson_ratio)
         nx, ny = problem.interface.shape
         self.shape = (nx // every, ny // every)
-        self.pieces = pieces_of(problem.friction)
+        self.pieces = pieces_of(problem.friction)._replace(at_corner=AT_CORNER)
         self.requested = gap
         self.widest_gap = 1.01 * gap  # round-off
-
-    def sample_of(self, rows: Samples, row: int) -> Sample:
-        """Return one sample of a batch."""
-        return sample_of(rows, row, self.pieces)
 
     def first(self, rows: Samples, slips: bool) -> tuple[First, dict[int, State | None]]:
         """Return an empty table, and the rows that are to be followed from rest: all of them."""
         return empty_first(rows.samples, 9, rows.strength[0].size), dict.fromkeys(
             range(rows.samples)
         )
-
-    def at_rest(self, sample: Sample) -> State:
-        """Return the state in which the first node is about to slip."""
-        load = float((sample.excess / sample.profile).min())
-        return State(load, *np.zeros((3, sample.excess.size)))
 
     def _operator(self, sample: Sample) -> Operator:
         return make_operator(
@@ -210,7 +200,7 @@ class PlaneProgram:
 
     def programme(self, sample: Sample, slip: Array) -> PlaneOnset | None:
         """Return the next instability if no further node reaches a corner before it."""
-        now = present(sample, slip)
+        now = present_pieces(sample, slip)
         found = plane_onset(
             self.plane,
             now.strength.reshape(self.shape),
@@ -219,7 +209,7 @@ class PlaneProgram:
             self.requested,
             slip.reshape(self.shape) if slip.any() else None,
         )
-        if exceeds(sample, found.slip.reshape(-1), now.piece, AT_RESIDUAL):
+        if exceeds(sample, found.slip.reshape(-1), now.piece):
             return None
         return found
 
@@ -231,7 +221,7 @@ class PlaneProgram:
         slip = np.maximum(found.slip.reshape(-1), state.slip)
         return State(
             found.lower, slip, state.stiff, found.multiplier.reshape(-1), upper=found.upper,
-            certified=not present(sample, state.slip).piece[sample.critical > 0.0].any(),
+            certified=not present_pieces(sample, state.slip).piece[sample.critical > 0.0].any(),
         )  # fmt: skip
 
     def _step_on(self, sample: Sample, state: State) -> State:
@@ -300,7 +290,7 @@ def _direction(operator: Operator, sample: Sample, slip: Array, after: Array) ->
     inside = slip > 0.0
     vector = np.where(inside, growth, 0.0)
     if vector.any():
-        frozen = operator._replace(rate=present(sample, slip).rate)
+        frozen = operator._replace(rate=present_pieces(sample, slip).rate)
         tolerance = 1e-6 * float(sample.rate.max())
         lowest_eigenvector(frozen, inside, vector, tolerance, DIRECTION_ITERATIONS)
         growth = np.maximum(vector, 0.0)
