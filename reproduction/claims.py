@@ -1,5 +1,6 @@
 """A claim is a row: what the paper says, where, what is computed for it, and the rule."""
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,12 +34,8 @@ class Series:
             shown = rounded(number) + (f" {self.unit}" if self.unit else "")
             where = f"{key:g}: " if isinstance(key, float) else f"{key}: " if key else ""
             parts.append(where + shown)
-        head = f"{self.label} at xi_0/h_n = " if self._over_ratios else f"{self.label}: "
-        return head + ", ".join(parts)
-
-    @property
-    def _over_ratios(self) -> bool:
-        return bool(self.rows) and isinstance(self.rows[0][0], float)
+        over_ratios = self.rows and isinstance(self.rows[0][0], float)
+        return self.label + (" at xi_0/h_n = " if over_ratios else ": ") + ", ".join(parts)
 
 
 class Data:
@@ -95,6 +92,9 @@ class Claim:
     measure: Callable[[Data], Measured]
     note: str = ""
     kind: str = "finding"
+
+
+Check = functools.partial(Claim, kind="arithmetic")
 
 
 @dataclass(frozen=True)

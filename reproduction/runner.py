@@ -87,13 +87,6 @@ class Runner:
         """Return the seed of a correlation length: each has draws of its own, as in the paper."""
         return self.seed * 1000 + round(100 * ratio)
 
-    def what_if(self, name: str, samples: int | None) -> xr.Dataset:
-        """Run a study file of `what_if/`, with at most so many samples."""
-        study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
-        count = min(samples or self.size.what_if, study.ensemble.samples)
-        ensemble = st.Ensemble(samples=count, seed=self.seed)
-        return self.study(name, dataclasses.replace(study, ensemble=ensemble))
-
     def map(self, function, items) -> list:
         """Return [function(*item) for item in items], computed by all threads."""
         with ThreadPoolExecutor(self.workers) as pool:

@@ -7,7 +7,7 @@ from scipy.special import ndtr
 from scipy.stats import ks_2samp, kstest
 
 from reproduction import setting
-from reproduction.claims import Claim, Data, Series, one, over_ratios
+from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import (
     Number,
     deviation,
@@ -117,44 +117,39 @@ _HUMP = (
 )
 
 PARAMETERS = [
-    Claim("mean-strength", "The mean peak strength is 1 MPa.", "Sec. 3.1, par. 2, sentence 7",
-        printed("1"), lambda d: ([one("<tau_p>", MEAN * MPA, "MPa")], []), kind="arithmetic"),
-    Claim("strength-deviation", "The standard deviation of the peak strength is 0.2 MPa.",
+    Check("mean-strength", "The mean peak strength is 1 MPa.", "Sec. 3.1, par. 2, sentence 7",
+        printed("1"), lambda d: ([one("<tau_p>", MEAN * MPA, "MPa")], [])),
+    Check("strength-deviation", "The standard deviation of the peak strength is 0.2 MPa.",
         "Sec. 3.1, par. 2, sentence 7", printed("0.2"),
-        lambda d: ([one("standard deviation", DEVIATION * MPA, "MPa")], []), kind="arithmetic"),
-    Claim("lower-bound", "The lower bound of the strength is 0.66 of its mean.",
+        lambda d: ([one("standard deviation", DEVIATION * MPA, "MPa")], [])),
+    Check("lower-bound", "The lower bound of the strength is 0.66 of its mean.",
         "Sec. 4.2, par. 3, sentence 7", printed("0.66"),
-        lambda d: ([one("tau_p,min/<tau_p>", LOW / MEAN)], []), kind="arithmetic"),
-    Claim("nucleation-factor", "The critical nucleation length is 1.158 G*/W.",
+        lambda d: ([one("tau_p,min/<tau_p>", LOW / MEAN)], [])),
+    Check("nucleation-factor", "The critical nucleation length is 1.158 G*/W.",
         "Sec. 3.2, par. 2, sentence 1 (Eq. 8)", printed("1.158"),
-        lambda d: ([one("h_n W/G*", setting.H * setting.W / setting.G_STAR)], []),
-        kind="arithmetic"),
-    Claim("unit-weight", "The factor 0.751 makes the integral of the printed eigenfunction one.",
+        lambda d: ([one("h_n W/G*", setting.H * setting.W / setting.G_STAR)], [])),
+    Check("unit-weight", "The factor 0.751 makes the integral of the printed eigenfunction one.",
         "App. B, par. 1, sentence 2 (Eq. B.1)", printed("0.751"),
-        lambda d: ([one("factor", 1.0 / (math.pi / 2.0 * (0.925 - 0.308 / 4.0)))], []),
-        kind="arithmetic"),
-    Claim("long-interface", "The interface is considerably longer than the nucleation length.",
+        lambda d: ([one("factor", 1.0 / (math.pi / 2.0 * (0.925 - 0.308 / 4.0)))], [])),
+    Check("long-interface", "The interface is considerably longer than the nucleation length.",
         "Sec. 3.1, par. 3, sentence 1; Sec. 3.3, par. 1, sentence 3", above(10.0),
-        lambda d: ([one("L/h_n", setting.L / setting.H)], []), kind="arithmetic"),
-    Claim("rounded-weights", "The rounded eigenfunction suffices for the critical stress.",
+        lambda d: ([one("L/h_n", setting.L / setting.H)], [])),
+    Check("rounded-weights", "The rounded eigenfunction suffices for the critical stress.",
         "Sec. 3.2, par. 3, sentence 2 (Eq. 9)", below(0.1, "%: a tenth of what a plot can show"),
         lambda d: ([over_ratios("change of tau_cr, root mean square", "%", lambda r:
-                    root_mean_square(d.at("modes", "rounded", r)) * PER_CENT)], []),
-        kind="arithmetic"),
-    Claim("power-kept", "Truncation at 2.5 times the cutoff keeps 0.9997 of the power.",
+                    root_mean_square(d.at("modes", "rounded", r)) * PER_CENT)], [])),
+    Check("power-kept", "Truncation at 2.5 times the cutoff keeps 0.9997 of the power.",
         "Sec. 2.3, par. 1, sentence 6 (Eq. 7)", printed("0.9997"),
-        lambda d: ([one("power kept", SPECTRUM.power_within(SPECTRUM.cutoff()))], []),
-        kind="arithmetic"),
+        lambda d: ([one("power kept", SPECTRUM.power_within(SPECTRUM.cutoff()))], [])),
     Claim("higher-modes", "Modes beyond the truncation would have negligible amplitudes.",
         "Sec. 2.3, par. 1, sentence 7", below(0.1, "%: a tenth of what a plot can show"),
         lambda d: ([over_ratios("change of tau_cr by them, root mean square", "%", lambda r:
                     root_mean_square(d.at("modes", "untruncated", r)) * PER_CENT)], [])),
-    Claim("enough-modes",
+    Check("enough-modes",
         "So many modes of the strength can be taken that the error is negligible.",
         "Sec. 4.1, par. 1, sentence 2 (Eq. 10)", below(0.1, "%"),
         lambda d: ([over_ratios("change of tau_cr with twice the modes of z", "%", lambda r:
-                    root_mean_square(d.at("modes", "cut", r)) * PER_CENT)], []),
-        kind="arithmetic"),
+                    root_mean_square(d.at("modes", "cut", r)) * PER_CENT)], [])),
     Claim("correlation-kept", "The mapping hardly changes the correlation of the field.",
         "Sec. 2.2, par. 2, sentence 6", below(0.05, "what one interface cannot show"),
         lambda d: ([over_ratios("largest difference of the two correlations", "", lambda r: Number(
@@ -171,10 +166,10 @@ PARAMETERS = [
         within(0.5, 2.0, "two definitions of one length"),
         lambda d: ([one("length where C = 1/e, over xi_0",
                         setting.strength(1.0).efolding_length(of="z") / setting.H)], [])),
-    Claim("fracture-energy-varies", "The fracture energy varies with (tau_p - tau_r)²: stronger"
+    Check("fracture-energy-varies", "The fracture energy varies with (tau_p - tau_r)²: stronger"
         " places dissipate more.", "Sec. 5.1, par. 4, sentences 4 and 5 (Eq. 14)", above(0.0),
         lambda d: ([one("coefficient of variation of the fracture energy", energy_variation())],
-                   [one("mean fracture energy", mean_energy(), "J/m²")]), kind="arithmetic"),
+                   [one("mean fracture energy", mean_energy(), "J/m²")])),
     Claim("enough-samples", "10,000 samples describe the distribution of the critical stress"
         " accurately.", "Sec. 4.1, par. 1, sentence 5",
         each(below(0.1, "%"), below(2.0, "%: narrower than a line in a plot")),
@@ -203,15 +198,13 @@ def _relative(function, d: Data, ratio: float) -> Number:
 
 
 NUCLEATION = [
-    Claim("nucleation-mean", "The mean of tau_n is that of tau_p, whatever the correlation length.",
+    Check("nucleation-mean", "The mean of tau_n is that of tau_p, whatever the correlation length.",
         "Sec. 4.2, par. 2, sentence 1 (Eq. B.2)", within(0.99, 1.01),
-        lambda d: ([over_ratios("<tau_n>/<tau_p>", "", lambda r: tau_n_moments(d, r)[0])], []),
-        kind="arithmetic"),
-    Claim("nucleation-variance", "The variance of tau_n is a double integral of correlation and"
+        lambda d: ([over_ratios("<tau_n>/<tau_p>", "", lambda r: tau_n_moments(d, r)[0])], [])),
+    Check("nucleation-variance", "The variance of tau_n is a double integral of correlation and"
         " eigenfunction.", "Sec. 4.2, par. 2, sentence 2 (Eq. B.3)", within(0.97, 1.03),
         lambda d: ([over_ratios("sampled over integrated variance", "", lambda r:
-                    _variance(d, r) * (1.0 / float(d.at("theory", "variance_ratio", r))))], []),
-        kind="arithmetic"),
+                    _variance(d, r) * (1.0 / float(d.at("theory", "variance_ratio", r))))], [])),
     Claim("linear-variance", "For short correlation the variance of tau_n is proportional to"
         " xi_0/h_n.", "Sec. 4.2, par. 2, sentence 4; App. B (Eq. B.5, Fig. 7d)",
         within(0.95, 1.05), lambda d: ([one("logarithmic slope at xi_0 = h_n/50", _slope(d))],
@@ -336,16 +329,16 @@ ONSET = [
                                 skewness(d.stress(r)) - tau_n_moments(d, r)[2])]),
         note="our reading: the minimum lies far below the mean. Read as the third moment it holds"
         " at the longer correlation lengths only"),
-    Claim("uniform-position", "The onset may come anywhere: its position is uniformly distributed.",
+    Check("uniform-position", "The onset may come anywhere: its position is uniformly distributed.",
         "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", by_chance(),
         lambda d: ([over_ratios("Kolmogorov-Smirnov p-value", "", lambda r:
                     Number(round(float(kstest(_positions(d, r), "uniform").pvalue), 3)))], []),
-        note="true by construction: the field is stationary and periodic", kind="arithmetic"),
-    Claim("position-independent", "Its distribution does not depend on the correlation length.",
+        note="true by construction: the field is stationary and periodic"),
+    Check("position-independent", "Its distribution does not depend on the correlation length.",
         "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", by_chance(),
         lambda d: ([over_ratios("p-value against 0.25", "", lambda r: Number(round(float(
             ks_2samp(_positions(d, 0.25), _positions(d, r)).pvalue), 3)), RATIOS[1:])], []),
-        note="true by construction; independent samples", kind="arithmetic"),
+        note="true by construction; independent samples"),
     Claim("weakest-does-not-govern", "Sliding need not set in where the interface is weakest.",
         "Sec. 3.1, par. 5, sentence 1; Sec. 6, par. 1, sentence 3",
         above(0.01, "one interface in a hundred", partly=True),
@@ -353,11 +346,11 @@ ONSET = [
                     lambda r: share(setting.distance(
                         d.at("local", "critical_position", r),
                         d.at("moments", "weakest_position", r)) > 0.5 * setting.H))], [])),
-    Claim("above-first-slip", "The critical stress is not reached when the first point slips.",
+    Check("above-first-slip", "The critical stress is not reached when the first point slips.",
         "Sec. 3.1, par. 5, sentence 1", above(0.0),
         lambda d: ([over_ratios("mean of (tau_cr - min tau_p)/<tau_p>", "", lambda r: mean(
             (d.stress(r) - d.at("moments", "weakest_strength", r)) / MEAN))], []),
-        note="true by construction: an average is above the minimum", kind="arithmetic"),
+        note="true by construction: an average is above the minimum"),
 ]  # fmt: skip
 
 
@@ -446,12 +439,12 @@ PREDICTION = [
         lambda d: ([over_ratios("share of onsets more than h_n/2 off", "", lambda r:
                     share(d.misplaced(r)))], []),
         note="the printed 8 of 60, 6 of them at the shortest, are judged under 'Which modulus'"),
-    Claim("applied-load",
+    Check("applied-load",
         "The critical stress of a simulation is its loading rate times the time of"
         " onset.", "Sec. 3.3, par. 3, sentence 4", below(0.1, "%"),
         lambda d: ([over_ratios("applied load above the peak of the mean stress", "%", lambda r:
                     mean(d.at("ruptures", "applied_load", r) / d.stress(r, "ruptures") - 1.0)
-                    * PER_CENT, SIMULATED)], []), kind="arithmetic"),
+                    * PER_CENT, SIMULATED)], [])),
     Claim("converged", "The simulations have converged in grid, loading rate and time step.",
         "Sec. 3.1, par. 3, sentence 3", below(0.5, "%"),
         lambda d: ([Series("largest change of tau_cr", "%", convergence(d))], []),

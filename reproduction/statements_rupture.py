@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from reproduction import setting
-from reproduction.claims import Claim, Data, Series, one, over_ratios
+from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import (
     Number,
     deviation,
@@ -110,15 +110,15 @@ PATCHES = [
                         _help(d, "helped_wrong") - _help(d, "helped_right"), "%")],
                    [one("help where misplaced", _help(d, "helped_wrong"), "%"),
                     one("help where right", _help(d, "helped_right"), "%")])),
-    Claim("load-like-strength", "A non-uniform load on uniform strength, and a uniform load on"
+    Check("load-like-strength", "A non-uniform load on uniform strength, and a uniform load on"
         " non-uniform strength, are one problem.", "Sec. 3.2, par. 1, sentences 4 and 5",
         below(1e-6, "round-off of the solver"),
         lambda d: ([one("largest relative difference of tau_cr",
-                        float(d["mechanism"]["exchange"]))], []), kind="arithmetic"),
-    Claim("one-accelerates", "Most patches grow slowly until the onset; one becomes unstable.",
+                        float(d["mechanism"]["exchange"]))], [])),
+    Check("one-accelerates", "Most patches grow slowly until the onset; one becomes unstable.",
         "Sec. 5.2, par. 1, sentence 3", above(1.0),
         lambda d: ([one("patches at the onset, xi_0/h_n = 0.25",
-                        mean(d.at("exact", "slip_patches", RATIOS[0])))], []), kind="arithmetic",
+                        mean(d.at("exact", "slip_patches", RATIOS[0])))], []),
         note="one by definition: the onset is the first moment at which one accelerates"),
 ]  # fmt: skip
 
@@ -166,17 +166,16 @@ ARREST = [
         "Sec. 5.2, par. 5, sentences 9 and 10", within(2.5, 3.5, "about 3, as printed"),
         lambda d: ([over_ratios("length at which it does, over h_n", "", lambda r:
                     mean(runaway_length(d.stress(r))))], [])),
-    Claim("release-rate-grows", "The static energy release rate grows in proportion to the length.",
+    Check("release-rate-grows", "The static energy release rate grows in proportion to the length.",
         "Sec. 5.2, par. 5, sentence 8", within(0.95, 1.05),
         lambda d: ([one("logarithmic slope from h_n to 3 h_n, periodic row of cracks",
                         math.log(math.tan(1.5 * math.pi * H / L) / math.tan(0.5 * math.pi * H / L))
-                        / math.log(3.0))], []), kind="arithmetic"),
-    Claim("longest-arrest", "Shorter than about 3 h_n a rupture may be arrested.",
+                        / math.log(3.0))], [])),
+    Check("longest-arrest", "Shorter than about 3 h_n a rupture may be arrested.",
         "Sec. 5.2, par. 5, sentences 10 and 11", within(0.0, 3.5),
         lambda d: ([one("longest arrested patch over h_n",
                         float(d["arrest"]["length"].max()) / H)] if d["arrest"].sizes["event"]
-                   else [], [one("arrested samples looked at", d["arrest"].sizes["event"])]),
-        kind="arithmetic"),
+                   else [], [one("arrested samples looked at", d["arrest"].sizes["event"])])),
     Claim("both-sides", "Arrest needs a large rise of the strength on both sides at once.",
         "Sec. 5.2, par. 5, sentence 12", above(0.5, "more than at a random place"),
         lambda d: ([one("rank of the strength beside arrested patches, the weaker side, among"
@@ -227,11 +226,11 @@ ARREST = [
         lambda d: ([one("median length over Griffith's, edge load", _griffith(d, "length")),
                     one("with inertia, first event", _griffith(d, "dynamic_length"))], []),
         note="in the median; single events scatter from near zero to 1.3 times"),
-    Claim("larger-earthquakes", "A higher stress at the onset means a larger stress drop.",
+    Check("larger-earthquakes", "A higher stress at the onset means a larger stress drop.",
         "Sec. 5.4, par. 3, sentence 2", falling(),
         lambda d: ([over_ratios("stress drop of the ruptures, mean", "MPa", lambda r:
                     mean(d.at("ruptures", "stress_drop", r)) * MPA, SIMULATED)], []),
-        kind="arithmetic", note="with tau_r = 0 the drop is tau_cr; an interface that slides as a"
+        note="with tau_r = 0 the drop is tau_cr; an interface that slides as a"
         " whole has no magnitude"),
 ]  # fmt: skip
 
@@ -346,21 +345,21 @@ SIZE = [
         "Sec. 5.1, par. 6, sentence 4", corrected(above(0.0)),
         lambda d: ([one("share of onsets within h_n/2 of an end, above chance", _near_end(d))], []),
         note="shown in mode III"),
-    Claim("length-against-pressure", "The nucleation length is inversely proportional to"
+    Check("length-against-pressure", "The nucleation length is inversely proportional to"
         " tau_p - tau_r as pressure changes.", "Sec. 5.3, par. 4, sentence 4",
         within(-1.05, -0.95),
         lambda d: ([one("logarithmic slope of the critical patch", _pressure_slope(d))], []),
-        kind="arithmetic", note="d_c fixed"),
+        note="d_c fixed"),
     Claim("pressure-like-length", "More normal load acts like a longer interface: less variation.",
         "Sec. 5.3, par. 4, sentences 3 and 4", falling(),
         lambda d: ([Series("standard deviation over mean of the friction coefficient,"
                            " xi_0/h_n fixed", "", _pressure(d, _variation, (3, 1, 4)))],
                    [Series("with xi_0 fixed", "", _pressure(d, _variation, (0, 1, 2)))]),
         note="xi_0/h_n held fixed, so that h_n/L alone changes"),
-    Claim("failure-probability", "The framework gives the failure probability of an interface of"
+    Check("failure-probability", "The framework gives the failure probability of an interface of"
         " known strength.", "Sec. 5.3, par. 1, sentence 2", within(0.4, 1.6, "to a half"),
         lambda d: ([_counted(d)], [one("stress with P = 1e-6",
-                   float(d["failure"]["stress"].values.min()) * MPA, "MPa")]), kind="arithmetic"),
+                   float(d["failure"]["stress"].values.min()) * MPA, "MPa")])),
 ]  # fmt: skip
 
 

@@ -97,25 +97,24 @@ def theory(run: Runner) -> xr.Dataset:
     interface = PROBLEM.interface
     ratios = np.geomspace(0.02, 20.0, 41)
     usable = ratios[ratios > 0.1]
-    own = [st.theory.nucleation_statistics(PROBLEM, strength(r)).variance_ratio for r in usable]
-    fields = [strength(ratio) for ratio in RATIOS]
-    return xr.Dataset(
-        {
-            "correlation": (("correlation_ratio", "x"), [f.correlation(interface) for f in fields]),
-            "gaussian_correlation": (
-                ("correlation_ratio", "x"),
-                [f.correlation(interface, of="z") for f in fields],
-            ),
-            "variance_ratio": (
-                "correlation_ratio",
-                [st.theory.nucleation_statistics(PROBLEM, f).variance_ratio for f in fields],
-            ),
-            "periodic": ("usable", own),
-            "infinite": ("ratio", [infinite_variance_ratio(ratio) for ratio in ratios]),
-        },
-        coords={"ratio": ratios, "usable": usable, "correlation_ratio": list(RATIOS),
-                "x": interface.x},
+    parts = [
+        xr.Dataset({
+            "correlation": ("x", field.correlation(interface)),
+            "gaussian_correlation": ("x", field.correlation(interface, of="z")),
+            "variance_ratio": variance_ratio(PROBLEM, field),
+        })
+        for field in map(strength, RATIOS)
+    ]  # fmt: skip
+    return along("correlation_ratio", RATIOS, parts).assign(
+        periodic=("usable", [variance_ratio(PROBLEM, strength(ratio)) for ratio in usable]),
+        infinite=("ratio", [infinite_variance_ratio(ratio) for ratio in ratios]),
+        ratio=ratios, usable=usable, x=interface.x,
     )  # fmt: skip
+
+
+def variance_ratio(problem, field) -> float:
+    """Return Var[tau_n]/Var[tau_p]."""
+    return float(st.theory.nucleation_statistics(problem, field).variance_ratio)
 
 
 def infinite_variance_ratio(ratio: float) -> float:
@@ -123,8 +122,7 @@ def infinite_variance_ratio(ratio: float) -> float:
     length = 60.0 * H * max(ratio, 1.0)
     nodes = 2 ** math.ceil(math.log2(length / H * max(16.0, 8.0 / ratio)))
     problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=length, nodes=nodes))
-    field = strength(ratio, mean_mode=True)
-    return float(st.theory.nucleation_statistics(problem, field).variance_ratio)
+    return variance_ratio(problem, strength(ratio, mean_mode=True))
 
 
 def readings(run: Runner) -> xr.Dataset:
@@ -197,10 +195,8 @@ def representative(run: Runner) -> xr.Dataset:
     return xr.Dataset(
         {
             "slip_rate": (("time", "x"), found["slip_rate"].values.astype(np.float32)),
-            "load": ("time", found["load"].values),
             "mean_stress": ("time", found["mean_stress"].values),
             "critical_position": float(found["critical_position"]),
-            "critical_stress": float(found["critical_stress"]),
             "weakened": weakened,
             "patch_length": patch_length,
             "strength": ("x", tau_p),
@@ -252,10 +248,9 @@ def trend(run: Runner) -> xr.Dataset:
     """
     parts = []
     for mode in (False, True):
-        random = strength(1.0, mean_mode=mode)
         study = st.Study(
             problem=PROBLEM,
-            random=random,
+            random=strength(1.0, mean_mode=mode),
             method=LOCAL,
             ensemble=st.Ensemble(samples=run.size.trend, seed=run.seed),
             sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
@@ -396,9 +391,7 @@ def mechanism(run: Runner, samples: int) -> xr.Dataset:
     tau_n = np.ravel(st.theory.nucleation_stress(PROBLEM, pair))
     result["pair_strength"], result["pair_tau_n"] = ("x", pair), ("x", tau_n)
     result["pair_local"] = PROBLEM.interface.x[tau_n.argmin()]
-    found = onset(pair)
-    result["pair_exact"] = float(found["critical_position"][0])
-    result["pair_stress"] = float(found["first_instability"][0])
+    result["pair_exact"] = float(onset(pair)["critical_position"][0])
     # Load and strength exchanged: tau_p(x), and max tau_p with an initial stress in its place.
     field, gaps = strength(RATIOS[1]), []
     for tau_p in field.sample(PROBLEM.interface, samples=16, seed=run.seed):
@@ -593,8 +586,10 @@ ARRESTS = {
 
 def what_if(run: Runner, name: str) -> xr.Dataset:
     """A study file of `what_if/`, its swept points stacked along 'point'."""
-    samples = run.size.trend if name in LOCAL_ONLY else None
-    return stacked(run.what_if(name, samples))
+    study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
+    most = run.size.trend if name in LOCAL_ONLY else run.size.what_if
+    ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
+    return stacked(run.study(name, dataclasses.replace(study, ensemble=ensemble)))
 
 
 def stacked(found: xr.Dataset) -> xr.Dataset:
@@ -611,11 +606,7 @@ def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
         {key: [values[i] for i in chosen] for key, values in axis.items()}
         for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
     ]
-    plain["method"] = {
-        "type": "rupture",
-        "loading_rate": setting.LOADING_RATE,
-        "stop": "runaway",
-    }
+    plain["method"] = RUNAWAY
     plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
     return stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
 
