@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from line_and_plane_figures import draw
+from line_and_plane_figures import NAMES, draw
 from scipy.stats import rankdata
 
 import stiction as st
 from stiction.equilibrium.solver import first_instabilities, make_program
-from stiction.statistics.estimates import Estimate, mean, standard_deviation
+from stiction.statistics.estimates import Estimate, mean
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
@@ -33,17 +33,14 @@ REACH = 1.25
 """Radius of the neighbourhood of a critical patch, in h_n: most of them fit into it."""
 OUT_OF_REACH = 5e6
 """Strength, Pa, that nothing reaches."""
-HEADS = {
-    "line, small": "line, 16 h_n",
-    "line, large": "line, 64 h_n",
-    "plane, small": "plane, 4 h_n",
-    "plane, large": "plane, 8 h_n",
-    "link": "weakest of four",
-    "local": "local criterion",
-    "local link": "weakest of four, local",
-    "lowering": "lowering, points",
+TITLES = {
+    "lowering": "Onset lowered, % of the local criterion",
+    "far": "Of this by slip far from the critical patch",
+    "single": "Samples with a single slipping patch, %",
+    "slipping": "Slipping nodes, %",
+    "rank": "Rank correlation of local criterion and onset",
+    "arrested": "Samples with an arrested event, %",
 }
-"""What cases and estimates are called in tables."""
 QUARTERS = 4
 """How often a small interface fits into the large one of the same kind."""
 
@@ -67,12 +64,8 @@ class Case:
     def problem(self) -> st.Problem:
         """The only difference between a line and a plane: two numbers for one."""
         length, nodes = self.size * NUCLEATION_LENGTH, self.size * self.nodes
-        interface = (
-            st.Interface(length=(length, length), nodes=(nodes, nodes))
-            if self.plane
-            else st.Interface(length=length, nodes=nodes)
-        )
-        return st.Problem(SOLID, interface, FRICTION)
+        sides = ((length, length), (nodes, nodes)) if self.plane else (length, nodes)
+        return st.Problem(SOLID, st.Interface(*sides), FRICTION)
 
 
 CASES = (
@@ -121,13 +114,10 @@ def compute(folder: Path, most: int = 10**6, progress: bool = True) -> dict[str,
     folder.mkdir(parents=True, exist_ok=True)
     found = {}
     for case in CASES:
-        pair = studies(case, most)
-        results = {
-            which: study.run(
-                out=folder / f"{case.name.replace(', ', '-')}-{which}", progress=progress
-            )
-            for which, study in pair.items()
-        }
+        results = {}
+        for which, study in studies(case, most).items():
+            place = folder / f"{case.name.replace(', ', '-')}-{which}"
+            results[which] = study.run(out=place, progress=progress)
         slip = results["kept"].slip.rename(sample="kept_sample")
         data = results["exact"].assign(local=results["local"].first_instability, slip=slip)
         data = data.assign_coords(ratio=("correlation_length", list(RATIOS)))
@@ -146,36 +136,32 @@ def slipping(data: xr.Dataset) -> xr.DataArray:
     return 100.0 * (data.slip > 0.0).mean(along)
 
 
-def neighbourhood_onset(case: Case, ratio: float, data: xr.Dataset) -> np.ndarray:
-    """First instability, Pa, if only nodes near the critical patch can slip.
+def far_lowering(case: Case, data: xr.Dataset) -> list[Estimate]:
+    """Lowering by slip far from the critical patch, per cent of the local criterion.
 
-    Of the first `NEIGHBOURS` samples; near is within `REACH` h_n of the centre. What slips
-    farther away is missing, while the patch keeps its own shape, which on a plane is no ellipse.
+    Of the first `NEIGHBOURS` samples, each with its onset if only nodes within `REACH` h_n of the
+    centre of its critical patch can slip. The patch keeps its own shape, on a plane no ellipse.
     """
     problem = case.problem
-    count = min(NEIGHBOURS, data.sizes["sample"])
-    tau_p = strength(ratio).sample(problem.interface, samples=count, seed=case.seed)
-    centres = data.critical_position.sel(ratio=ratio).values.reshape(-1, 2 if case.plane else 1)
-    n, length = case.size * case.nodes, case.size * NUCLEATION_LENGTH
-    x = np.arange(n) * length / n
-    for row, centre in zip(tau_p, centres, strict=False):
-        away = [(x - c + 0.5 * length) % length - 0.5 * length for c in centre]
-        square = away[0] ** 2 if not case.plane else np.add.outer(away[0] ** 2, away[1] ** 2)
-        row[square > (REACH * NUCLEATION_LENGTH) ** 2] = OUT_OF_REACH
-    sample = problem.sample({"strength": tau_p})
-    return sample.mean_stress(first_instabilities(make_program(problem), sample))
-
-
-def split(case: Case, data: xr.Dataset) -> dict[str, list[Estimate]]:
-    """Lowering by what is near and by what is far, per cent of the local criterion."""
-    rows: dict[str, list[Estimate]] = {"near": [], "far": []}
+    places, length = problem.interface.coordinates.values(), case.size * NUCLEATION_LENGTH
+    program = make_program(problem)
+    found = []
     for ratio in RATIOS:
-        at = data.sel(ratio=ratio)
-        near = neighbourhood_onset(case, ratio, data)
-        local, exact = (v.values[: near.size] for v in (at.local, at.first_instability))
-        rows["near"].append(mean(100.0 * (1.0 - near / local)))
-        rows["far"].append(mean(100.0 * (near - exact) / local))
-    return rows
+        at = data.sel(ratio=ratio).isel(sample=slice(NEIGHBOURS))
+        count = at.sizes["sample"]
+        tau_p = strength(ratio).sample(problem.interface, samples=count, seed=case.seed)
+        centres = at.critical_position.values.reshape(count, -1)
+        for row, centre in zip(tau_p, centres, strict=True):
+            away = [
+                (x - c + 0.5 * length) % length - 0.5 * length
+                for x, c in zip(places, centre, strict=True)
+            ]
+            square = sum(each**2 for each in np.meshgrid(*away, indexing="ij"))
+            row[square > (REACH * NUCLEATION_LENGTH) ** 2] = OUT_OF_REACH
+        sample = problem.sample({"strength": tau_p})
+        near = sample.mean_stress(first_instabilities(program, sample))
+        found.append(mean(100.0 * ((near - at.first_instability) / at.local).values))
+    return found
 
 
 def weakest_link(values: np.ndarray, copies: int = QUARTERS) -> float:
@@ -196,9 +182,8 @@ def rank_correlation(pairs: np.ndarray) -> float:
 def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> Estimate:
     """A statistic of independent rows, with the standard error from resampling them."""
     random = np.random.default_rng(0)
-    again = [
-        statistic(rows[random.integers(len(rows), size=len(rows))]) for _ in range(resampled)
-    ]
+    choices = (random.integers(len(rows), size=len(rows)) for _ in range(resampled))
+    again = [statistic(rows[chosen]) for chosen in choices]
     return Estimate(statistic(rows), float(np.std(again, ddof=1)))
 
 
@@ -206,11 +191,6 @@ def share(events: np.ndarray) -> Estimate:
     """Per cent."""
     p = float(events.mean())
     return Estimate(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / events.size))
-
-
-def share_text(found: Estimate, samples: int) -> str:
-    """Where none was seen, what 95 % confidence excludes."""
-    return text(found) if found.value > 0.0 else f"< {300.0 / samples:.2g}"
 
 
 def text(estimate: Estimate) -> str:
@@ -221,44 +201,31 @@ def text(estimate: Estimate) -> str:
     return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
 
 
-def summarise(data: xr.Dataset) -> dict[str, list]:
+def summarise(data: xr.Dataset) -> dict[str, list[Estimate]]:
     """Estimates at each correlation length of one case."""
-    rows: dict[str, list] = defaultdict(list)
-    for i in range(data.sizes["ratio"]):
-        at = data.isel(ratio=i)
-        lower = lowering(at).values
-        stopped = at.arrested_events.values > 0
-        rise = 100.0 * (at.critical_stress / at.first_instability - 1.0).values[stopped]
-        onset = at.first_instability.values * 1e-6
-        rows["onset"].append(mean(onset))
-        rows["scatter"].append(standard_deviation(onset).scaled(100.0 / onset.mean()))
-        rows["lowering"].append(mean(lower))
-        rows["spread"].append(np.quantile(lower, [0.05, 0.95]))
-        rows["patches"].append(mean(at.slip_patches.values.astype(float)))
+    rows: dict[str, list[Estimate]] = defaultdict(list)
+    for ratio in RATIOS:
+        at = data.sel(ratio=ratio)
+        rows["lowering"].append(mean(lowering(at).values))
         rows["slipping"].append(mean(slipping(at).values))
         pairs = np.column_stack([at.local.values, at.first_instability.values])
         rank = bootstrap(rank_correlation, pairs)
         rows["rank"].append(rank)
         rows["disorder"].append(Estimate(1.0 - rank.value, rank.error))
-        rows["arrested"].append(share(stopped))
-        rows["arrested, text"].append(share_text(rows["arrested"][-1], stopped.size))
-        rows["rise"].append(mean(rise) if rise.size > 1 else None)
+        rows["arrested"].append(share(at.arrested_events.values > 0))
+        rows["single"].append(share(at.slip_patches.values == 1))
     return rows
 
 
 def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate]]:
     """Mean fall of the onset, per cent, when the interface grows: seen, and of a weakest link."""
-    rows: dict[str, list[Estimate]] = {"exact": [], "local": [], "link": [], "local link": []}
+    rows: dict[str, list[Estimate]] = defaultdict(list)
     for name, column in (("exact", "first_instability"), ("local", "local")):
-        for i in range(small.sizes["ratio"]):
-            before, after = (data[column].values[i] for data in (small, large))
-            reference = float(before.mean())
-            seen = mean(before) - mean(after)
-            rows[name].append(seen.scaled(100.0 / reference))
+        for before, after in zip(small[column].values, large[column].values, strict=True):
+            share_of_mean = 100.0 / float(before.mean())
             link = bootstrap(lambda v: v.mean() - weakest_link(v), before)
-            rows["link" if name == "exact" else "local link"].append(
-                link.scaled(100.0 / reference)
-            )
+            rows[name].append((mean(before) - mean(after)).scaled(share_of_mean))
+            rows[f"{name}, weakest of four"].append(link.scaled(share_of_mean))
     return rows
 
 
@@ -268,57 +235,32 @@ def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[Estimate]
     coarse = coarse.isel(sample=slice(few))
     changes = {
         "exact": 100.0 * (fine.first_instability / coarse.first_instability - 1.0),
-        "lowering": lowering(fine) - lowering(coarse),
+        "lowering, points": lowering(fine) - lowering(coarse),
     }
     return {name: [mean(row) for row in change.values] for name, change in changes.items()}
 
 
-def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> str:
-    """Everything as tables in Markdown."""
-    lines: list[str] = []
+def table(title: str, columns: dict[str, list[Estimate]]) -> None:
+    """Print a table in Markdown, with a row for each correlation length."""
+    heads = [NAMES.get(name, name).replace("$", "") for name in columns]
+    print(f"{title}:\n\n| xi_0/h_n | " + " | ".join(heads) + " |")
+    print("|---" * (1 + len(columns)) + "|")
+    for ratio, *row in zip(RATIOS, *columns.values(), strict=True):
+        print(f"| {ratio:g} | " + " | ".join(map(text, row)) + " |")
+    print()
 
-    def table(title: str, columns: dict, cell) -> None:
-        heads = [HEADS.get(name, name) for name in columns]
-        lines.extend([f"{title}:", "", "| xi_0/h_n | " + " | ".join(heads) + " |"])
-        lines.append("|---" * (1 + len(columns)) + "|")
-        for i, ratio in enumerate(RATIOS):
-            cells = [cell(column, i) for column in columns.values()]
-            lines.append(f"| {ratio:g} | " + " | ".join(cells) + " |")
-        lines.append("")
 
-    def lowered(part: dict, i: int) -> str:
-        low, high = part["spread"][i]
-        return f"{text(part['lowering'][i])} ({low:.2g} to {high:.2g})"
-
-    def plain(key: str):
-        return lambda part, i: text(part[key][i]) if part[key][i] else ""
-
+def tables(found: dict[str, xr.Dataset], parts: dict, effects: dict) -> None:
+    """Print everything."""
     for name, data in found.items():
         counts = data.sizes["sample"], data.sizes["kept_sample"]
-        lines.append("{}: {} samples a point, slip of {}".format(name, *counts))
-    lines.append("")
-    table("Onset lowered, % of the local criterion (5 to 95 % of the samples)", parts, lowered)
-    for where in ("near", "far"):
-        table(f"Of this by what is {where}", parts, plain(where))
-    table("Mean onset, MPa", parts, plain("onset"))
-    table("Its standard deviation, % of the mean", parts, plain("scatter"))
-    table("Slipping patches at the first instability", parts, plain("patches"))
-    table("Slipping nodes, %", parts, plain("slipping"))
-    table("Rank correlation of local criterion and onset", parts, plain("rank"))
-    table("Samples with an arrested event, %", parts, lambda part, i: part["arrested, text"][i])
-    table("Of these, sliding load over first instability, %", parts, plain("rise"))
+        print("{}: {} samples a point, slip of {}".format(name, *counts))
+    for key, title in TITLES.items():
+        table(title, {name: part[key] for name, part in parts.items()})
     for kind, effect in effects.items():
-        table(
-            f"Fall of the mean onset on a {kind} four times as large, %", effect, plain_estimate
-        )
+        table(f"Fall of the mean onset on a {kind} four times as large, %", effect)
         error = grid_error(found[f"{kind}, small"], found[f"{kind}, small, fine"])
-        table(f"Change on a {kind} by half the spacing, %", error, plain_estimate)
-    return "\n".join(lines)
-
-
-def plain_estimate(column: list[Estimate], i: int) -> str:
-    """A cell of a table."""
-    return text(column[i])
+        table(f"Change on a {kind} by half the spacing, %", error)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -336,8 +278,8 @@ def main(arguments: list[str] | None = None) -> None:
     }
     for case in CASES:
         if case.name in parts:
-            parts[case.name] |= split(case, found[case.name])
-    print(tables(found, parts, effects))
+            parts[case.name]["far"] = far_lowering(case, found[case.name])
+    tables(found, parts, effects)
     lowered = {name: lowering(found[name]) for name in parts}
     draw(given.figures, RATIOS, lowered, parts, effects, samples_to_show(found))
 

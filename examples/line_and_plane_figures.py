@@ -25,21 +25,13 @@ from stiction.plot.style import (
 
 LEAST = 1e-3
 """Lowering in per cent from which on it is drawn: below, the grid of the line decides."""
+LINE, PLANE = ({"color": color(1), "marker": "s"}, {"color": color(2), "marker": "o"})
+SMALL = {"markerfacecolor": "white", "linestyle": "--"}
 STYLES = {
-    "line, small": {
-        "color": color(1),
-        "marker": "s",
-        "markerfacecolor": "white",
-        "linestyle": "--",
-    },
-    "line, large": {"color": color(1), "marker": "s"},
-    "plane, small": {
-        "color": color(2),
-        "marker": "o",
-        "markerfacecolor": "white",
-        "linestyle": "--",
-    },
-    "plane, large": {"color": color(2), "marker": "o"},
+    "line, small": LINE | SMALL,
+    "line, large": LINE,
+    "plane, small": PLANE | SMALL,
+    "plane, large": PLANE,
 }
 NAMES = {
     "line, small": r"line, 16 $h_n$",
@@ -84,12 +76,10 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
         for i, ratio in enumerate(ratios):
             values = np.sort(lowered[name].isel(ratio=i).values)
             above = 100.0 * (1.0 - np.arange(values.size) / values.size)
-            axes.step(
-                values, above, where="pre", label=rf"$\xi_0/h_n = {ratio:g}$", **series(i)
-            )
-        axes.set(
-            xscale="log", xlabel="lowered by more than (%)", xlim=(LEAST, 10.0), ylim=(0, 102)
-        )
+            label = rf"$\xi_0/h_n = {ratio:g}$"
+            axes.step(values, above, where="pre", label=label, **series(i))
+        axes.set(xscale="log", xlabel="lowered by more than (%)")
+        axes.set(xlim=(LEAST, 10.0), ylim=(0, 102))
         axes.set_title(NAMES[name], pad=10)
         panel(axes, letter)
     panels[0].set_ylabel("share of the samples (%)")
@@ -100,12 +90,8 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     panels[2].set(yscale="log", ylabel="mean lowering (%)", ylim=(1e-4, 6.0))
     panel(panels[2], "c")
     for axes, place in ((panels[0], 0.3), (panels[2], 0.8)):
-        figure.legend(
-            *axes.get_legend_handles_labels(),
-            ncols=2,
-            loc="lower center",
-            bbox_to_anchor=(place, 0.0),
-        )
+        style = {"ncols": 2, "loc": "lower center", "bbox_to_anchor": (place, 0.0)}
+        figure.legend(*axes.get_legend_handles_labels(), **style)
     figure.set_layout_engine("constrained", rect=(0.0, 0.17, 1.0, 0.83))
     return figure
 
@@ -113,9 +99,8 @@ def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
 def _against_ratio(axes: Axes, ratios: Any, cases: dict[str, list]) -> None:
     for name, estimates in cases.items():
         values, errors = ([getattr(e, key) for e in estimates] for key in ("value", "error"))
-        axes.errorbar(
-            ratios, values, yerr=errors, label=NAMES[name], capsize=1.5, **STYLES[name]
-        )
+        style = {"label": NAMES[name], "capsize": 1.5} | STYLES[name]
+        axes.errorbar(ratios, values, yerr=errors, **style)
     axes.set(xscale="log", xlabel=r"correlation length $\xi_0/h_n$")
     axes.set_xticks(ratios, [f"{ratio:g}" for ratio in ratios])
     axes.minorticks_off()
@@ -140,18 +125,13 @@ def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
     for kind, effect in effects.items():
         name = f"{kind}, large"
         _against_ratio(panels[1, 1], ratios, {name: effect["exact"]})
-        values = [e.value for e in effect["link"]]
+        values = [e.value for e in effect["exact, weakest of four"]]
         panels[1, 1].plot(ratios, values, color=STYLES[name]["color"], linestyle=":")
     panels[1, 1].set(ylabel="fall of the mean onset (%)", ylim=(0, None))
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=STYLES[f"{kind}, large"]["color"],
-            label=f"{kind}, four times as large",
-        )
-        for kind in effects
-    ]
+    handles = []
+    for kind in effects:
+        colour = STYLES[f"{kind}, large"]["color"]
+        handles.append(Line2D([], [], color=colour, label=f"{kind}, four times as large"))
     handles.append(Line2D([], [], color=QUIET, linestyle=":", label="weakest of four"))
     panels[1, 1].legend(handles=handles)
     panel(panels[1, 1], "d")
@@ -172,9 +152,8 @@ def patches(shown: dict) -> Figure:
 def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     axes = figure.subplots()
     ends = (-0.5 / case.nodes, case.size - 0.5 / case.nodes)
-    image = axes.imshow(
-        tau_p.T * 1e-6, origin="lower", extent=ends * 2, cmap="Greys_r", vmin=0.55
-    )
+    style = {"origin": "lower", "cmap": "Greys_r", "vmin": 0.55}
+    image = axes.imshow(tau_p.T * 1e-6, extent=ends * 2, **style)
     figure.colorbar(image, ax=axes, location="bottom", label="strength (MPa)", shrink=0.8)
     at = np.arange(case.size * case.nodes) / case.nodes
     moves = (onset.slip.values > 0.0).astype(float)
@@ -183,14 +162,11 @@ def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     axes.contour(at, at, moves.T, levels=[0.5], colors=[color(1)], linewidths=0.7)
     axes.contour(at, at, inside.T.astype(float), levels=[0.5], colors=[ACCENT], linewidths=1.5)
     axes.set(xlabel="$x/h_n$, direction of slip", ylabel="$y/h_n$")
-    axes.legend(handles=_handles(), loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
-
-
-def _handles() -> list[Any]:
-    return [
+    handles = [
         Patch(facecolor=color(1), alpha=0.5, label="slips"),
         Line2D([], [], color=ACCENT, linewidth=1.5, label="critical patch"),
     ]
+    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
 
 
 def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
@@ -210,12 +186,5 @@ def _line(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
         axes.fill_between(at, bar, high, where=critical, color=ACCENT, **options)
         axes.axhline(load, color=QUIET, linewidth=0.7)
         axes.set(xlim=window, xlabel="$x/h_n$", ylabel="strength (MPa)", ylim=(low, high))
-    axes.text(
-        window[1],
-        load - 0.01,
-        "stress at onset ",
-        ha="right",
-        va="top",
-        color=QUIET,
-        fontsize=7.5,
-    )
+    style = {"ha": "right", "va": "top", "color": QUIET, "fontsize": 7.5}
+    axes.text(window[1], load - 0.01, "stress at onset ", **style)
