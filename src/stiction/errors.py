@@ -14,7 +14,7 @@ _OURS = ("stiction", "pydantic", "dataclasses", "functools")
 
 
 class InputError(ValueError):
-    """Everything wrong with what was given, in one message.
+    """Invalid input: one message that lists every problem.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ class InputError(ValueError):
 
 
 class AccuracyWarning(UserWarning):
-    """A result is valid but less accurate than it could be; the message says by how much."""
+    """A result is valid but less accurate than it could be; the message gives the error."""
 
 
 class UnitWarning(UserWarning):
-    """A value that no solid has: probably it is in another unit than it is taken to be."""
+    """A value that no solid has; it is probably in another unit than assumed."""
 
 
 class RunError(RuntimeError):
-    """A run cannot go on; what was stored stays, and the message says what to do."""
+    """A run cannot continue; stored results are kept, and the message gives the remedy."""
 
 
 class StoreError(RunError):

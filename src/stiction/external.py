@@ -1,4 +1,4 @@
-"""Functions for the samplers and reliability codes of others: OpenTURNS, UQpy, dynesty, sbi."""
+"""Functions for external samplers and reliability codes: OpenTURNS, UQpy, dynesty, sbi."""
 
 from stiction.ensemble.limit_state import limit_state
 from stiction.inference.simulator import simulator

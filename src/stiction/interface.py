@@ -56,8 +56,8 @@ class Interface:
     Parameters
     ----------
     length : float or (float, float)
-        Period, m. One number is a line, two are a plane: along x, the direction of load and slip,
-        and along y, across it.
+        Period, m. One number gives a line, two give a plane: along x, the direction of load
+        and slip, and along y, across it.
     nodes : int or (int, int)
         Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
         are fastest.
@@ -107,7 +107,7 @@ class Interface:
 
     @property
     def is_plane(self) -> bool:
-        """Whether it has two directions."""
+        """Whether the interface is a plane."""
         return len(self.shape) == 2
 
     @property
@@ -117,7 +117,7 @@ class Interface:
 
     @property
     def size(self) -> int:
-        """Number of nodes in all."""
+        """Total number of nodes."""
         return math.prod(self.shape)
 
     @property
@@ -127,7 +127,7 @@ class Interface:
 
     @property
     def cell(self) -> float:
-        """What a node stands for: a length (m), on a plane an area (m²)."""
+        """Length (m) that a node represents; on a plane, its area (m²)."""
         return self.extent / self.size
 
     @property
@@ -152,7 +152,7 @@ class Interface:
         return self.coordinates["x"]
 
     def describe_node(self, node: int) -> str:
-        """Where a node is, counted in the order of a flat profile, for messages."""
+        """Return the position of a node of the flat profile in words."""
         entry = np.unravel_index(int(node), self.shape)
         places = zip(self.dims, entry, self.spacings, strict=True)
         return ", ".join(f"{dim} = {i * spacing:.6g} m" for dim, i, spacing in places)
@@ -179,9 +179,9 @@ class Interface:
 
     @property
     def in_plane_share(self) -> Array | None:
-        """(kx/k)² of the wave vectors of a plane: how much of mode II, the rest being mode III.
+        """Share of mode II, (kx/k)², at each wave vector of a plane; the rest is mode III.
 
-        The constant mode counts as mode II. None on a line, whose mode is the problem's.
+        The constant mode counts as mode II. None on a line, where the problem sets the mode.
         """
         if not self.is_plane:
             return None
@@ -192,14 +192,14 @@ class Interface:
         return share
 
     def transform(self, profiles: Array) -> Array:
-        """Real Fourier transform of profiles (..., *shape), unscaled.
+        """Return the real Fourier transform of profiles (..., *shape), unscaled.
 
-        Row by row of the other axes, so that the numbers do not depend on the batch.
+        Each profile is transformed by itself, so that the result does not depend on the batch.
         """
         return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 
     def inverse_transform(self, spectra: Array) -> Array:
-        """Profiles (..., *shape) of real Fourier transforms."""
+        """Return the profiles (..., *shape) of real Fourier transforms."""
         if self.is_plane:
             return np.fft.irfft2(spectra, self.shape)
         return np.fft.irfft(spectra, self.shape[0])

@@ -34,7 +34,7 @@ class LoadShape(ABC):
     """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
 
     To add one, decorate a class that derives from it with `stiction.model.model`, so that
-    its parameters are checked, and with `register`, so that study files know its `type`.
+    its parameters are checked, and with `register`, so that study files accept its `type`.
     """
 
     @abstractmethod
@@ -86,7 +86,7 @@ class GradientLoad(LoadShape):
     amplitude : float
         The profile runs from 1 + amplitude down to 1 - amplitude (1), in [0, 1).
     centre : float
-        Where it is largest, as a share of the length, in [0, 1).
+        Position of the maximum as a share of the length, in [0, 1).
 
     """
 
@@ -112,11 +112,11 @@ class EdgeLoad(LoadShape):
     Parameters
     ----------
     excess : float
-        How much higher at the edge than far away, over that far away (1), not negative.
+        Excess load at the edge over the load far away (1), not negative.
     decay : float
-        m, positive.
+        Decay length, m, positive.
     edge : float
-        Where it is, as a share of the length, in [0, 1).
+        Position of the edge as a share of the length, in [0, 1).
 
     """
 
@@ -142,7 +142,7 @@ LoadProfile: TypeAlias = Annotated[Profile, OneOf(SHAPES, _shape, PROFILE_SCHEMA
 
 @model
 class Load:
-    """Shear stress on the interface if nothing slipped: tau_i(x) + tau_0 p(x), tau_0 rising.
+    """Shear stress on an interface without slip: tau_i(x) + tau_0 p(x), with rising tau_0.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class Load:
     initial_stress : float or (nodes,) array
         tau_i, Pa, below the peak strength everywhere.
     normal_pressure : float or (nodes,) array, optional
-        Pa, positive on average. With it every onset has a `friction_coefficient`.
+        Pa, positive on average. Every onset then has a `friction_coefficient`.
 
     Examples
     --------

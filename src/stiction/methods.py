@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FIRST = 16
-"""Samples that `onset` solves before it knows how long one takes."""
+"""Samples that `onset` solves to measure the time of one."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -220,18 +220,18 @@ def onset(
     gaps: Literal["refuse", "fill"] = "refuse",
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Compute at which load, and where, interfaces of given strength begin to slide.
+    """Compute the load and position at which interfaces of given strength begin to slide.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane (samples, nx,
-        ny) or (nx, ny); or several profiles by name, such as ``{"strength": ...,
-        "residual_strength": ...}``, which replace the problem's own; see `Problem.sample`. Of a
-        DataArray or Dataset the dimension 'x' runs along the interface (on a plane 'x' and 'y'),
-        its coordinate (m) decides where a value belongs, and `units` that are stated are converted;
-        see `stiction.read_profile`.
+        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
+        (samples, nx, ny) or (nx, ny); or several profiles by name, such as ``{"strength":
+        ..., "residual_strength": ...}``, which replace the problem's own; see
+        `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
+        interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
+        value, and stated `units` are converted; see `stiction.read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
         The method; there is no default.
     gaps : {"refuse", "fill"}
@@ -244,8 +244,8 @@ def onset(
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
-        method adds. Every variable has `units` and `long_name`. Of profiles with gaps that were
-        filled also `in_gap`, whether the onset lies in one, and the coordinate `measured` of nodes.
+        method adds. Every variable has `units` and `long_name`. If gaps were filled, also
+        `in_gap`, whether the onset lies in one, and the coordinate `measured` of nodes.
 
     Raises
     ------

@@ -13,18 +13,18 @@ from stiction.solid import Solid
 
 
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> Problem:
-    """The interface of Albertini, Karrer, Grigoriu and Kammer (2020).
+    """Return the interface of Albertini, Karrer, Grigoriu and Kammer (2020).
 
-    G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m, W = 0.5 TPa/m, mode II. The strength above
-    the residual is all that matters to the onset, so the residual is zero.
+    G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m, W = 0.5 TPa/m, mode II. Only the
+    strength above the residual affects the onset, so the residual is zero.
 
     Parameters
     ----------
     nodes : int
         Number of nodes on the interface, even.
     plane : {"stress", "strain"}
-        The paper says plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu), which
-        belongs to plane strain; ``plane="strain"`` gives the printed value.
+        The paper states plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu),
+        which belongs to plane strain. ``plane="strain"`` gives the printed value.
     """
     return Problem(
         solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
@@ -35,7 +35,7 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
 
 @checked
 def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField:
-    """The random strength of Albertini et al. (2020, Eqs. 2 to 7).
+    """Return the random strength of Albertini et al. (2020, Eqs. 2 to 7).
 
     Beta(1.5, 3) on [0.66, 1.66] MPa; power-law spectrum (k^2 + lambda^2)^-4, truncated at
     2.5 lambda, without the mean mode.

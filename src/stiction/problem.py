@@ -129,7 +129,7 @@ of random draws and never changes."""
 
 @model
 class Problem:
-    """Everything about the interface that is not random.
+    """The deterministic part of a model: solid, interface, friction law and load.
 
     Parameters
     ----------
@@ -137,15 +137,15 @@ class Problem:
     interface : Interface
     friction : LinearWeakening, ExponentialWeakening or PiecewiseWeakening
     load : Load, optional
-        Uniform and without initial stress if left out.
+        By default uniform and without initial stress.
     mode : {"II", "III"}
         In-plane or anti-plane shear; a plane is in-plane along x and anti-plane along y.
 
     Raises
     ------
     InputError
-        Naming all that does not fit, such as arrays of another shape than the interface,
-        or fewer than four nodes in the nucleation length.
+        If an array has another shape than the interface, fewer than four nodes span the
+        nucleation length, or another argument is invalid; the message lists every problem.
 
     Examples
     --------
@@ -222,7 +222,7 @@ class Problem:
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
-        """Warn if mean peak and residual strengths (Pa) do not go with the rest of the problem."""
+        """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
         ratio = strength / self.solid.shear_modulus
         if not WEAKEST <= ratio <= STRONGEST:
             warn_user(
@@ -237,7 +237,7 @@ class Problem:
 
     @property
     def load_profile(self) -> Any:
-        """p of the load: a number, or at the nodes, (*shape)."""
+        """Load profile p: a number, or an array at the nodes, (*shape)."""
         profile = self.load.profile
         return profile.on(self.interface) if isinstance(profile, LoadShape) else profile
 
@@ -256,8 +256,8 @@ class Problem:
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
 
-        An `InputError` if the rate varies along the interface or follows from other
-        parameters.
+        It raises an `InputError` if the rate varies along the interface or follows from
+        other parameters.
         """
         if self.uniform_rate is None:
             raise InputError(
@@ -269,7 +269,7 @@ class Problem:
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
         """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
 
-        On a plane that of mode II along x, and that of mode III along y.
+        On a plane, the length along x is that of mode II, along y that of mode III.
         """
         if not rate > 0.0:
             raise InputError(f"rate: must be a positive number, got {describe(rate)}")
@@ -279,7 +279,7 @@ class Problem:
     def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
         """Return how many nodes the nucleation length of a weakening rate (Pa/m) spans.
 
-        In each direction. If the law steepens with slip, the steepest rate counts.
+        It returns one number per direction. If the law steepens, the steepest rate counts.
         """
         steepest = rate * self.friction.steepest_slope / self.friction.initial_slope
         lengths = zip(self.nucleation_lengths(steepest), self.interface.spacings, strict=True)
@@ -301,7 +301,7 @@ class Problem:
             )
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
-        """Warn if the nucleation length spans fewer than `enough` nodes; `cost`: the error."""
+        """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
         resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
         if min(resolution) < enough:
             nodes = f"{resolution[0]:.1f} nodes"
@@ -312,25 +312,25 @@ class Problem:
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
-        """Return what differs between samples, validated, and the problem's own for all the rest.
+        """Return the validated profiles of samples, with the problem's own values for all others.
 
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles
-            by name: 'strength', and any others of `PROFILES`, of 'weakening_rate',
-            'critical_slip' and 'fracture_energy' one. They may also be (samples, 1) or a
-            number and replace the problem's own.
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
+            name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
+            'critical_slip' and 'fracture_energy'. A profile replaces the problem's own, and
+            may also be (samples, 1) or a number.
         accept : collection of {"barriers", "overstress", "constant"}
-            What the method at hand can do besides: infinite strength where nothing breaks;
-            an initial stress above the strength. "constant": the caller has warned of
-            nodes that do not weaken.
+            What the method accepts: infinite strength where nothing breaks; an initial
+            stress above the strength. "constant": the caller has warned of nodes that do
+            not weaken.
 
         Raises
         ------
         InputError
-            Naming all that is wrong: names, shapes, values that are not finite, strength
-            not above the initial stress, or nowhere above the residual strength.
+            If a name, shape or value is invalid, a strength is not above the initial stress,
+            or no strength is above the residual strength; the message lists every problem.
 
         Notes
         -----

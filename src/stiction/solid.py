@@ -23,7 +23,7 @@ class Solid:
     Parameters
     ----------
     shear_modulus : float
-        G, Pa. Or, by name, `youngs_modulus`, E in Pa: then G = E/(2 (1 + nu)) is what is kept.
+        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa; then G = E/(2 (1 + nu)) is stored.
     poisson_ratio : float
         nu, in (-1, 0.5).
     density : float

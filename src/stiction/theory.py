@@ -1,4 +1,4 @@
-"""Theory of the local criterion and of cracks: what can be said without an ensemble."""
+"""Theory of the local criterion and of cracks: results that need no ensemble."""
 
 from stiction.criterion.griffith import energy_release_rate, griffith_length
 from stiction.criterion.local import nucleation_stress

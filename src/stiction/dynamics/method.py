@@ -59,10 +59,10 @@ LoadHistory = Annotated[
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Implicit steps of adaptive size follow the interface while it creeps, explicit ones its
-    rupture; the run goes from just below the first instability (see `start`) to the moment when
-    every node that can break has reached its residual strength, or as far as `stop` says. Strength
-    may be infinite where nothing ever breaks, and the initial stress may be above the strength:
+    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. A run
+    begins just below the first instability (see `start`) and ends when every node that can
+    break has reached its residual strength, or as `stop` specifies. Strength may be
+    infinite where nothing ever breaks, and the initial stress may be above the strength:
     such a patch breaks at once, at zero load.
 
     Parameters
@@ -70,49 +70,49 @@ class Rupture:
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
     kernel_tolerance : float
-        Error allowed in the memory kernel C(T) by its sum of exponentials (1), up to
-        T = |k| c_s t = 1e5; older slip rate decays faster than it should. The sum is fitted once
-        a solid and kept on disk: about 1 s at 1e-6 (22 pairs), half a minute at 1e-8 (35).
-        Refused where the error makes waves grow at any time step, from some 1e-3 on.
+        Allowed error of the memory kernel C(T), a sum of exponentials (1), up to T = |k|
+        c_s t = 1e5; older slip rate decays too fast. The sum is fitted once for each solid
+        and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8 (35). From
+        about 1e-3 on, waves may grow at any time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     time_step : float, optional
         Explicit time step, s, instead of `courant`.
     slip_step : float
-        Slip of any node in one implicit step, in units of its d_c, as long as it weakens.
+        Slip of any weakening node in one implicit step, in units of its d_c.
     load_step : float
         Rise of the load in one implicit step, in units of the stress scale (see Notes).
     start : {"equilibrium", "rest"}
-        "rest": at the first slip. "equilibrium": on the quasi-static path, as close below the
-        first instability as an estimate of the error allows; `start_load` is the load there, and
-        `start_error` (Pa) the estimate. Where there is no such state, the run begins at the first
-        slip and `start_error` is 0: at a loading rate too fast for it, on planes, with laws
-        without straight pieces, barriers or stress above the strength, where a node loses half
-        of its strength before.
+        "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
+        the first instability as the estimated error allows; `start_load` is the load there,
+        and `start_error` (Pa) the estimate. The run begins at the first slip, with
+        `start_error` 0, if the loading rate is too high, if a node loses half of its
+        strength before, on planes, with laws that are not piecewise linear, and with
+        barriers or stress above the strength.
     end_time : float, optional
-        s; a run never goes beyond it, except for a part of the last explicit step.
+        Time at which a run ends at the latest, s, but for a part of the last explicit step.
     load : (times, values), optional
-        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate; straight lines join
-        them, and the last slope goes on. It must not fall before the first slip, where runs begin.
+        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate, with linear
+        interpolation; the last slope continues. It must not fall before the first slip.
     arrival : float
-        Share of its way to the residual that the strength of a node has lost when the front has
-        arrived there, in (0, 1]: 0.5 is the middle of the cohesive zone, 1e-3 its tip.
+        Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
+        0.5 is the middle of the cohesive zone, 1e-3 its tip.
     stop : {"sliding", "onset", "rest", "runaway", "time"}
-        "sliding": when every node that can break is at its residual strength. "onset": when the
-        first instability has begun; critical values are those of that maximum of the mean stress,
-        even if the instability would be arrested later, and what comes after it is nan (kinetic
-        stress, stress drop, moment, energies, arrested events, rupture speeds). "rest": when
-        everything has come to rest after an instability, or slides; critical values are then
-        those of the largest mean stress so far, kinetic stress and stress drop are nan unless
-        it slides, and the rest is that of the arrested event. "runaway": when the rupture has
-        grown so long that no fracture energy of the interface can stop it (Griffith), or slides:
-        all loads and `arrested_events` are known then, what "onset" leaves nan is nan but for
-        those. Lines only. "time": at `end_time`. Unless it waits for that, a run also ends where
-        nothing slips and the load has stopped rising for good.
+        "sliding": when every node that can break is at its residual strength. "onset": when
+        the first instability has begun. Critical values are those of that maximum of the mean
+        stress, even if the instability would be arrested later; later quantities are NaN
+        (kinetic stress, stress drop, moment, energies, arrested events, rupture speeds).
+        "rest": when the interface is at rest after an instability, or slides. Critical values
+        are those of the largest mean stress so far, kinetic stress and stress drop are NaN
+        unless it slides, and the rest is that of the arrested event. "runaway": when the
+        rupture is so long that no fracture energy of the interface can stop it (Griffith), or
+        the interface slides; lines only. All loads and `arrested_events` are then final;
+        other quantities that "onset" leaves NaN stay NaN. "time": at `end_time`. With the
+        others a run also ends where nothing slips and the load has stopped rising.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
-        Steps after which a run is given up.
+        Number of steps after which a run is abandoned.
 
     Raises
     ------
@@ -121,23 +121,23 @@ class Rupture:
 
     Notes
     -----
-    `critical_stress` is the largest mean shear stress on the interface, `critical_load` the load
-    factor that carries it statically (nan where nothing became unstable, or where an overstressed
-    patch slipped at the start and the mean stress was never as high again), `applied_load` the one
-    applied at that moment, somewhat higher; the difference is radiated. An instability begins when
-    the mean stress has fallen by 1e-4 of the stress scale below its last maximum, not counting what
-    the load itself goes down. `arrested_events` counts those in which a node slips so fast that
-    Z V exceeds 7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all
-    is calm: the waves after an event, and the creep that they modulate, stay slower.
-    `Equilibrium` also counts jumps too small to reach that slip rate.
-    The stress scale is the mean over nodes of tau_p - tau_r, no node counting for more than three
-    times the drop tau_0 p + tau_i - tau_r that the largest load so far provides there: barriers
-    that nothing breaks do not count.
-    `kinetic_stress` and the energies are those of the first step after which all that can break is
-    at its residual strength; the interface slides fast then, and radiated energy and moment grow by
-    some 2 % in that step. Slip never reverses: a node whose slip rate would become negative sticks,
-    keeps its weakened strength, and slips again only when the stress reaches it.
-    Boundary integral in Fourier space: Breitenfeld and Geubelle (1998).
+    `critical_stress` is the largest mean shear stress on the interface, `critical_load` the
+    load factor that carries it statically (nan where nothing became unstable, or where an
+    overstressed patch slipped at the start and the mean stress was never as high again),
+    `applied_load` the one applied at that moment, somewhat higher; the difference is
+    radiated. An instability begins when the mean stress has fallen by 1e-4 of the stress
+    scale below its last maximum, not counting any fall of the load itself. `arrested_events`
+    counts those in which a node slips so fast that Z V exceeds 7.5 % of the median of tau_p -
+    tau_r before the mean stress is as high again or all is calm: the waves after an event,
+    and the creep that they modulate, stay slower. `Equilibrium` also counts jumps too small
+    to reach that slip rate. The stress scale is the mean over nodes of tau_p - tau_r, where
+    each node counts for at most three times the drop tau_0 p + tau_i - tau_r at the largest
+    load so far, so that unbroken barriers do not count. `kinetic_stress` and the energies are
+    those of the first step after which every node that can break is at its residual strength;
+    the interface then slides fast, and radiated energy and moment grow by about 2 % in that
+    step. Slip never reverses: a node whose slip rate would become negative sticks, keeps its
+    weakened strength, and slips again only when the stress reaches it. Boundary integral in
+    Fourier space: Breitenfeld and Geubelle (1998).
     """
 
     loading_rate: Positive | None = None
@@ -171,7 +171,7 @@ class Rupture:
         return self
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """About how long a sample takes on one core, s."""
+        """Return the approximate time of a sample on one core, s."""
         shape = problem.interface.shape
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
@@ -180,13 +180,13 @@ class Rupture:
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
-        """Reasons why it cannot take a problem; none if it can."""
+        """Return the reasons why the method cannot solve a problem; none if it can."""
         if self.stop == "runaway" and problem.interface.is_plane:
             return ["stop: 'runaway' works on lines only; stop at 'sliding' or 'onset'"]
         return []
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return what the solver returns for each sample."""
+        """Return the variables that the solver computes for each sample."""
         return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
@@ -194,7 +194,7 @@ class Rupture:
         return prepare_medium(problem, self.kernel_tolerance, self.courant, self.time_step)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver of samples of this problem; the kernel is fitted here, once."""
+        """Return a solver for samples of this problem, with its kernel fitted once."""
         medium, rate = self.medium(problem), self.loading_rate
         from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
         static = static_setting(problem) if from_equilibrium else None

@@ -41,16 +41,16 @@ class Misfit(NamedTuple):
 
 
 def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Misfit:
-    """Return how far a simulated rupture on a line is from what gauges recorded.
+    """Return the misfit between a simulated rupture on a line and gauge records.
 
     Parameters
     ----------
     run : xarray.Dataset
-        From `simulate_rupture`, with stations at the gauges, or with the quantity that was
-        measured among its fields and frames dense enough in time.
+        From `simulate_rupture`, with stations at the gauges, or with the measured quantity
+        among its fields and frames dense enough in time.
     measured : xarray.DataArray
-        Over 'time' (s) and 'x' (m), named 'slip', 'slip_rate' or 'shear_stress', in SI units or
-        those that its attributes state. NaN where nothing was recorded.
+        Over 'time' (s) and 'x' (m), named 'slip', 'slip_rate' or 'shear_stress', in SI
+        units or in the units of its attributes. NaN where nothing was recorded.
     align : bool
         Shift the record in time for the best fit, the same for all gauges; otherwise its times are
         those of the run.
@@ -68,10 +68,10 @@ def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Mi
 
     Notes
     -----
-    Where every gauge has a station within half a spacing of nodes, the records of its steps are
-    compared, else frames, linear between nodes; both are linear in time, and stay as they were
-    before the first and after the last. The search begins at every shift that puts the steepest
-    moment of the record on a step or frame, and closes in on the best three.
+    If every gauge has a station within half a node spacing, records at every step are compared;
+    otherwise frames, interpolated linearly between nodes. Both are interpolated linearly in
+    time, and constant before the first and after the last. The search starts from every shift
+    that puts the steepest point of the record on a step or frame, and refines the best three.
     """
     times, values, places, kind = _checked(measured)
     clock, simulated = _at_gauges(run, kind, places)

@@ -92,7 +92,7 @@ Place = Annotated[tuple[float, ...], BeforeValidator(_place)]
 
 @model
 class Save:
-    """What `simulate_rupture` keeps, and where.
+    """Results that `simulate_rupture` keeps, and where it stores them.
 
     Parameters
     ----------
@@ -106,10 +106,10 @@ class Save:
         Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
         (traction) are recorded after every step. The node nearest to a place is taken.
     to : path, optional
-        Folder to write to while the run goes on; memory then stays bounded, the result holds no
-        fields, and `stiction.dynamics.save.open_rupture` reads them. If the folder holds the same
-        run, cut short, it goes on from where that was last written: every number is then the same
-        as without the interruption, to the bit. A run that has ended is read.
+        Folder to write to during the run. Memory then stays bounded and the result holds no
+        fields; `stiction.dynamics.save.open_rupture` reads them. If the folder holds the
+        same run, interrupted, it resumes from the last state written, and every number is
+        the same, to the bit, as without the interruption. A finished run is read.
 
     Examples
     --------

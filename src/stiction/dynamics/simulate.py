@@ -57,11 +57,11 @@ def simulate_rupture(
         by name, as in `onset`. Where the initial stress is above the strength, slip begins at
         once.
     method : Rupture
-        Load, numerical options, and when to stop. The run begins at the first slip, whatever its
-        `start`; after `max_steps` it ends as it is.
+        Load, numerical options and end of the run. The run begins at the first slip,
+        regardless of `start`, and keeps its results if `max_steps` ends it.
     save : Save, optional
-        What to keep and where: by default slip, slip rate and shear stress every ten explicit
-        steps, in memory.
+        Results to keep and where to store them: by default slip, slip rate and shear stress
+        every ten explicit steps, in memory.
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets the steps taken
         and 0.
@@ -69,17 +69,17 @@ def simulate_rupture(
     Returns
     -------
     xarray.Dataset
-        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, energies and more; over
-        'step' some of these at every step, with `step_time`; over ('step', 'station')
+        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, energies and more;
+        over 'step' some of these at every step, with `step_time`; over ('step', 'station')
         `station_slip`, `station_slip_rate` and `station_shear_stress`, and `station_x` (and
         `station_y`), where their nodes are; over 'x' `peak_strength`, `arrival_time` and
-        `front_speed`; and the scalars of `Rupture` for the run so far. The attribute `stopped`
-        says why it ended.
+        `front_speed`; and the scalars of `Rupture` for the run so far. The attribute
+        `stopped` is the reason why it ended.
 
     Raises
     ------
     InputError
-        Naming all that does not fit.
+        If any argument is invalid; the message lists every problem.
     StoreError
         If `save.to` cannot be written; what was written stays readable.
 

@@ -236,7 +236,7 @@ def _keeping(
 
 @model(kw_only=True)
 class Ensemble:
-    """How many samples, and which.
+    """Number of samples, seed, and variables to keep.
 
     Parameters
     ----------
@@ -247,8 +247,8 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
+        Variables kept along the interface: random fields, such as ``"strength"``, and
+        optional ones of the method, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
 
     Examples
     --------

@@ -168,7 +168,7 @@ def limit_state(
 ) -> LimitState:
     """Return the stress at onset as a function of standard normal draws.
 
-    For other reliability codes. Failure below a stress s is ``limit_state(draws) < s``.
+    It serves external reliability codes. Failure below a stress s is ``limit_state(draws) < s``.
 
     Parameters
     ----------
@@ -180,14 +180,14 @@ def limit_state(
     Returns
     -------
     LimitState
-        Call it with independent standard normal draws of shape (samples, `dimension`) for the
-        stresses, Pa, of shape (samples,). Its `draws(seed, first, samples)` are those of the
-        samples of `monte_carlo`, and `profiles(draws)` the profiles.
+        A callable that maps independent standard normal draws, of shape (samples,
+        `dimension`), to stresses, Pa, of shape (samples,). `draws(seed, first, samples)`
+        returns the draws of `monte_carlo`, `profiles(draws)` their profiles.
 
     Raises
     ------
     InputError
-        Naming everything that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Examples
     --------

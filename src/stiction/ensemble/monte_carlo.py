@@ -146,7 +146,7 @@ def monte_carlo(
     ----------
     problem : Problem
     random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa.
+        The random properties; a field alone is the peak strength, Pa.
     method : LocalCriterion, Equilibrium or Rupture
     samples : int
         Number of samples.
@@ -155,22 +155,21 @@ def monte_carlo(
     first : int
         Number of the first sample, to continue an ensemble.
     keep : str or tuple of str
-        What is kept along the interface: random fields, such as ``"strength"``, and what the
-        method can add, such as ``"sensitivity"``. A few samples are enough for a picture: those of
-        another call with the same seed and fewer samples are the same.
+        Variables kept along the interface: random fields, such as ``"strength"``, and
+        optional ones of the method, such as ``"sensitivity"``. For a figure, repeat the first
+        few samples: another call with the same seed and fewer samples gives the same ones.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
-        Anything that has `submit`: processes, a Dask client's executor, ... instead of threads.
+        Any object with `submit` instead of threads, such as a process pool or a Dask executor.
     progress : bool or callable
-        True shows how far it is, on standard error, once it takes more than two seconds; a
-        callable gets (done, total).
+        True shows progress on standard error after two seconds; a callable gets (done, total).
     time_limit : float, optional
-        Seconds. When they are over, samples that are not done are NaN, and the attribute
-        'cut_short' says how many are.
+        Time limit, s. Samples that are not done by then are NaN, and the attribute
+        'cut_short' gives the number that are done.
     pilot : bool
-        Solve the first samples by `Equilibrium` too if the method is the local criterion, 32 on a
-        line and 8 on a plane, and say how far the two are apart; the ensemble stays the same.
+        With the local criterion, also solve the first samples (32 on a line, 8 on a plane)
+        by `Equilibrium` and report the difference; the ensemble stays the same.
 
     Returns
     -------
@@ -184,9 +183,9 @@ def monte_carlo(
     Raises
     ------
     InputError
-        Naming all that does not fit. If no sample at all can be solved, naming one with its seed.
+        If any argument is invalid (the message lists every problem), or no sample is valid.
     RuntimeError
-        Naming a sample and the seed, if a solver fails on all of them.
+        If the solver fails on all samples; the message names one with its seed.
 
     Warns
     -----

@@ -181,8 +181,8 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        One of W (Pa/m), d_c (m; then W = (tau_p - tau_r)/d_c varies with the strength) and Gamma
-        (J/m²; then W = (tau_p - tau_r)²/(2 Gamma) varies with the strength), positive.
+        One of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c
+        varies with the strength; with Gamma, W = (tau_p - tau_r)²/(2 Gamma) does.
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -250,12 +250,12 @@ Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
 
 @model(kw_only=True)
 class PiecewiseWeakening(FrictionLaw):
-    """Strength that falls along a polygon of slip, such as dual-scale weakening.
+    """Strength that falls piecewise linearly with slip, such as dual-scale weakening.
 
     Parameters
     ----------
     slip : sequence of float
-        Corners u = d/d_c, rising from above 0 to 1; the corner at zero slip is understood.
+        Corners u = d/d_c, rising from above 0 to 1; the corner at zero slip is implied.
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
@@ -265,8 +265,8 @@ class PiecewiseWeakening(FrictionLaw):
     Raises
     ------
     InputError
-        If the corners do not make a falling polygon, none or several of W, d_c and Gamma are
-        given, or a value is out of range.
+        If the strength does not fall from corner to corner, none or several of W, d_c and
+        Gamma are given, or a value is out of range.
 
     Examples
     --------
@@ -297,7 +297,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def corners(self) -> tuple[Array, Array]:
-        """u and f at all corners, those at zero slip included."""
+        """u and f at all corners, including the one at zero slip."""
         return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
 
     @property
@@ -317,7 +317,7 @@ class PiecewiseWeakening(FrictionLaw):
         return float(np.sum(self._pieces[1]))
 
     def area(self, u: Any) -> Array:
-        """Return the area under the polygon up to u."""
+        """Return the area under f up to u."""
         (corners, f), (slopes, areas) = self.corners, self._pieces
         at_corners = np.append(0.0, np.cumsum(areas))
         u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
@@ -326,13 +326,13 @@ class PiecewiseWeakening(FrictionLaw):
         return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
 
     def slip_at(self, fraction: float) -> float:
-        """Return u on the polygon."""
+        """Return u at f."""
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
 
     @property
     def parameters(self) -> Polygon | Linear:
-        """For kernels; a single piece is the linear law to the bit."""
+        """Parameters for the kernels; a single piece gives the linear law, to the bit."""
         if len(self.slip) == 1:
             return Linear()
         return Polygon(*self.corners, float(self._pieces[0][0]))
@@ -340,10 +340,10 @@ class PiecewiseWeakening(FrictionLaw):
     @classmethod
     @checked
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
-        """Make a polygon of so many `pieces`, at least 2, that follows another law.
+        """Approximate another law by so many linear `pieces`, at least 2.
 
-        Corners lie on the law where it has lost equal shares of strength; the last piece of a law
-        that never ends is so long that it dissipates as much as all the rest of the law.
+        Corners lie on the law at equal steps of strength. If the law never reaches its
+        residual, the last piece is so long that it dissipates as much as the rest of the law.
 
         Returns
         -------
@@ -360,8 +360,8 @@ class PiecewiseWeakening(FrictionLaw):
         --------
         >>> import stiction as st
         >>> law = st.ExponentialWeakening(weakening_rate=0.5e12)
-        >>> polygon = st.PiecewiseWeakening.from_law(law, 32)
-        >>> round(float(polygon.weakening_rate) / 0.5e12, 3)
+        >>> pieces = st.PiecewiseWeakening.from_law(law, 32)
+        >>> round(float(pieces.weakening_rate) / 0.5e12, 3)
         0.984
         """
         if problems := contradictions(law):
@@ -463,4 +463,4 @@ else:
         WrapValidator(_law),
         WrapSerializer(_written),
     ]
-"""Any friction law; in a study file ``type`` says which, linear if left out."""
+"""Any friction law; in a study file ``type`` selects it (default: linear)."""

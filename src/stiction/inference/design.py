@@ -1,4 +1,4 @@
-"""Designs of tests: how much each is expected to tell, before any is made."""
+"""Designs of tests: the information expected from each before any test is made."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -46,16 +46,16 @@ def design_of_tests(
     seed: at_least(0) = 0,  # type: ignore[valid-type]
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate how much each design of tests will tell of each parameter.
+    """Estimate the information that each design of tests will give on each parameter.
 
     Parameters
     ----------
     problem, random, prior, method, samples, seed, progress
         As in `infer`.
     designs : mapping
-        Of names to designs: a number of tests, a mapping of lengths (m) to numbers of tests, or a
-        table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of the prior
-        that are known from elsewhere, such as a marginal that was measured.
+        Designs by name: a number of tests, a mapping of lengths (m) to numbers of tests, or
+        a table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of
+        the prior that are known from elsewhere, such as a marginal that was measured.
     load_cell_error : float
         Pa.
     repetitions : int
@@ -64,15 +64,15 @@ def design_of_tests(
     Returns
     -------
     xarray.Dataset
-        Over 'design' and 'parameter': `information`, the expected divergence of the posterior of
-        a parameter from its prior (nats; NaN where it is known), `standard_error` of it, and
-        `spread_left`, the expected standard deviation of the posterior over that of the prior, in
-        units in which the prior is uniform.
+        Over 'design' and 'parameter': `information`, the expected divergence of the
+        posterior of a parameter from its prior (nats; NaN where it is known), its
+        `standard_error`, and `spread_left`, the expected standard deviation of the
+        posterior over that of the prior, in units in which the prior is uniform.
 
     Raises
     ------
     InputError
-        Naming all that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Notes
     -----

@@ -101,7 +101,7 @@ class FieldFit:
         the marginal end outside the values, those of an exponent and of an anisotropy at the ranges
         that are searched, 0.65 to 16 and 0.05 to 20.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     repetitions : tuple of RandomField
         The fits to records simulated from `field`: what another measurement might have given.
     families : dict of str to Goodness
@@ -180,50 +180,51 @@ def fit_field(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> FieldFit:
-    """Fit a random field to measured profiles, with an interval of every parameter.
+    """Fit a random field to measured profiles, with an interval for every parameter.
 
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile` returns, with
-        equally spaced points. Missing values (NaN, missing points, values that were filled in) are
-        left out. Plain arrays, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or
-        (samples, nx, ny), in SI, have a value at each node of `interface`. Several profiles, also
-        of different length, are of one field.
+        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile`
+        returns, with equally spaced points. Missing values (NaN, missing points, filled
+        values) are left out. Plain arrays, of shape (nodes,) or (samples, nodes), on a
+        plane (nx, ny) or (samples, nx, ny), in SI, have a value at each node of
+        `interface`. Several profiles, also of different lengths, are samples of one field.
     interface : Interface, optional
         Needed for arrays without coordinates. A warning is issued if it is too short, or its nodes
         too coarse, for the fitted field.
     marginal : str, dict or sequence of them
         Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal' or any
-        continuous distribution of `scipy.stats`. Of several the best is taken, and `families` in
-        the result compares them. A table keeps parameters: ``{"type": "beta", "low": 0,
-        "high": 2e6}``. Both bounds of 'beta' are estimated unless they are given; the lower bound
-        of the others is 0 unless it is given.
+        continuous distribution of `scipy.stats`. Of several, the best is chosen, and
+        `families` in the result compares them. A table fixes parameters: ``{"type": "beta",
+        "low": 0, "high": 2e6}``. Both bounds of 'beta' are estimated unless they are given;
+        the lower bound of the others is 0 unless it is given.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'; a table keeps parameters, such as
-        ``{"type": "power_law", "exponent": 4.0}`` or ``"power_kept": 0.999``.
+        'power_law', 'squared_exponential' or 'exponential'; a table fixes parameters, such
+        as ``{"type": "power_law", "exponent": 4.0}`` or ``"power_kept": 0.999``.
     detrend : int
-        Degree of the polynomial trend that is taken off, 0 to 3. The mean stays in any case.
+        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept.
     noise : bool or float
-        Whether measurement noise, white and normal, is estimated along with the field; or its
-        standard deviation, where it is known (SI).
+        Whether to estimate white, normal measurement noise along with the field; or its
+        standard deviation, if known (SI).
     anisotropy : bool or float
-        Of maps: ratio of correlation lengths along y and x. False: 1; True: estimated.
+        Ratio of the correlation lengths of maps along y and x. False: 1; True: estimated.
     between : bool
-        Whether records are of different specimens, each with a factor of its own: the coefficient
-        of variation ``between`` of this factor is estimated, for `RandomInterface`.
+        Whether records come from different specimens, each with its own factor. The coefficient
+        of variation ``between`` of this factor is then estimated, for `RandomInterface`.
     quantity : str
-        What was measured, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
-        The fitted field of friction coefficients has ``of="friction_coefficient"``.
+        Measured quantity, for its unit: 'strength', 'normal_pressure',
+        'friction_coefficient', ... The fitted field of friction coefficients has
+        ``of="friction_coefficient"``.
     bootstrap : int
-        Repetitions, at least 20: as many from the fitted field, and from fields with correlation
-        lengths at either end of a first interval of it.
+        Number of repetitions, at least 20, from the fitted field, and from each of two
+        fields with the correlation lengths at the ends of a first interval.
     confidence : float
         Of the intervals.
     seed : int
-        Of the repetitions.
+        Seed of the repetitions.
     workers : int, optional
-        Threads; all cores by default. The numbers do not depend on it.
+        Threads; all cores by default. Results do not depend on it.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -241,21 +242,21 @@ def fit_field(
     Warns
     -----
     AccuracyWarning
-        If values are outliers, and of each reason in `doubts`: records hold fewer than ten
-        correlation lengths, a p-value is below 1 %, the noise hides the cut-off of the spectrum, or
-        a parameter lies at the end of the range that is searched.
+        If values are outliers, and for each reason in `doubts`: records hold fewer than ten
+        correlation lengths, a p-value is below 1 %, the noise hides the cut-off of the
+        spectrum, or a parameter lies at the end of the range that is searched.
 
     Notes
     -----
-    The marginal is found by maximum likelihood, of values and noise together. The spectrum comes
-    from a Whittle likelihood whose expectation is exact for the window: taper, gaps, the removal of
-    the trend and aliasing are in it, as is a truncation of the spectrum if one is given (Sykulski
-    et al., 2019; Guillaumin et al., 2022). Correlations of values follow from those of the Gaussian
-    field z by Hermite expansion (Grigoriu, 1995).
+    The marginal is found by maximum likelihood, of values and noise together. The spectrum
+    comes from a Whittle likelihood whose expectation is exact for the window: it includes
+    taper, gaps, detrending, aliasing, and a truncation of the spectrum if one is given
+    (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
+    those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    A likelihood's own curvature understates the error. The intervals come from a studentised
-    bootstrap (Davison and Hinkley, 1997, section 5.2), and their upper and lower ends from fields
-    of longer and shorter correlation (Carpenter, 1999), which matters for short records.
+    The curvature of the likelihood understates the error. The intervals come from a studentised
+    bootstrap (Davison and Hinkley, 1997, section 5.2), and their upper and lower ends from
+    fields of longer and shorter correlation (Carpenter, 1999), which matters for short records.
 
     Examples
     --------

@@ -62,26 +62,26 @@ def infer(
     problem : Problem
         One specimen.
     random : RandomInterface or RandomField
-        What is random, with its known parameters; its values of those in `prior` are not used.
+        The random properties with known parameters; `prior` replaces their values.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress at which each specimen slid, in `unit`; for specimens of several lengths
-        a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``, with the node
-        distance of the problem. Or from `read_peaks`.
+        Mean shear stress at which each specimen slid, in `unit`; for specimens of several
+        lengths a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``,
+        with the node spacing of the problem. Or the result of `read_peaks`.
     prior : mapping
-        Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a range
-        ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``; they are independent.
-        Keys are those of a sweep. Of the strength, ``"correlation_length"`` and
-        ``"marginal.low"`` will do; others are ``"residual_strength.marginal.high"`` or
-        ``"problem.friction.weakening_rate"``.
+        Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a
+        range ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``. Priors
+        are independent. Keys are those of a sweep: for the strength,
+        ``"correlation_length"`` or ``"marginal.low"``; for others,
+        ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
     method : LocalCriterion, Equilibrium or any other
-        How the onset is found. For all but the local criterion that one, where it holds, first
-        finds the part of the prior that matters, which grows until it holds the posterior.
+        The method that finds the onset. For all but the local criterion, that one, if applicable,
+        first finds the relevant part of the prior, which grows until it contains the posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
         coefficient.
     unit : str
-        Of peaks and load-cell error: that of a stress, or "1" for coefficients of friction, which
-        need ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error: a unit of stress, or "1" for friction
+        coefficients, which need ``Load(normal_pressure=...)``.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
         equilibrium.
@@ -99,23 +99,23 @@ def infer(
     Raises
     ------
     InputError
-        Naming all that does not fit; peaks that nothing in the prior can produce, with the bound
-        that would have to move.
+        If any argument is invalid, or no parameters in the prior can produce the peaks; the
+        message then names the bound that must move.
 
     Warns
     -----
     AccuracyWarning
-        If the posterior piles up at an end of the prior; the number of simulated samples matters;
-        or the peaks fall into groups that one population does not show.
+        If the posterior piles up at an end of the prior, the number of simulated samples
+        matters, or the peaks fall into groups that one population does not show.
 
     Notes
     -----
-    The likelihood is a kernel density of simulated onsets, joined with the error of the load cell.
-    Parameters that only shift and stretch the strength need no simulation: see
-    `stiction.inference.scaling` for when the onset follows them exactly. The others are simulated
-    on a grid with the same draws everywhere, and interpolated. The posterior is summed on a grid
-    that closes in on it, for up to four parameters or so; for more, give `log_likelihood` and
-    `prior_transform` of the result to emcee or dynesty.
+    The likelihood is a kernel density of simulated onsets, combined with the error of the
+    load cell. Parameters that only shift and stretch the strength need no simulation: see
+    `stiction.inference.scaling` for when the onset follows them exactly. The others are
+    simulated on a grid with the same draws everywhere, and interpolated. The posterior is
+    summed on a grid that closes in on it, for up to four parameters or so; for more, give
+    `log_likelihood` and `prior_transform` of the result to emcee or dynesty.
 
     Examples
     --------

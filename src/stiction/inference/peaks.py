@@ -131,7 +131,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
         coefficient of friction has the unit 1 or -. Another may be the length of the specimen:
         ``length [mm]``. Columns of other names are not read.
     unit : str, optional
-        Of the peaks, where the file states none.
+        Unit of the peaks if the file states none.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     Raises
     ------
     InputError
-        If a unit is missing or unknown, columns cannot be told apart, or a number is missing.
+        If a unit is missing or unknown, columns are ambiguous, or a number is missing.
 
     Examples
     --------

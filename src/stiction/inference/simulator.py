@@ -29,7 +29,7 @@ def simulator(
     seed: at_least(0) = 0,  # type: ignore[valid-type]
     load_cell_error: NotNegative = 0.0,
 ) -> Callable[..., Array]:
-    """Return a function from parameters to the peaks of repeated tests, for dynesty, sbi, others.
+    """Return a function that simulates the peaks of repeated tests, for dynesty or sbi.
 
     Parameters
     ----------
@@ -38,23 +38,23 @@ def simulator(
     parameters : sequence of str
         Keys as in the prior of `infer`: ``("correlation_length", "marginal.low")``.
     samples : int
-        Tests that a call simulates.
+        Number of tests that one call simulates.
     load_cell_error : float
         Standard deviation of the error of a peak, Pa.
 
     Returns
     -------
     callable
-        ``simulate(theta)``, with theta a sequence of numbers or a mapping by name, returns the
-        peaks, Pa, of shape (samples,); ``simulate(theta, first=k)`` those of samples k, k + 1, ...,
-        independent of the first ones if k >= samples. The same samples at every theta make a
-        smooth function of it.
+        ``simulate(theta)`` returns the peaks, Pa, of shape (samples,); theta is a sequence
+        of numbers or a mapping by name. ``simulate(theta, first=k)`` returns those of
+        samples k, k + 1, ..., independent of the first call if k >= samples. All theta
+        share the samples, so that peaks are smooth in theta.
 
     Raises
     ------
     InputError
-        If a parameter does not exist, or another argument does not fit; by the function, if there
-        is no problem with these parameters.
+        If a parameter does not exist or another argument is invalid. The function raises it
+        if the parameters do not make a valid problem.
 
     Examples
     --------

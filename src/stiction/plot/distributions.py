@@ -21,13 +21,13 @@ LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the density of an onset: of one ensemble, several, or along a sweep.
+    """Draw the density of the onset of one or several ensembles, or along a sweep.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo` or `Study.run`. Give several as a list, or by name. Of a sweep over one
-        parameter up to six steps are drawn.
+        From `monte_carlo` or `Study.run`. Give several as a list, or by name. For a sweep
+        over one parameter, up to six steps are drawn.
     quantity : str, optional
         A variable of the result; by default `friction_coefficient` if there is a pressure, else
         `critical_stress`. `critical_position` is drawn as a histogram.
@@ -110,14 +110,14 @@ def quantiles(
     along: str | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the median of an onset with its error, and quartiles, along a sweep.
+    """Draw the median onset with its error, and the quartiles, along a sweep.
 
     Parameters
     ----------
     result : Dataset
         From `Study.run` with a sweep over one parameter or two; the second makes curves.
     quantity : str, optional
-        As of `monte_carlo`.
+        As in `monte_carlo`.
     along : str, optional
         Dimension along the abscissa; the longest by default.
     ax : matplotlib.axes.Axes, optional
@@ -126,13 +126,13 @@ def quantiles(
     Returns
     -------
     matplotlib.axes.Axes
-        Medians with their 95 % confidence intervals; bands between quartiles, and of a single
-        curve between the 5 % and 95 % quantiles, paler.
+        Medians with their 95 % confidence intervals; bands between quartiles; for a single
+        curve, a paler band between the 5 % and 95 % quantiles.
 
     Raises
     ------
     InputError
-        If the result is not swept, or over more than two parameters.
+        If the result has no sweep, or a sweep over more than two parameters.
     """
     variable = result[shown_quantity(result, quantity)]
     dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])

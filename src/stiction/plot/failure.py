@@ -31,13 +31,13 @@ def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
-        With friction coefficients above, if there is a pressure. A dotted line marks the lower
-        bound of the strength.
+        With friction coefficients at the top if there is a normal pressure. A dotted line
+        marks the lower bound of the strength.
 
     Raises
     ------
     InputError
-        If this is no failure curve.
+        If the dataset is not a failure curve.
     """
     need(curve, "stress", "probability", "probability_low", "probability_high")
     bound, probability = float(curve.attrs["lower_bound"]), curve["probability"].values
@@ -66,7 +66,7 @@ def weak_spots(
     problem: Problem | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw failing interfaces, each moved so that it begins to slide in the middle.
+    """Draw failing interfaces, each shifted so that sliding begins in the middle.
 
     Parameters
     ----------

@@ -30,15 +30,15 @@ def field(
     quantity: str = "strength",
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a profile, or a field of which a part was measured: lines along x, on a plane a map.
+    """Draw a profile or a partly measured field: lines along x, on a plane a map.
 
     Parameters
     ----------
     where : Problem or Interface
     profile : array or RandomField
-        Of shape (nodes,) or (samples, nodes), of which the first six are drawn; on a plane (nx,
-        ny) or (samples, nx, ny), of which the first is drawn. Of a field its median, on a line the
-        band that holds it with 90 %, and what was measured (`RandomField.given`).
+        Shape (nodes,) or (samples, nodes); the first six samples are drawn. On a plane,
+        (nx, ny) or (samples, nx, ny); the first is drawn. For a field, its median, on a
+        line its central 90 % band, and the measured values (`RandomField.given`) are drawn.
     quantity : str
         Name of the property, as `RandomInterface` uses it; 'strength' (Pa) by default.
     ax : matplotlib.axes.Axes, optional

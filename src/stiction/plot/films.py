@@ -52,7 +52,7 @@ def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20)
     Raises
     ------
     InputError
-        If a variable was not kept, or the path ends otherwise.
+        If a variable was not kept, or the path does not end in .gif.
     """
     need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
     check("frames", frames, at_least(1))

@@ -47,9 +47,10 @@ def fit(found: FieldFit) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        (a) Values and the fitted marginal; (b) quantiles of the data against those of the fit;
-        (c) correlation, as the window leaves it; (d) spectrum. Shaded in (a) and (b): 90 % of the
-        fits to records simulated from the fitted field; in (c) and (d): 90 % of such records.
+        (a) Values and the fitted marginal; (b) quantiles of the data against those of the
+        fit; (c) correlation, with the effect of the window; (d) spectrum. Shaded in (a) and
+        (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
+        % of such records.
     """
     estimate = found._estimate
     windows = estimate.setting.windows
@@ -173,8 +174,8 @@ def posterior(found: Posterior) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Each parameter before (grey) and after the tests on the diagonal, with the information
-        gained (nats); pairs below; on the right the measured and predicted peaks.
+        On the diagonal, each parameter before (grey) and after the tests, with the
+        information gained (nats); pairs below; on the right the measured and predicted peaks.
     """
     names, count = found.names, len(found.names)
     size = max(2.0 * count, 4.0)

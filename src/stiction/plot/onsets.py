@@ -1,4 +1,4 @@
-"""Where each method sees sliding begin on a profile, and how slip grows before that."""
+"""Figures of the onset by each method on a profile, and of the slip before it."""
 
 import itertools
 from collections.abc import Mapping
@@ -48,14 +48,14 @@ def onset(
     sample: int = 0,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a strength profile and where sliding begins on it, by one method or several.
+    """Draw a strength profile and the position of its onset, by one or several methods.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `stiction.onset` with this strength. Give several methods as a list, or by name. On a
-        plane the critical ellipse of the local criterion is drawn, and, for an `Equilibrium` with
-        ``slip=True`` and ``sensitivity=True``, what slips at the onset.
+        From `stiction.onset` with this strength. Give several methods as a list, or by name. On
+        a plane, the critical ellipse of the local criterion is drawn and, for `Equilibrium`
+        with ``slip=True`` and ``sensitivity=True``, the slipping patches at the onset.
     strength : array
         tau_p, Pa, of shape (nodes,) or (samples, nodes); on a plane (nx, ny) or (samples, nx, ny).
     problem : Problem, optional

@@ -40,9 +40,9 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     Returns
     -------
     matplotlib.axes.Axes
-        A dot marks the onset, from which time counts. On a line, time begins shortly before the
-        onset, and what slips seven decades slower than the fastest point is white; on a plane, the
-        front is drawn at equal intervals of time on a map of the strength.
+        A dot marks the onset, where time is zero. On a line, time begins shortly before it,
+        and points that slip seven decades slower than the fastest one are white. On a
+        plane, the front is drawn at equal intervals of time on a map of the strength.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One look for every figure: sizes of a journal's columns, and lines that can be told in grey."""
+"""One style for every figure: column widths of a journal, and lines distinct in grey."""
 
 import io
 from collections.abc import Iterator
@@ -67,7 +67,7 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Draw inside this: fonts, widths and ticks of a printed page."""
+    """Set fonts, widths and ticks of a printed page for the figures drawn inside."""
     with matplotlib.rc_context(_RC):
         yield
 

@@ -86,15 +86,15 @@ def read_profile(
         'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa), 'critical_slip',
         'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or 'friction_coefficient' (1).
     interface : Interface, optional
-        Put the profile on its nodes x_i = i L/n, modulo L, in any order of its points. For a plane
-        from ``.npy`` of shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y', or text with
-        the columns x, y and value.
+        Map the profile to the nodes x_i = i L/n, modulo L, from points in any order. For a
+        plane, pass ``.npy`` of shape (nx, ny), ``.nc`` or labelled arrays over 'x' and 'y',
+        or text with the columns x, y and value.
     interpolate : bool
-        Interpolate linearly between points of a line that lie elsewhere than the nodes.
+        Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
-        Refuse missing values (NaN, empty cells, missing points), fill them with straight lines (on
-        a plane with the smoothest surface over their rim), or leave NaN, for `stiction.fit_field`.
-        Without an interface they stay in any case.
+        Refuse missing values (NaN, empty cells, missing points), fill them with straight
+        lines (on a plane with the smoothest surface over their rim), or leave NaN, for
+        `stiction.fit_field`. Without an interface, they always stay.
 
     Returns
     -------
@@ -105,8 +105,8 @@ def read_profile(
     Raises
     ------
     InputError
-        If the source cannot be read, is in an unknown or unsuitable unit, leaves open which of
-        several columns is meant, or does not fit the interface.
+        If the source cannot be read, is in an unknown or unsuitable unit, is ambiguous
+        about the columns, or does not fit the interface.
 
     Warns
     -----

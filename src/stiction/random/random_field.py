@@ -44,22 +44,22 @@ class RandomField:
         Power spectral density of the Gaussian field z.
     mean_mode : bool
         Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every
-        sample has the same mean of z, which is harmless only while the correlation length
-        is short against the interface.
+        sample has the same mean of z, which is harmless only if the correlation length is
+        short compared with the interface.
     anisotropy : float, optional
         On a plane, the correlation length along y over that along x, which is that of the
         spectrum; 1 if left out.
     of : {"friction_coefficient"}, optional
-        The field holds friction coefficients: the strength (or another stress, where the
-        field stands for one) is their product with the normal pressure.
+        The field holds friction coefficients. The strength (or the other stress that the
+        field represents) is their product with the normal pressure.
     conditions : Conditions, optional
-        What was measured of it, as `given` enters it; in a study file the table ``given``.
+        Measured values, as set by `given`; in a study file the table ``given``.
 
     Notes
     -----
     The same object serves lines and planes. A line cut through a plane along x has the
-    correlation of the field on a line, but for what truncation leaves out, which is a little
-    more on a plane. Translation process after Grigoriu (1995), spectral representation after
+    correlation of the field on a line, except that truncation removes slightly more power
+    on a plane. Translation process after Grigoriu (1995), spectral representation after
     Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
 
     Examples
@@ -95,8 +95,8 @@ class RandomField:
     def modes(self, interface: Interface) -> Modes:
         """Return the modes of this field on an interface, or raise an `InputError`.
 
-        There is none if the correlation length is too long for the interface; a line has no
-        anisotropy.
+        It raises if the correlation length is too long for the interface, or if a field on
+        a line has an anisotropy.
         """
         if self.anisotropy is not None and not interface.is_plane:
             raise InputError(
@@ -110,7 +110,7 @@ class RandomField:
         self, interface: Interface, samples: Number, seed: Number, first: Number = 0, *,
         stream: Number = 0,
     ) -> Array:  # fmt: skip
-        """Draw samples number `first`, `first` + 1, ..., standard normal numbers.
+        """Draw the standard normal numbers of samples `first`, `first` + 1, ....
 
         Draw j of sample i depends on (seed, stream, i, j) only, not on the batch or spectrum.
 
@@ -154,12 +154,12 @@ class RandomField:
         return self.mapped(interface, draws)
 
     def mapped(self, interface: Interface, draws: Array) -> Array:
-        """Map draws to profiles, whatever was measured."""
+        """Map draws to profiles, ignoring measured values."""
         return from_normal(self.marginal, self.gaussian(interface, draws))
 
     @checked
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
-        """Return the field given what was measured of it: fixed there, random elsewhere.
+        """Return the field conditioned on measured values: fixed there, random elsewhere.
 
         Parameters
         ----------
@@ -172,8 +172,8 @@ class RandomField:
         Returns
         -------
         RandomField
-            Like any other, for one interface: the one that was measured. Its samples have
-            the draws of those of this field, and tend to them as the noise grows.
+            The conditioned field, for the measured interface only. Its samples use the
+            draws of this field, and tend to the samples of this field as the noise grows.
 
         Examples
         --------
@@ -194,7 +194,7 @@ class RandomField:
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
-        """Return the quantile of the field at each node, given what was measured, (*shape)."""
+        """Return the quantile of the field at each node, given the measured values, (*shape)."""
         mean, deviation = np.zeros(interface.size), np.ones(interface.size)
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
@@ -204,7 +204,7 @@ class RandomField:
         return found.reshape(interface.shape)
 
     def measured(self, interface: Interface, factor: Any = None) -> Measured:
-        """Return what was measured, with the marginal of a factor between specimens, checked."""
+        """Return the checked measured values, with the marginal of a factor between specimens."""
         given = self.conditions
         assert given is not None
         given.check(self.marginal, interface, factor)
@@ -223,7 +223,7 @@ class RandomField:
         ----------
         interface : Interface
         samples, seed, first, stream : int
-            How many; as for `draws`. Sample i is the same in whatever batch it comes.
+            As for `draws`. Sample i does not depend on the batch.
 
         Returns
         -------
@@ -232,8 +232,8 @@ class RandomField:
         Warns
         -----
         AccuracyWarning
-            If the grid is coarser than the spectrum, or the interface is short against the
-            correlation length and the field has no mean mode.
+            If the grid is too coarse for the spectrum, or the interface is short compared
+            with the correlation length and the field has no mean mode.
         """
         draws = self.draws(interface, samples, seed, first, stream=stream)
         self.warn_if_inaccurate(interface)
@@ -242,7 +242,7 @@ class RandomField:
         return self.profiles(interface, draws)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
-        """Warn of a grid coarser than the spectrum and of an interface short against xi_0."""
+        """Warn if the grid is too coarse for the spectrum or the interface too short."""
         modes = self.modes(interface)
         lost = modes.unresolved(interface)
         if lost > LOST:
@@ -274,12 +274,12 @@ class RandomField:
         ----------
         interface : Interface
         of : {"strength", "z"}
-            Of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian one.
+            The mapped field (Hermite expansion; Grigoriu, 1995) or the Gaussian one.
 
         Warns
         -----
         AccuracyWarning
-            If the tails of the marginal are too heavy for its correlation, with the error.
+            If the tails of the marginal are too heavy for its correlation; it gives the error.
         """
         modes = self.modes(interface)
         # The field whose amplitudes are its own standard deviations.
@@ -305,8 +305,8 @@ class RandomField:
     def efolding_length(self, *, of: Of = "strength") -> float:
         """Return the distance (m) at which the correlation on a line first falls to 1/e.
 
-        That of the mapped field or of the Gaussian one, z, with truncation; on a plane
-        along x.
+        The correlation is that of the mapped field or of the Gaussian one, z, with
+        truncation; on a plane, along x.
         """
         if of == "z":
             return float(self.spectrum.efolding_length)
@@ -322,7 +322,7 @@ class RandomField:
     def with_efolding_length(self, length: Positive, *, of: Of = "strength") -> RandomField:
         """Return the same field with a correlation that falls to 1/e at `length` (m).
 
-        Of the mapped field or of the Gaussian one, z.
+        The correlation is that of the mapped field or of the Gaussian one, z.
         """
         if isinstance(self.spectrum, CustomSpectrum):
             raise InputError("spectrum: a spectrum of your own has no length that could be set")

@@ -93,13 +93,13 @@ class Stream(NamedTuple):
 
 @model(kw_only=True)
 class RandomInterface:
-    """What is random along an interface: the strength, and whatever else varies.
+    """The random properties of an interface: the strength, and any others that vary.
 
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``,
-        which the normal pressure turns into strength. So may be the other stresses.
+        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which
+        are multiplied by the normal pressure. The other stresses may be coefficients too.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Pa.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
@@ -117,10 +117,10 @@ class RandomInterface:
     Notes
     -----
     Correlated translation fields after Grigoriu (1995): the draws of a property are a
-    combination, by the Cholesky factor of the correlation matrix, of independent draws of
-    its own and of the properties before it in the list above. So a property keeps its draws
-    whatever else is random, unless it is correlated with one before it. Where spectra differ,
-    the correlation of the fields at a point is a little less than that of the modes.
+    combination, by the Cholesky factor of the correlation matrix, of independent draws of its
+    own and of the properties before it in the list above. So a property keeps its draws
+    regardless of the other properties, unless it is correlated with one before it. Where spectra
+    differ, the correlation of the fields at a point is a little less than that of the modes.
 
     Examples
     --------
@@ -201,12 +201,12 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """What is random, by name, in the order of `stiction.problem.PROFILES`."""
+        """The random properties by name, in the order of `stiction.problem.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of what is random."""
+        """Names of the random properties."""
         return tuple(self.properties)
 
     @property
@@ -233,14 +233,14 @@ class RandomInterface:
     def draws(
         self, interface: Interface, samples: Number, seed: Number, first: Number = 0
     ) -> Array:
-        """Draw samples number `first`, `first` + 1, ..., independent standard normal numbers.
+        """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
 
         Draw j of a property of sample i depends on (seed, property, i, j) only.
 
         Returns
         -------
         (samples, dimension) array
-            Those of each property side by side, in the order of `names`; then of `between`.
+            Draws of each property side by side, in the order of `names`; then those of `between`.
         """
         each = self.dimension(interface) + len(self.names) * interface.size
         check_memory("samples", 8.0 * samples * each)
@@ -273,7 +273,7 @@ class RandomInterface:
     def profiles(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> dict[str, Array]:
-        """Sampled profiles by name, (samples, *shape) each, in the unit of each property.
+        """Sample profiles by name, (samples, *shape) each, in the unit of each property.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class RandomInterface:
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
-        """Warn of fields that the grid or the interface cannot do justice to."""
+        """Warn if the grid is too coarse or the interface too short for a field."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
         for _, known in _conditioned(self, interface):
@@ -321,7 +321,7 @@ def _conditioned(
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
     """What was measured, for each group of correlated properties, with the columns of its draws.
 
-    The last column is that of the factor between specimens that it tells of, if any.
+    The last column is that of the factor between specimens on which it depends, if any.
     """
     streams, names, between = _layout(random, interface), random.names, random.between or {}
     columns = [np.r_[stream.columns] for stream in streams]

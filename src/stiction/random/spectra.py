@@ -39,7 +39,7 @@ class SpectralDensity:
 
     power_kept: float | None
     default_power: ClassVar[float] = 0.9997
-    """Share of the power kept by truncation if nothing is given."""
+    """Share of the power retained by truncation if nothing is given."""
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         """Return the density at wave vectors of length k (rad/m), up to a factor."""
@@ -211,7 +211,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     truncation : float, optional
         Truncation in multiples of lambda; 2.5 if neither this nor `power_kept` is given.
     power_kept : float, optional
-        Share of the power kept by truncation, in (0, 1).
+        Share of the power retained by truncation, in (0, 1).
 
     Notes
     -----
@@ -258,8 +258,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     correlation_length : float
         xi_0, m: without truncation the correlation of z is 1/e there.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or by the share of the power that is kept;
-        0.9997 of the power if neither is given.
+        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained;
+        the default retains 0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -285,8 +285,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
-    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is kept
-    if nothing else is given, since every further nine takes ten times as many modes.
+    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is
+    retained by default, since every further nine takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"
@@ -309,7 +309,7 @@ def _refuse_to_write(function: Any) -> Any:
 
 @model
 class CustomSpectrum(SpectralDensity):
-    """A spectrum of your own: any g(k), up to a factor.
+    """User-defined spectrum: any g(k), up to a factor.
 
     Parameters
     ----------
@@ -321,15 +321,15 @@ class CustomSpectrum(SpectralDensity):
     max_wavenumber : float, optional
         Truncation, rad/m; by `power_kept` if left out.
     power_kept : float, optional
-        Share of the power kept by truncation; 0.9997 if neither is given.
+        Share of the power retained by truncation; 0.9997 if neither is given.
     break_points : sequence of float
         Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than
         a tenth of an octave needs its two ends here, or it may be missed.
 
     Notes
     -----
-    For Python only: a study with a function of your own cannot be written to a file. The function
-    is integrated by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
+    It exists in Python only: a study with a function cannot be written to a file. The
+    function is integrated by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
     """
 
     function: Annotated[

@@ -66,15 +66,15 @@ def design_stress(
 ) -> DesignStress:
     """Estimate the stress below which the interface slides with a given probability.
 
-    The quantile of the stress at onset, from one set of repetitions of subset simulation.
+    This is a quantile of the onset stress, from one set of repetitions of subset simulation.
 
     Parameters
     ----------
     probability : float
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
-        `Rupture`, and a method that would take more than a quarter of an hour on one core, is
-        refused unless `max_evaluations` is 20,000 or more.
+        `Rupture`, or a method that would take more than a quarter of an hour on one core,
+        is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
     problem, random, seed, workers, progress
@@ -90,13 +90,13 @@ def design_stress(
     Raises
     ------
     InputError
-        Naming everything that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Warns
     -----
     AccuracyWarning
-        If the evaluations allowed do not suffice, the onset piles up on the bound, or samples
-        about the stress fail otherwise by equilibrium than by the local criterion.
+        If the allowed evaluations do not suffice, onsets accumulate at the bound, or
+        equilibrium and the local criterion disagree on samples near the stress.
 
     Examples
     --------
@@ -162,9 +162,9 @@ def failure_curve(
     Parameters
     ----------
     smallest : float
-        Probability down to which the curve goes.
+        Smallest probability of the curve.
     points_per_decade : int
-        Stresses a factor of ten in probability.
+        Number of stresses per decade of probability.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
     problem, random, seed, workers, progress
@@ -185,13 +185,13 @@ def failure_curve(
     Raises
     ------
     InputError
-        Naming everything that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Warns
     -----
     AccuracyWarning
-        If the evaluations allowed do not suffice, or samples at the end of the curve fail
-        otherwise by equilibrium than by the local criterion.
+        If the allowed evaluations do not suffice, or equilibrium and the local criterion
+        disagree on samples at the end of the curve.
 
     Examples
     --------

@@ -69,29 +69,29 @@ def failure_probability(
     Parameters
     ----------
     problem, random, seed, workers, progress
-        As in `monte_carlo`. How many samples it will take is not known beforehand.
+        As in `monte_carlo`. The total number of samples is an estimate.
     stress : float, optional
-        Mean interface stress that it must hold, Pa. Failure is an onset strictly below it.
+        Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        The method that finds the onset. By `Rupture` failures are counted; so are they by any
-        method that is too slow for subset simulation, unless `max_evaluations` is 20,000 or more.
+        The method. `Rupture`, and any method too slow for subset simulation, is used with
+        plain Monte Carlo unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
-        Instead of `stress`: mean shear stress over mean normal pressure that it must hold. Where
-        the pressure is random, each sample's own pressure counts.
+        Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
+        carry. If the pressure is random, each sample's own pressure counts.
     algorithm : {"auto", "plain", "subset", "two_level"}
-        Plain Monte Carlo; subset simulation; or subset simulation by the local criterion with
-        equilibrium at its end. 'auto' solves a thousand plain samples; if 1 % of them fail it
-        counts failures among others. Otherwise it takes two levels for equilibrium if the local
-        criterion picks the same samples as the weakest and most of what it leads to is not
-        wasted, else subset simulation. `reason` in the result gives the choice and its cause.
+        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
+        equilibrium as the last level. 'auto' solves a thousand plain samples; if 1 % of them
+        fail, it continues with plain Monte Carlo. Otherwise it takes two levels for equilibrium
+        if the local criterion picks the same weakest samples and wastes few evaluations, else
+        subset simulation. `reason` in the result gives the choice and its cause.
     target_cv : float
         Coefficient of variation to reach.
     max_evaluations : int, optional
-        Most samples the method is asked for: by default 2,000,000 by the local criterion, 200,000
-        by equilibrium, 1,000 by rupture. If they do not suffice, the result holds what there is
-        and a warning.
+        Largest number of samples to solve: by default 2,000,000 by the local criterion,
+        200,000 by equilibrium, 1,000 by rupture. If they do not suffice, the result holds
+        the estimate so far and a warning.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become unstable,
         arrested or not. By the local criterion they are the same.
@@ -104,14 +104,14 @@ def failure_probability(
     Raises
     ------
     InputError
-        Naming everything that does not fit.
+        If any argument is invalid; the message lists every problem.
 
     Warns
     -----
     AccuracyWarning
-        If the estimate is not to be trusted; `warnings` in the result holds the same texts. By the
-        local criterion some samples about the stress are solved by equilibrium too, and both
-        probabilities are given if they differ by more than their error.
+        If the estimate is unreliable; `warnings` in the result holds the same texts. With
+        the local criterion, some samples near the stress are also solved by equilibrium,
+        and both probabilities are given if they differ by more than their error.
     UnitWarning
         If the stress is below a thousandth of the mean strength.
 

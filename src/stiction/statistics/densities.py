@@ -49,8 +49,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     ----------
     values : (samples,) array
     bounds : (float or None, float or None)
-        Lower and upper bound of the distribution where it has them, in the unit of the
-        values: for strength those of its marginal.
+        Lower and upper bound of the distribution, if any, in the unit of the values; for
+        strength, those of its marginal.
 
     Notes
     -----
@@ -59,12 +59,12 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     reflected at the bounds; the time of diffusion, and so the bandwidth, solves their
     fixed-point equation (14) without reference to a normal distribution.
 
-    A density that vanishes at a bound would be made positive there. So the share of values
-    within a distance d of a bound is first fitted by d^b (Hill, 1975). If b is significantly
-    above 1, the estimate is that of d + c log(1 - exp(-(d + e)/c)), with the median distance c
-    and the distance e of the eighth nearest value: near the bound a logarithm, for which the
-    kernel narrows towards the bound, and far from it d itself. Where there is no bound the
-    grid reaches beyond the sample.
+    This would make a density that vanishes at a bound positive there. So the share of
+    values within a distance d of a bound is first fitted by d^b (Hill, 1975). If b is
+    significantly above 1, the estimate is that of d + c log(1 - exp(-(d + e)/c)), with the
+    median distance c and the distance e of the eighth nearest value: near the bound a
+    logarithm, for which the kernel narrows towards the bound, and far from it d itself.
+    Without a bound, the grid extends beyond the sample.
 
     Examples
     --------

@@ -105,21 +105,21 @@ class Combined:
 
 
 def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
-    """Estimate the mean of an expensive result of few samples, with the help of others of more.
+    """Estimate the mean of few expensive results, with many inexpensive ones as controls.
 
-    Such as onsets by `Rupture`, `Equilibrium` and `LocalCriterion` of one seed.
+    The results may be onsets by `Rupture`, `Equilibrium` and `LocalCriterion` with one seed.
 
     Parameters
     ----------
     expensive : (n,) array
-        Of samples 0 .. n - 1, at least three.
+        Results of samples 0 to n - 1, at least three.
     *inexpensive : (N_1,), (N_2,), ... arrays
-        Of the same samples first and then of more, each at least as long as the one before.
+        Results of the same samples first and then of more; each is at least as long as the last.
 
     Notes
     -----
     With n expensive results the error has n - 2 degrees of freedom, since mean and weight
-    are estimated from them: of few results, use the interval and not twice the error.
+    are estimated from them: for small n, use the interval and not twice the error.
 
     Examples
     --------
@@ -201,9 +201,9 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Share = 0.95) ->
     Notes
     -----
     The number of values below the p-quantile is binomial (N, p); the interval runs between
-    the order statistics whose ranks hold it with the asked probability (David and Nagaraja,
-    2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole
-    ranks.
+    the order statistics whose ranks contain it with the given confidence (David and
+    Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded
+    up to whole ranks.
 
     Examples
     --------

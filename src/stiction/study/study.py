@@ -57,7 +57,7 @@ T = TypeVar("T")
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
 ]
-"""Any registered method; in a study file ``type`` says which."""
+"""Any registered method; in a study file ``type`` selects it."""
 
 
 def _interface(value: Any) -> Any:
@@ -72,7 +72,7 @@ else:
 
 @model(kw_only=True)
 class Study:
-    """Everything that defines a Monte Carlo study.
+    """Definition of a Monte Carlo study.
 
     The same names serve Python and TOML; a study read from the attributes of a result runs again
     to the same numbers.
@@ -81,7 +81,7 @@ class Study:
     ----------
     problem : Problem
     random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa.
+        The random properties; a field alone is the peak strength, Pa.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
@@ -89,15 +89,15 @@ class Study:
         of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
         the sweep has the same samples.
     save : Save, optional
-        What `stiction rupture` keeps of one rupture, and where its stations are.
+        Results that `stiction rupture` keeps, and the places of its stations.
     title : str
-        For people.
+        Title of the study, for readers.
 
     Raises
     ------
     InputError
-        Naming every key that is missing, unknown or out of range, and the points of the sweep
-        that make no valid study.
+        If a key is missing, unknown or out of range, or a point of the sweep is not a valid
+        study; the message lists every problem.
 
     Examples
     --------
@@ -136,7 +136,7 @@ class Study:
 
     @property
     def points(self) -> list[Point]:
-        """The points of the sweep, in order; one without values if nothing is swept."""
+        """The points of the sweep, in order; without a sweep, one point without values."""
         keys = [key for axis in self.sweep for key in axis.keys]
         steps = itertools.product(*(axis.steps for axis in self.sweep))
         return [
@@ -146,7 +146,7 @@ class Study:
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """What is to be computed at each point; what points share is made once.
+        """The experiment at each point; objects that points share are built once.
 
         A mistake is reported once, with the points where it is.
         """
@@ -196,10 +196,10 @@ class Study:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """What a result says about itself: enough to run it again."""
+        """Attributes of a result, from which the study can be run again."""
         try:
             found: dict[str, Any] = {"study": self.to_dict()}
-        except InputError as error:  # a function of the user's: the result says so
+        except InputError as error:  # a function of the user's: the result states it
             found = {"study_incomplete": str(error)}
         title = {"title": self.title} if self.title else {}
         return found | {"seed": self.ensemble.seed} | title
@@ -217,20 +217,20 @@ class Study:
         part: Any = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
-        """Run it, or what is missing of it.
+        """Run the study, or the part of it that is missing.
 
         Parameters
         ----------
         out : path, optional
-            A folder in which results are stored as they are done. The same call goes on where a
-            run was interrupted, and computes only what is new if `samples` was raised.
+            Folder in which results are stored as they are computed. The same call resumes
+            an interrupted run, and computes only the new samples if `samples` was raised.
         workers, executor, progress, time_limit, pilot
             See `stiction.monte_carlo`.
         retry : bool
             Compute stored samples that failed again.
         part : (int, int) or str, optional
-            Compute one part of so many only, such as (3, 100) or "3/100", into the same folder as
-            the other parts: for jobs that do not know of each other.
+            Compute only one of several parts, such as (3, 100) or "3/100", into the same
+            folder as the other parts: for independent jobs.
 
         Returns
         -------
@@ -269,12 +269,12 @@ class Study:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers, as in TOML.
+        """Return plain dictionaries, lists and numbers, as in TOML.
 
         Raises
         ------
         InputError
-            If something in it exists in Python only (a spectrum that is a function).
+            If a part exists in Python only (a spectrum that is a function).
         """
         plain: dict[str, Any] = to_plain(self)
         for name in ("title", "sweep"):
@@ -283,9 +283,9 @@ class Study:
         return plain
 
     def to_toml(self, path: str | Path) -> None:
-        """Write it as a TOML file.
+        """Write the study as a TOML file.
 
-        What exists in Python only, and a file that cannot be written, are an `InputError`.
+        It raises an `InputError` if a part exists in Python only or the file cannot be written.
         """
         text = tomli_w.dumps(self.to_dict())
         try:
@@ -295,7 +295,7 @@ class Study:
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
-        """A study from plain dictionaries; file names of profiles are relative to `folder`.
+        """Make a study of plain dictionaries; paths of profiles are relative to `folder`.
 
         A key that is swept need not have a value of its own.
         """
@@ -303,13 +303,13 @@ class Study:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
-        """A study from a TOML file."""
+        """Read a study from a TOML file."""
         file = Path(check("path", path, FilePath))
         return cls.from_dict(_read_toml(file), folder=file.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
-        """The study that made a result."""
+        """Return the study that produced a result."""
         check("result", result, xr.Dataset)
         if "study" not in result.attrs:
             raise InputError(
@@ -342,7 +342,7 @@ def study_schema() -> dict[str, Any]:
 
 @model(kw_only=True)
 class Setup:
-    """What a study file says of one interface; what is random is not looked at."""
+    """The interface that a study file describes, without its random properties."""
 
     problem: Problem
     method: AnyMethod | None = None
@@ -354,7 +354,7 @@ class Setup:
 
 
 def read_setup(path: Path) -> Setup:
-    """Read what a study file says of one interface; of a sweep, the first values."""
+    """Read one interface from a study file; of a sweep, the first values."""
     return _read(Setup, _read_toml(path), path.parent)
 
 
@@ -388,7 +388,7 @@ def open_run(path: Any) -> StoredRun:
     Parameters
     ----------
     path : path
-        Its folder, as given to `Study.run` or ``stiction run --out``.
+        Folder of the run, as given to `Study.run` or ``stiction run --out``.
 
     Returns
     -------
@@ -398,9 +398,9 @@ def open_run(path: Any) -> StoredRun:
     Raises
     ------
     InputError
-        If it is no path.
+        If `path` is not a path.
     StoreError
-        If there is no run, or it cannot be read.
+        If the folder holds no run, or the run cannot be read.
     """
     place = check("path", path, FilePath)
     if not place.is_dir():
