@@ -70,36 +70,26 @@ def pytest_sessionfinish(session):
 
 @pytest.fixture
 def solid():
-    import stiction as st
+    from setups import SOLID
 
-    return st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
+    return SOLID
 
 
 @pytest.fixture
-def problem(solid):
+def problem():
     """The paper's system with the modulus G/(1-nu) that it prints, 256 nodes."""
-    import stiction as st
+    from setups import make_problem
 
-    return st.Problem(
-        solid, st.Interface(length=0.1, nodes=256), st.LinearWeakening(weakening_rate=0.5e12)
-    )
+    return make_problem()
 
 
 @pytest.fixture
 def make_strength(problem):
     """The paper's random strength at a given xi_0/h_n."""
-    import stiction as st
+    from setups import beta_strength
 
     def make(ratio=0.5, **options):
-        return st.RandomField(
-            marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-            spectrum=st.PowerLawSpectrum(
-                correlation_length=ratio * problem.nucleation_length,
-                exponent=4.0,
-                truncation=2.5,
-            ),
-            **options,
-        )
+        return beta_strength(ratio * problem.nucleation_length, truncation=2.5, **options)
 
     return make
 

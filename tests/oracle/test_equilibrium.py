@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.linalg import circulant
-from scipy.optimize import linprog
+from setups import by_linear_programme, make_problem
 
 import stiction as st
 import stiction.equilibrium.dense
@@ -20,27 +20,13 @@ from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, plane_onset
 
 
-def by_linear_programme(problem, strength, rate=None):
-    """max tau_0: (K - W) d + s - tau_0 p >= 0, d >= 0, by the simplex method of HiGHS."""
-    n = problem.interface.nodes
+def largest_load(problem, strength, rate=None):
     if rate is None:
         rate = problem.friction.weakening_rate
-    column = stiffness_column(n, problem.interface.length, problem.effective_modulus)
-    unit = float(np.max(rate))  # slip in units that make the matrix of order one
-    matrix = (circulant(column) - np.diag(np.broadcast_to(rate, n))) / unit
-    profile = np.broadcast_to(problem.load.profile, n)
-    excess = (strength - problem.load.initial_stress) / 1e6
-    # HiGHS keeps feasibility to 1e-7 at worst, 1e-10 on request; its vertex is exact.
-    result = linprog(
-        np.r_[np.zeros(n), -1.0],
-        A_ub=np.c_[-matrix, profile],
-        b_ub=excess,
-        bounds=[(0, None)] * n + [(None, None)],
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    assert result.status == 0
-    return result.x[-1] * 1e6
+    line, load = problem.interface, problem.load
+    column = stiffness_column(line.nodes, line.length, problem.effective_modulus)
+    excess = strength - load.initial_stress
+    return by_linear_programme(circulant(column), rate, excess, load.profile)[0]
 
 
 def by_relaxation(problem, strength, load, limit=200_000, rate=None):
@@ -68,23 +54,21 @@ def by_relaxation(problem, strength, load, limit=200_000, rate=None):
 def test_linear_programme(problem, make_strength, ratio):
     tau_p = make_strength(ratio).sample(problem.interface, samples=3, seed=7)
     ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
-    theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+    theirs = [largest_load(problem, profile) for profile in tau_p]
     np.testing.assert_allclose(ours, theirs, rtol=1e-11)
 
 
-def test_linear_programme_with_everything_varying(solid, make_strength):
+def test_linear_programme_with_everything_varying(make_strength):
     x = np.arange(256) / 256
     load = st.Load(
         profile=1.0 + 0.3 * np.cos(2 * np.pi * x), initial_stress=1e5 * np.sin(4 * np.pi * x)
     )
     rate = 0.4e12 * (1.0 + 0.6 * np.sin(6 * np.pi * x))
     for mode in ("II", "III"):
-        problem = st.Problem(
-            solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=rate), load, mode
-        )
+        problem = make_problem(load=load, mode=mode, weakening_rate=rate)
         tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
         ours = st.onset(problem, tau_p, method=Equilibrium())
-        theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+        theirs = [largest_load(problem, profile) for profile in tau_p]
         np.testing.assert_allclose(ours.critical_load, theirs, rtol=1e-11)
         assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
         # The mean stress differs from the load factor here.
@@ -92,23 +76,21 @@ def test_linear_programme_with_everything_varying(solid, make_strength):
         np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
 
 
-def test_uniform_critical_slip(solid, make_strength):
-    friction = st.LinearWeakening(critical_slip=2e-6)
-    problem = st.Problem(solid, st.Interface(0.1, 256), friction)
+def test_uniform_critical_slip(make_strength):
+    problem = make_problem(critical_slip=2e-6)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
     ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
-    theirs = [by_linear_programme(problem, profile, profile / 2e-6) for profile in tau_p]
+    theirs = [largest_load(problem, profile, profile / 2e-6) for profile in tau_p]
     np.testing.assert_allclose(ours, theirs, rtol=1e-11)
 
 
 def test_interface_shorter_than_a_critical_patch(solid, make_strength):
     # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
-    interface = st.Interface(0.1, 128)
     rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
-    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=rate))
-    tau_p = make_strength(2.0).sample(interface, samples=4, seed=10)
+    problem = make_problem(128, weakening_rate=rate)
+    tau_p = make_strength(2.0).sample(problem.interface, samples=4, seed=10)
     onset = st.onset(problem, tau_p, method=Equilibrium(slip=True))
-    theirs = [by_linear_programme(problem, profile) for profile in tau_p]
+    theirs = [largest_load(problem, profile) for profile in tau_p]
     np.testing.assert_allclose(onset.first_instability, theirs, rtol=1e-11)
     assert np.all(onset.first_instability.values <= tau_p.mean(axis=1) * (1 + 1e-12))
 
@@ -127,13 +109,11 @@ def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
 
 
 @pytest.mark.parametrize("rough", [0.0, 0.4])
-def test_transforms_agree_with_the_dense_factor(solid, make_strength, monkeypatch, rough):
+def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, rough):
     """Lines on which very many nodes slip are solved as planes are."""
     x = np.arange(2048) / 2048
     rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
-    problem = st.Problem(
-        solid, st.Interface(0.2, 2048), st.LinearWeakening(weakening_rate=rate)
-    )
+    problem = make_problem(2048, 0.2, weakening_rate=rate)
     program = LineProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     samples = [program.sample_of(rows, row) for row in range(4)]
@@ -160,11 +140,9 @@ def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
     assert 0.7e6 < found.lower < 0.701e6
 
 
-def test_onset_of_a_long_line(solid, make_strength):
+def test_onset_of_a_long_line(make_strength):
     """Certified, and with the quick test for arrest, as shorter lines are."""
-    problem = st.Problem(
-        solid, st.Interface(0.4, 4096), st.LinearWeakening(weakening_rate=0.5e12)
-    )
+    problem = make_problem(4096, 0.4)
     tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
     onset = st.onset(problem, tau_p, method=Equilibrium(sensitivity=True))
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
@@ -172,16 +150,15 @@ def test_onset_of_a_long_line(solid, make_strength):
     np.testing.assert_allclose(onset.first_instability, loads, rtol=1e-11)
 
 
-def test_patches_alike_on_a_long_interface(solid):
+def test_patches_alike_on_a_long_interface():
     """Thirty-two periods of a profile let go at the load of one: all patches are singular at once.
 
     By symmetry there is a multiplier with the period of the profile.
     """
     dip = 1e6 + 0.3e6 * np.cos(2.0 * np.pi * np.arange(128) / 128)
-    friction = st.LinearWeakening(weakening_rate=0.5e12)
     loads = []
     for periods in (1, 32):
-        problem = st.Problem(solid, st.Interface(0.0135 * periods, 128 * periods), friction)
+        problem = make_problem(128 * periods, 0.0135 * periods)
         program = LineProgram(problem)
         found = program.programme(program.sample_of(problem.sample(np.tile(dip, periods)), 0))
         assert found is not None
@@ -191,14 +168,9 @@ def test_patches_alike_on_a_long_interface(solid):
 
 @pytest.mark.parametrize("high", [1.66e6, 4.0e6])
 @pytest.mark.parametrize("low", [0.1e6, 0.66e6])
-def test_events_against_relaxation(problem, low, high):
+def test_events_against_relaxation(problem, make_strength, low, high):
     """Wide ranges of strength: nodes reach the floor, patches are arrested."""
-    strength = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=low, high=high),
-        spectrum=st.PowerLawSpectrum(
-            correlation_length=0.5 * problem.nucleation_length, exponent=4.0, truncation=2.5
-        ),
-    )
+    strength = make_strength(0.5, low=low, high=high)
     tau_p = strength.sample(problem.interface, samples=2, seed=13)
     onset = st.onset(problem, tau_p, method=Equilibrium())
     for row, profile in enumerate(tau_p):
@@ -213,11 +185,8 @@ def test_events_against_relaxation(problem, low, high):
         assert by_relaxation(problem, profile, 1.001 * load) is None
 
 
-def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
+def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength):
     """Most samples slide at the first instability; the few that do not are not an artefact."""
-    problem = st.Problem(
-        solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12)
-    )
     tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
     onset = st.onset(problem, tau_p, method=Equilibrium())
     arrested = np.flatnonzero(onset.arrested_events.values)
@@ -232,14 +201,13 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(solid, make_strength):
     first = onset.first_instability.values[row]
     path = equilibrium_path(problem, tau_p[row], first * np.array([1 - 1e-12, 1 + 1e-9]))
     added = (path.slip[1] - path.slip[0]).values
-    moment = solid.shear_modulus * added.sum() * problem.interface.spacing
+    modulus = problem.solid.shear_modulus
+    moment = modulus * added.sum() * problem.interface.spacing
     event = path.isel(event=0)
     # Slip is steep in the load just before the event: 1e-12 of the load counts.
     assert event.event_moment.item() == pytest.approx(moment, rel=1e-2)
     assert added.max() / 5 < event.event_mean_slip.item() < added.max()
-    share = (
-        event.event_mean_slip * event.event_length * solid.shear_modulus / event.event_moment
-    )
+    share = event.event_mean_slip * event.event_length * modulus / event.event_moment
     assert 0.9 < share.item() <= 1.0  # the patch has most of the moment
     events = st.onset(problem, tau_p, method=Equilibrium(events=8))
     count = np.isfinite(events.event_stress).sum("event")
@@ -266,12 +234,11 @@ def test_residual_strength_only_shifts_the_stress(problem, make_strength):
 
 
 @pytest.mark.parametrize("law", ["weakening_rate", "critical_slip"])
-def test_nodes_that_do_not_weaken(problem, solid, make_strength, law):
+def test_nodes_that_do_not_weaken(make_strength, law):
     """Where tau_p is not above tau_r strength is constant; against relaxation with that law."""
+    given = {} if law == "weakening_rate" else {"critical_slip": 3e-6}
+    problem = make_problem(residual_strength=0.8e6, **given)
     tau_p = 2.0 * make_strength(0.5).sample(problem.interface, samples=2, seed=16) - 0.8e6
-    given = {"weakening_rate": 0.5e12} if law == "weakening_rate" else {"critical_slip": 3e-6}
-    friction = st.LinearWeakening(residual_strength=0.8e6, **given)
-    problem = st.Problem(solid, problem.interface, friction)
     constant = tau_p <= 0.8e6
     assert constant.any(axis=1).all()
     with pytest.warns(
@@ -289,11 +256,10 @@ def test_nodes_that_do_not_weaken(problem, solid, make_strength, law):
 
 
 @pytest.mark.parametrize("above", [1e-13, 1e-9])
-def test_flat_stretches_just_above_the_residual(solid, make_strength, above):
+def test_flat_stretches_just_above_the_residual(make_strength, above):
     """Cut off at the residual strength, 1e-13 or 1e-9 of it above: an onset, and soon."""
     floor = 0.99e6
-    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=floor)
-    problem = st.Problem(solid, st.Interface(0.1, 256), friction)
+    problem = make_problem(residual_strength=floor)
     tau_p = np.maximum(
         make_strength(0.5).sample(problem.interface, samples=3, seed=0), floor * (1.0 + above)
     )
@@ -305,19 +271,15 @@ def test_flat_stretches_just_above_the_residual(solid, make_strength, above):
     assert onset.arrested_events.max() < 30
 
 
-def test_estimated_error_is_of_the_size_of_the_error(solid):
+def test_estimated_error_is_of_the_size_of_the_error(make_strength):
     """Against the same fields on a grid eight times as fine."""
-    fine, friction = st.Interface(0.1, 2048), st.LinearWeakening(weakening_rate=0.5e12)
-    reference = st.Problem(solid, fine, friction)
-    tau_p = st.paper.strength(reference, correlation_ratio=0.25).sample(
-        fine, samples=40, seed=3
-    )
+    reference = make_problem(2048)
+    tau_p = make_strength(0.25).sample(reference.interface, samples=40, seed=3)
     exact = st.onset(reference, tau_p, method=Equilibrium()).first_instability.values
     for nodes, resolves in ((256, 8.8), (512, 17.7)):
-        problem = st.Problem(solid, st.Interface(0.1, nodes), friction)
-        assert problem.nucleation_length / problem.interface.spacing == pytest.approx(
-            resolves, rel=0.01
-        )
+        problem = make_problem(nodes)
+        in_length = problem.nucleation_length / problem.interface.spacing
+        assert in_length == pytest.approx(resolves, rel=0.01)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", st.AccuracyWarning)
             onset = st.onset(
@@ -334,18 +296,9 @@ def test_estimated_error_is_of_the_size_of_the_error(solid):
 
 
 @pytest.mark.parametrize("high", [1.66e6, 2.66e6])
-def test_sliding_is_proved(solid, high):
+def test_sliding_is_proved(problem, make_strength, high):
     """Without any length taken for unstoppable, the same loads and events."""
-    problem = st.Problem(
-        solid, st.Interface(0.1, 256), st.LinearWeakening(weakening_rate=0.5e12)
-    )
-    strength = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=high),
-        spectrum=st.PowerLawSpectrum(
-            correlation_length=0.5 * problem.nucleation_length, exponent=4.0, truncation=2.5
-        ),
-    )
-    tau_p = strength.sample(problem.interface, samples=200, seed=17)
+    tau_p = make_strength(0.5, high=high).sample(problem.interface, samples=200, seed=17)
     plain = st.onset(problem, tau_p, method=Equilibrium())
     program = LineProgram(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
