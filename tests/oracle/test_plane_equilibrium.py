@@ -6,32 +6,37 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
+from setups import (
+    LENGTH,
+    RATE,
+    beta_strength,
+    by_linear_programme,
+    make_problem,
+    smooth_noise,
+)
 
 import stiction as st
 from stiction.elasticity.line import stiffness_column
 from stiction.elasticity.operator import stiffness_symbol
 
-RATE = 0.5e12
-LENGTH = 3.46e-3  # nucleation length h_n along x
 NODES = (24, 24)
+SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)
 
 
-def noise(correlation, rng, shape=NODES):
-    """Smooth field between 0 and 1; correlation length in nodes."""
-    k = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :])
-    field = np.fft.irfft2(
-        np.fft.rfft2(rng.standard_normal(shape)) * np.exp(-((correlation * k) ** 2)), shape
+def noise(correlation, seed, shape=NODES):
+    return smooth_noise(correlation, np.random.default_rng(seed), shape)
+
+
+def symbol_of(problem):
+    interface, solid = problem.interface, problem.solid
+    return stiffness_symbol(
+        interface.shape, interface.lengths, problem.effective_modulus, solid.shear_modulus
     )
-    return (field - field.min()) / np.ptp(field)
 
 
 def dense_stiffness(problem):
     """K as a matrix, column by column."""
-    interface, solid = problem.interface, problem.solid
-    symbol = stiffness_symbol(
-        interface.shape, interface.lengths, problem.effective_modulus, solid.shear_modulus
-    )
+    interface, symbol = problem.interface, symbol_of(problem)
     columns = []
     for node in range(interface.size):
         unit = np.zeros(interface.shape)
@@ -40,40 +45,24 @@ def dense_stiffness(problem):
     return np.array(columns).T
 
 
-def by_linear_programme(problem, sample):
-    """max tau_0: (K - W) d + tau_p - tau_i - tau_0 p >= 0, d >= 0, by HiGHS; onset and slip."""
-    excess = (sample.strength - sample.initial_stress)[0].ravel() / 1e6
-    matrix = (dense_stiffness(problem) - np.diag(sample.weakening_rate[0].ravel())) / RATE
-    result = linprog(
-        np.r_[np.zeros(excess.size), -1.0],
-        A_ub=np.c_[-matrix, sample.load_profile.ravel()],
-        b_ub=excess,
-        bounds=[(0, None)] * excess.size + [(None, None)],
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    assert result.status == 0
-    return result.x[-1] * 1e6, -result.ineqlin.marginals.reshape(NODES)
-
-
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")  # 24 nodes are few
 @pytest.mark.parametrize("seed", range(4))
-def test_onset_and_sensitivity_equal_the_linear_programme(solid, seed):
+def test_onset_and_sensitivity_equal_the_linear_programme(seed):
     rng = np.random.default_rng(seed)
-    problem = st.Problem(
-        solid,
-        st.Interface((3.0 * LENGTH, 3.0 * LENGTH), NODES),
-        st.LinearWeakening(weakening_rate=RATE * (0.8 + 0.3 * noise(6.0, rng))),
-        load=st.Load(profile=1.0 + 0.4 * noise(6.0, rng), initial_stress=2e5 * noise(3.0, rng)),
-    )
+    rate = RATE * (0.8 + 0.3 * noise(6.0, rng))
+    load = st.Load(profile=1.0 + 0.4 * noise(6.0, rng), initial_stress=2e5 * noise(3.0, rng))
+    problem = make_problem(NODES, SQUARE, load=load, weakening_rate=rate)
     strength = 0.66e6 + 1e6 * noise(rng.choice([2.0, 4.0, 8.0]), rng)
     sample = problem.sample(strength)
-    exact, multiplier = by_linear_programme(problem, sample)
+    excess = (sample.strength - sample.initial_stress)[0].ravel()
+    exact, _, multiplier = by_linear_programme(
+        dense_stiffness(problem), rate.ravel(), excess, sample.load_profile.ravel()
+    )
     found = st.onset(problem, strength, method=st.Equilibrium(gap=1e-10, sensitivity=True))
     mean = sample.initial_stress.mean() + exact * sample.load_profile.mean()
     assert found["first_instability"].item() == pytest.approx(mean, rel=1e-9)
     assert found["certified"].item()
-    sensitivity = multiplier * sample.load_profile.mean()
+    sensitivity = multiplier.reshape(NODES) * sample.load_profile.mean()
     # The multiplier is that of a load 1e-10 off, with a quadratic fold between: the root of it.
     error = np.abs(found["sensitivity"].values[0] - sensitivity).max()
     assert error < 1e-4 * sensitivity.max()
@@ -81,14 +70,11 @@ def test_onset_and_sensitivity_equal_the_linear_programme(solid, seed):
 
 def by_relaxation(problem, sample, load, slip, limit=60_000):
     """Every overloaded node slips a little at a time; None if the whole slides."""
-    interface, solid = problem.interface, problem.solid
-    symbol = stiffness_symbol(
-        interface.shape, interface.lengths, problem.effective_modulus, solid.shear_modulus
-    )
-    step = 1.0 / np.fft.irfft2(symbol, interface.shape)[0, 0]
+    shape, symbol = problem.interface.shape, symbol_of(problem)
+    step = 1.0 / np.fft.irfft2(symbol, shape)[0, 0]
     critical = (sample.strength - sample.residual_strength)[0] / RATE
     for _ in range(limit):
-        stress = load - np.fft.irfft2(symbol * np.fft.rfft2(slip), interface.shape)
+        stress = load - np.fft.irfft2(symbol * np.fft.rfft2(slip), shape)
         drive = stress - np.maximum(
             sample.strength[0] - RATE * slip, sample.residual_strength[0]
         )
@@ -103,17 +89,9 @@ def by_relaxation(problem, sample, load, slip, limit=60_000):
 @pytest.fixture(scope="module")
 def wide():
     """Strength over a wide range, so that ruptures are arrested: a problem and three samples."""
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
     shape = (32, 32)
-    problem = st.Problem(
-        solid,
-        st.Interface((5.0 * LENGTH, 5.0 * LENGTH), shape),
-        st.LinearWeakening(weakening_rate=RATE, residual_strength=3.5e5),
-    )
-    strength = [
-        0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(s), shape) for s in (20, 23, 0)
-    ]
-    return problem, np.array(strength)
+    problem = make_problem(shape, (5.0 * LENGTH, 5.0 * LENGTH), residual_strength=3.5e5)
+    return problem, np.array([0.4e6 + 4.6e6 * noise(5.0, s, shape) for s in (20, 23, 0)])
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -152,8 +130,7 @@ def test_arrest_equals_relaxation_node_by_node(wide):
 def test_what_moves_next_to_nothing_is_no_instability(wide):
     # On the way nodes reach their residual strength one by one, which looks unstable to long steps.
     problem, _ = wide
-    shape = problem.interface.shape
-    strength = 0.4e6 + 4.6e6 * noise(5.0, np.random.default_rng(5), shape)
+    strength = 0.4e6 + 4.6e6 * noise(5.0, 5, problem.interface.shape)
     found = st.onset(problem, strength, method=st.Equilibrium())
     assert found["arrested_events"].item() == 1
     first, last = found["first_instability"].item(), found["critical_load"].item()
@@ -191,16 +168,12 @@ LAWS = {
 
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("residual", [0.0, 0.25e6])
-def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(solid, name, residual):
+def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name, residual):
     """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
     law = st.PiecewiseWeakening(**LAWS[name], residual_strength=residual)
-    line = st.Problem(solid, st.Interface(0.02, 64), law)
-    strip = st.Problem(solid, st.Interface((0.02, 0.0025), (64, 8)), law)
-    field = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.3e6, high=2.66e6),
-        st.PowerLawSpectrum(correlation_length=3e-3),
-    )
-    tau_p = field.sample(line.interface, samples=4, seed=2)
+    line = make_problem(64, 0.02, friction=law)
+    strip = make_problem((64, 8), (0.02, 0.0025), friction=law)
+    tau_p = beta_strength(3e-3, 0.3e6, 2.66e6).sample(line.interface, samples=4, seed=2)
     exact = st.onset(line, tau_p, method=st.Equilibrium())
     assert exact["residual_reached"].any()
     with warnings.catch_warnings():
@@ -219,18 +192,15 @@ def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(solid, name, re
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 @pytest.mark.parametrize("name", LAWS)
-def test_laws_of_several_pieces_against_relaxation(solid, name):
+def test_laws_of_several_pieces_against_relaxation(name):
     """Below the onset node by node relaxation comes to rest, above it slides."""
-    law = st.PiecewiseWeakening(**LAWS[name])
-    problem = st.Problem(solid, st.Interface((3.0 * LENGTH, 3.0 * LENGTH), NODES), law)
-    tau_p = 0.5e6 + 2e6 * noise(3.0, np.random.default_rng(5))
+    problem = make_problem(NODES, SQUARE, friction=st.PiecewiseWeakening(**LAWS[name]))
+    tau_p = 0.5e6 + 2e6 * noise(3.0, 5)
     load = st.onset(problem, tau_p, method=st.Equilibrium()).critical_load.item()
     u, f = np.r_[0.0, LAWS[name]["slip"]], np.r_[1.0, LAWS[name]["strength"]]
     steep = (f[0] - f[1]) / u[1]
     critical = steep * tau_p / LAWS[name]["weakening_rate"]
-    symbol = stiffness_symbol(
-        NODES, problem.interface.lengths, problem.effective_modulus, solid.shear_modulus
-    )
+    symbol = symbol_of(problem)
     for share, slides in ((0.998, False), (1.002, True)):
         slip, last = np.zeros(NODES), np.inf
         for _ in range(100_000):

@@ -6,29 +6,15 @@ import numpy as np
 import pytest
 from planes import WAVENUMBERS, Lattice, plane_sample
 from scipy.linalg import eigh
-from scipy.optimize import linprog
+from setups import LENGTH, RATE, by_linear_programme, make_problem, smooth_noise
 
-import stiction as st
 from stiction.elasticity.linear import lowest_eigenvector
 from stiction.elasticity.operator import make_operator
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
 from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
 
-RATE = 0.5e12
 SHAPE = (20, 20)
-LENGTH = 3.46e-3  # nucleation length h_n of plane strain at G = 1 GPa, nu = 0.33 and that rate
-
-
-def smooth_noise(shape, correlation, rng):
-    """Field between 0 and 1 with a correlation length given in nodes."""
-    kx, ky = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :]
-    filtered = np.fft.irfft2(
-        np.fft.rfft2(rng.standard_normal(shape))
-        * np.exp(-((correlation * np.hypot(kx, ky)) ** 2)),
-        shape,
-    )
-    return (filtered - filtered.min()) / np.ptp(filtered)
 
 
 def dense_stiffness(plane, shape):
@@ -40,33 +26,20 @@ def dense_stiffness(plane, shape):
     return np.array(rows)
 
 
-def by_linear_programme(plane, strength, profile, rate):
-    """max tau_0: (K - W) d + s - tau_0 p >= 0, d >= 0, by HiGHS; the onset and its multiplier."""
-    matrix = (dense_stiffness(plane, strength.shape) - np.diag(rate.ravel())) / RATE
-    result = linprog(
-        np.r_[np.zeros(strength.size), -1.0],
-        A_ub=np.c_[-matrix, profile.ravel()],
-        b_ub=strength.ravel() / 1e6,
-        bounds=[(0, None)] * strength.size + [(None, None)],
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    assert result.status == 0
-    return result.x[-1] * 1e6, -result.ineqlin.marginals.reshape(strength.shape)
-
-
 @pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
 @pytest.mark.parametrize("seed", range(6))
 def test_onset_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     rng = np.random.default_rng(seed)
     shape = (24, 24) if seed % 2 else (26, 24)
     plane = WAVENUMBERS[wavenumbers]((3.0 * LENGTH, 3.0 * LENGTH), 1e9, 0.33)
-    strength = 0.66e6 + 1e6 * smooth_noise(shape, rng.choice([2.0, 4.0, 8.0]), rng)
+    strength = 0.66e6 + 1e6 * smooth_noise(rng.choice([2.0, 4.0, 8.0]), rng, shape)
     if seed % 3 == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
-    profile = 1.0 + 0.4 * smooth_noise(shape, 6.0, rng)
-    rate = RATE * (0.8 + 0.4 * smooth_noise(shape, 6.0, rng))
-    exact, multiplier = by_linear_programme(plane, strength, profile, rate)
+    profile = 1.0 + 0.4 * smooth_noise(6.0, rng, shape)
+    rate = RATE * (0.8 + 0.4 * smooth_noise(6.0, rng, shape))
+    given = (field.ravel() for field in (rate, strength, profile))
+    exact, _, multiplier = by_linear_programme(dense_stiffness(plane, shape), *given)
+    multiplier = multiplier.reshape(shape)
     found = plane_onset(plane, strength, profile, rate, gap=1e-9)
     assert found.closed
     assert found.lower <= exact * (1.0 + 1e-12)  # round-off of either programme
@@ -79,7 +52,7 @@ def test_lowest_eigenvector_equals_a_dense_one():
     shape = (20, 16)
     plane = Plane((3.0 * LENGTH, 2.0 * LENGTH), 1e9, 0.33)
     rng = np.random.default_rng(0)
-    inside = smooth_noise(shape, 4.0, rng) < 0.5
+    inside = smooth_noise(4.0, rng, shape) < 0.5
     matrix = dense_stiffness(plane, shape) - RATE * np.eye(inside.size)
     nodes = np.flatnonzero(inside)
     values, vectors = eigh(matrix[np.ix_(nodes, nodes)], subset_by_index=[0, 0])
@@ -111,19 +84,15 @@ def by_local_relaxation(plane, sample, load, slip, limit=60_000):
 def wide_sample(seed):
     """Strength over a wide range, so that ruptures are arrested."""
     rng = np.random.default_rng(seed)
-    return plane_sample(0.2e6 + 4.0e6 * smooth_noise(SHAPE, 4.0, rng), 0.05e6, RATE)
+    return plane_sample(0.2e6 + 4.0e6 * smooth_noise(4.0, rng, SHAPE), 0.05e6, RATE)
 
 
 @pytest.fixture
-def program(solid):
+def program():
     """Equilibria of a small plane on a lattice."""
-    length = 5.0 * LENGTH
-    friction = st.LinearWeakening(weakening_rate=RATE)
-    fine = st.Interface(
-        (length, length), (40, 40)
-    )  # a problem may not have as few nodes as SHAPE
-    found = PlaneProgram(st.Problem(solid, fine, friction))
-    found.plane, found.shape = Lattice((length, length), 1e9, 0.33), SHAPE
+    lengths = (5.0 * LENGTH, 5.0 * LENGTH)
+    found = PlaneProgram(make_problem((40, 40), lengths))  # as few nodes as SHAPE are refused
+    found.plane, found.shape = Lattice(lengths, 1e9, 0.33), SHAPE
     return found
 
 

@@ -7,22 +7,18 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from planes import Lattice
+from setups import LENGTH, RATE, make_problem, smooth_noise
 
 import stiction as st
 from stiction.equilibrium.transforms import Plane, plane_onset
 
-RATE = 0.5e12
-LENGTH = 3.46e-3  # nucleation length h_n along x
 NODES = (48, 40)
+LENGTHS = (6.0 * LENGTH, 4.0 * LENGTH)
 METHOD = st.Equilibrium(gap=1e-9, slip=True, sensitivity=True)
 
 
 def smooth(seed, correlation=4.0):
-    rng = np.random.default_rng(seed)
-    k = np.hypot(np.fft.fftfreq(NODES[0])[:, None], np.fft.rfftfreq(NODES[1])[None, :])
-    noise = np.fft.rfft2(rng.standard_normal(NODES)) * np.exp(-((correlation * k) ** 2))
-    field = np.fft.irfft2(noise, NODES)
-    return (field - field.min()) / np.ptp(field)
+    return smooth_noise(correlation, np.random.default_rng(seed), NODES)
 
 
 def strength_of(seed):
@@ -30,12 +26,8 @@ def strength_of(seed):
 
 
 @pytest.fixture
-def plane(solid):
-    return st.Problem(
-        solid,
-        st.Interface((6.0 * LENGTH, 4.0 * LENGTH), NODES),
-        st.LinearWeakening(weakening_rate=RATE),
-    )
+def plane():
+    return make_problem(NODES, LENGTHS)
 
 
 @pytest.mark.parametrize(
@@ -52,18 +44,13 @@ def test_translations_and_reflections(plane, change, move):
     for name in ("first_instability", "critical_load"):
         # The gap asked for.
         assert second[name].item() == pytest.approx(first[name].item(), rel=2e-9)
-    for name in (
-        "slip_patches",
-        "critical_patch_extent",
-        "critical_patch_area",
-        "arrested_events",
-    ):
+    same = "slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events"
+    for name in same:
         assert np.array_equal(second[name].values, first[name].values)
     spacings, lengths = np.array(plane.interface.spacings), np.array(plane.interface.lengths)
     place = np.array(move(*(first["critical_position"].values[0] / spacings))) * spacings
-    off = (
-        second["critical_position"].values[0] - place + 0.5 * lengths
-    ) % lengths - 0.5 * lengths
+    off = second["critical_position"].values[0] - place
+    off = (off + 0.5 * lengths) % lengths - 0.5 * lengths
     # y goes with the root of the gap.
     assert np.abs(off).max() < 1e-2 * spacings.min()
     for name in ("slip", "sensitivity"):
@@ -71,13 +58,10 @@ def test_translations_and_reflections(plane, change, move):
         assert np.abs(change(one) - other).max() < 1e-3 * one.max()
 
 
-def test_sensitivity_is_the_gradient_of_the_mean_stress(solid):
-    problem = st.Problem(
-        solid,
-        st.Interface((6.0 * LENGTH, 4.0 * LENGTH), NODES),
-        st.LinearWeakening(weakening_rate=RATE * (0.9 + 0.1 * smooth(5))),
-        load=st.Load(profile=1.0 + 0.3 * smooth(6), initial_stress=1e5 * smooth(7)),
-    )
+def test_sensitivity_is_the_gradient_of_the_mean_stress():
+    load = st.Load(profile=1.0 + 0.3 * smooth(6), initial_stress=1e5 * smooth(7))
+    rate = RATE * (0.9 + 0.1 * smooth(5))
+    problem = make_problem(NODES, LENGTHS, load=load, weakening_rate=rate)
     strength = strength_of(1)
     method = st.Equilibrium(gap=1e-10, sensitivity=True)
     found = st.onset(problem, strength, method=method)
@@ -150,13 +134,10 @@ def test_ensemble_of_random_properties(plane):
         weakening_rate=field(0.3e12, 0.5e12),
         initial_stress=field(0.0, 2e5),
     )
-    keep = {"keep": tuple(random.names), "progress": False}
-    result = st.monte_carlo(
-        plane, random, method=st.Equilibrium(), samples=4, seed=3, workers=2, **keep
-    )
-    part = st.monte_carlo(
-        plane, random, method=st.Equilibrium(), samples=2, first=2, seed=3, workers=1, **keep
-    )
+    given = {"method": st.Equilibrium(), "seed": 3, "keep": tuple(random.names)}
+    given["progress"] = False
+    result = st.monte_carlo(plane, random, samples=4, workers=2, **given)
+    part = st.monte_carlo(plane, random, samples=2, first=2, workers=1, **given)
     for name, values in part.items():
         assert np.array_equal(values.values, result[name].values[2:]), name
     profiles = {name: result[name].isel(sample=[1]) for name in random.names}
@@ -165,14 +146,9 @@ def test_ensemble_of_random_properties(plane):
     assert result["critical_position"].dims == ("sample", "direction")
 
 
-def test_discretization_error_is_of_the_size_of_the_error(solid):
+def test_discretization_error_is_of_the_size_of_the_error():
     fine, coarse = (
-        st.Problem(
-            solid,
-            st.Interface((4.0 * LENGTH, 4.0 * LENGTH), (nodes, nodes)),
-            st.LinearWeakening(weakening_rate=RATE),
-        )
-        for nodes in (128, 32)
+        make_problem((nodes, nodes), (4.0 * LENGTH, 4.0 * LENGTH)) for nodes in (128, 32)
     )
     rng = np.random.default_rng(1)
     k = np.hypot(

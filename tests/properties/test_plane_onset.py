@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from planes import WAVENUMBERS, plane_sample
+from setups import LENGTH, RATE, smooth_noise
 
 from stiction.criterion.average import local_onset
 from stiction.criterion.windows import ellipse_window
@@ -12,8 +13,6 @@ from stiction.elasticity.operator import make_operator
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
 from stiction.equilibrium.transforms import plane_onset
 
-RATE = 0.5e12
-LENGTH = 3.46e-3  # nucleation length h_n of plane strain at G = 1 GPa, nu = 0.33 and that rate
 SHAPE = (40, 32)
 ONE = np.ones(SHAPE)
 PLANES = {
@@ -22,11 +21,7 @@ PLANES = {
 
 
 def strength_of(seed):
-    rng = np.random.default_rng(seed)
-    kx, ky = np.fft.fftfreq(SHAPE[0])[:, None], np.fft.rfftfreq(SHAPE[1])[None, :]
-    noise = np.fft.rfft2(rng.standard_normal(SHAPE)) * np.exp(-((5.0 * np.hypot(kx, ky)) ** 2))
-    field = np.fft.irfft2(noise, SHAPE)
-    return 0.66e6 + 1e6 * (field - field.min()) / np.ptp(field)
+    return 0.66e6 + 1e6 * smooth_noise(5.0, np.random.default_rng(seed), SHAPE)
 
 
 def onset_of(strength, wavenumbers="lattice", gap=1e-9):
@@ -86,10 +81,7 @@ def test_multiplier_is_the_derivative_by_the_strength():
     found = onset_of(strength, gap=1e-10)
     direction = np.random.default_rng(0).standard_normal(SHAPE)
     direction *= 1e-4 * strength.mean() / np.abs(direction).max()
-    up, down = (
-        onset_of(strength + direction, gap=1e-10),
-        onset_of(strength - direction, gap=1e-10),
-    )
+    up, down = (onset_of(strength + d, gap=1e-10) for d in (direction, -direction))
     slope = (found.multiplier * direction).sum()
     # second order: the step changes the slope itself
     assert 0.5 * (up.upper - down.upper) == pytest.approx(slope, rel=0.02)
@@ -98,10 +90,8 @@ def test_multiplier_is_the_derivative_by_the_strength():
 def test_local_criterion_is_an_upper_bound_for_every_aspect():
     plane = PLANES["lattice"]
     symbol = plane.symbol(SHAPE)
-    windows = [
-        ellipse_window(symbol, SHAPE, plane.lengths, RATE, aspect)
-        for aspect in (1.0, 1.25, 1.5)
-    ]
+    aspects = (1.0, 1.25, 1.5)
+    windows = [ellipse_window(symbol, SHAPE, plane.lengths, RATE, a) for a in aspects]
     for seed in range(4):
         strength = strength_of(seed)
         local = local_onset(windows, strength, ONE)
