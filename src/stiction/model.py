@@ -263,16 +263,19 @@ def _hints(cls: type) -> dict[str, Any]:
     return {key: hints[name] for key, name in keys_of(cls).items()}
 
 
-def _place(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
-    """The path as the user wrote it, and the keys that are valid in its last step.
+def _place(
+    owner: Any, location: tuple[int | str, ...]
+) -> tuple[list[str], list[str], list[type]]:
+    """The path as the user wrote it, the keys valid in its last step, the models valid there.
 
     Pydantic numbers positional arguments, and puts the chosen member of a union into the path.
     """
     if not isinstance(owner, type):
         names = list(inspect.signature(owner).parameters) if owner else []
-        steps = [names[i] if isinstance(i, int) and i < len(names) else i for i in location[:1]]
-        steps += [step for step in location[1:] if isinstance(step, int)]
-        return [str(step) for step in steps], names
+        first = location[:1] if owner else ()
+        steps = [names[i] if isinstance(i, int) and i < len(names) else i for i in first]
+        steps += [step for step in location[len(first) :] if isinstance(step, int)]
+        return [str(step) for step in steps], names, []
     path: list[str] = []
     hints: dict[str, Any] = {}
     inside = [owner]
@@ -285,7 +288,7 @@ def _place(owner: Any, location: tuple[int | str, ...]) -> tuple[list[str], list
             step = list(hints)[step]
         path.append(str(step))
         inside = _models_in(hints.get(str(step)))
-    return path, list(hints)
+    return path, list(hints), inside
 
 
 def explain(error: pydantic.ValidationError, owner: Any, root: str = "") -> list[str]:
@@ -296,7 +299,7 @@ def explain(error: pydantic.ValidationError, owner: Any, root: str = "") -> list
     """
     texts: list[tuple[str, str, str]] = []
     for item in error.errors():
-        steps, valid = _place(owner, item["loc"])
+        steps, valid, models = _place(owner, item["loc"])
         path = ".".join([root, *steps] if root else steps)
         kind, given = item["type"], describe(item.get("input"))
         context = item.get("ctx") or {}
@@ -323,8 +326,12 @@ def explain(error: pydantic.ValidationError, owner: Any, root: str = "") -> list
         else:
             text, end = f"{path}: must be ", f", got {given}"
             member = item["msg"].removeprefix("Input should be ")
-            if name := context.get("class_name", context.get("class")):
-                member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
+            classes = [str(context[key]) for key in ("class_name", "class") if key in context]
+            if kind == "model_attributes_type":  # one of several, told apart by its type
+                classes = [one.__name__ for one in models]
+            if classes:
+                some = (f"{'an' if name[0] in 'AEIO' else 'a'} {name}" for name in classes)
+                member = " or ".join(some)
         texts.append((text, member, end))
     whole: dict[tuple[str, str], list[str]] = {}  # members of a union have an item each
     for text, member, end in texts:
@@ -482,8 +489,9 @@ def check(name: str, value: Any, annotation: Any) -> Any:
 
 @functools.lru_cache(maxsize=64)
 def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
-    own = isinstance(annotation, type)  # no table of a study file
-    return pydantic.TypeAdapter(Annotated[annotation, InstanceOf()] if own else annotation)
+    if isinstance(annotation, type):  # no table of a study file
+        return pydantic.TypeAdapter(Annotated[annotation, InstanceOf()])
+    return pydantic.TypeAdapter(_instances(annotation))
 
 
 def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:

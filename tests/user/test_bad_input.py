@@ -136,6 +136,19 @@ MISTAKES = {
     "st.PowerLawSpectrum(...) ... class": lambda: make_strength(spectrum=st.PowerLawSpectrum),
     "method ... write st.LocalCriterion(...)": lambda: onset(ONE, st.LocalCriterion),
     "method ... 'local'": lambda: onset(ONE, "local"),
+    "method ... method object ... got 3": lambda: st.external.limit_state(
+        make_problem(), make_strength(), 3
+    ),
+    "Study.method: must be a LocalCriterion or an Equilibrium ... got 0": lambda: make_study(
+        method=0
+    ),
+    "where: must be a Problem or an Interface, got 3": lambda: st.plot.field(3, ONE),
+    "profile ... must be a DataArray over x ... (64, 64)": lambda: make_strength().given(
+        np.ones((64, 64)), noise=1e4
+    ),
+    "sweep: slip cannot be kept ... number of nodes is swept": lambda: make_study(
+        method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
+    ),
     # Fields that cannot be
     "lognorm ... finite": lambda: make_strength(marginal=scipy.stats.lognorm(-0.3)),
     "function ... >= 0": lambda: st.CustomSpectrum(function=lambda k: np.cos(k)),

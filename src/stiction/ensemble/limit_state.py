@@ -13,6 +13,7 @@ from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
 from stiction.friction import SCALES
+from stiction.methods import MethodObject
 from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter, Portions
@@ -161,7 +162,7 @@ def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
 def limit_state(
     problem: Problem,
     random: RandomInterface | RandomField,
-    method: Any,
+    method: MethodObject,
     *,
     event: Event = "critical_stress",
     workers: Count | None = None,

@@ -61,8 +61,8 @@ def field(
     >>> st.plot.field(problem, tau_p).get_ylabel()
     'strength $\\\\tau_p$ (MPa)'
     """
+    check("where", where, Problem | Interface)
     interface = where.interface if isinstance(where, Problem) else where
-    check("where", interface, Interface)
     if quantity not in PROFILES:
         raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
     of_field = isinstance(profile, RandomField)

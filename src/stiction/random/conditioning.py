@@ -53,7 +53,7 @@ that ends the turns."""
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     """Places (rows x, and y on a plane) and values (last row) of what was measured."""
-    if isinstance(value, np.ndarray) and value.ndim == 2:  # as they are kept
+    if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) in (2, 3):  # as kept
         return value
     read = (info.context or {}).get("read")
     if read is not None and not isinstance(value, xr.DataArray):

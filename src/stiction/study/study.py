@@ -126,11 +126,12 @@ class Study:
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
-        ensemble, points = self.ensemble, self.experiments
-        if ensemble.keep and len({point.problem.interface.shape for point in points}) > 1:
+        points = self.experiments
+        wide = [name for name, one in variables_in(points).items() if {"x", "y"} & {*one.dims}]
+        if wide and len({point.problem.interface.shape for point in points}) > 1:
             raise InputError(
-                "ensemble.keep: nothing can be kept along the interface while its number of nodes"
-                " is swept; make a study of each"
+                f"sweep: {', '.join(wide)} cannot be kept along the interface while its number of"
+                " nodes is swept; make a study of each"
             )
         return self
 
