@@ -5,7 +5,19 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.random.mapping import from_normal, quantile_of_normal, quantile_table
+from stiction.random.mapping import (
+    correlation_of_mapped,
+    from_normal,
+    hermite_coefficients,
+    quantile_of_normal,
+    quantile_table,
+)
+
+LINE = st.Interface(length=0.1, nodes=256)
+
+
+def field_of(marginal, correlation_length):
+    return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length))
 
 
 @pytest.mark.parametrize(
@@ -56,17 +68,15 @@ def test_efolding_lengths():
     assert rough.efolding_length == pytest.approx(0.7, rel=3e-6)
     power = st.PowerLawSpectrum(correlation_length=0.7, exponent=2.0)
     again = power.with_efolding_length(0.2)
-    assert float(again.correlation(np.array([0.2]))[0]) == pytest.approx(
-        np.exp(-1.0), rel=1e-12
-    )
+    at_length = again.correlation(np.array([0.2])).item()
+    assert at_length == pytest.approx(np.exp(-1.0), rel=1e-12)
     assert again.exponent == 2.0
 
 
 def test_efolding_length_of_the_strength_is_where_its_correlation_is_one_over_e(make_strength):
     strength = make_strength(1.0).with_efolding_length(0.004, of="strength")
-    interface = st.Interface(
-        length=0.4, nodes=4000
-    )  # a node at 0.004 m; long, so nearly infinite
+    # A node at 0.004 m; long, so nearly infinite.
+    interface = st.Interface(length=0.4, nodes=4000)
     at_length = strength.correlation(interface)[40]
     # Left over: truncation (3e-4 of the power) and the missing mean mode.
     assert at_length == pytest.approx(np.exp(-1.0), abs=2e-2)
@@ -89,9 +99,7 @@ def test_efolding_length_of_the_strength_is_where_its_correlation_is_one_over_e(
     ids=lambda d: d.dist.name,
 )
 def test_table_of_the_map_matches_the_quantile(distribution):
-    marginal = st.RandomField(
-        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=1.0)
-    ).marginal
+    marginal = field_of(distribution, 1.0).marginal
     z = np.linspace(-8.0, 8.0, 100_001)
     exact = quantile_of_normal(distribution, z)
     np.testing.assert_allclose(from_normal(marginal, z), exact, rtol=1e-9)
@@ -134,51 +142,45 @@ def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes
 
 
 def test_discrete_spectrum_is_the_density_at_the_modes(make_strength):
-    strength, interface = make_strength(1.0), st.Interface(length=0.1, nodes=256)
-    sigma = strength.modes(interface).sigma
+    strength = make_strength(1.0)
+    sigma = strength.modes(LINE).sigma
     k = 2.0 * np.pi * np.arange(1, sigma.size) / 0.1
     lam = 2.0 * np.pi / strength.spectrum.correlation_length
     assert k[-1] <= 2.5 * lam < k[-1] + k[0]
     power = (k**2 + lam**2) ** -4.0
     np.testing.assert_allclose(sigma[1:] ** 2, power / power.sum(), rtol=1e-12)
     assert sigma[0] == 0.0
-    with_mean = make_strength(1.0, mean_mode=True).modes(interface).sigma
+    with_mean = make_strength(1.0, mean_mode=True).modes(LINE).sigma
     # Modes k and -k share sigma_j; the mean mode stands for itself.
-    assert with_mean[0] ** 2 / with_mean[1] ** 2 == pytest.approx(
-        0.5 * lam**-8.0 / power[0], rel=1e-12
-    )
+    expected = 0.5 * lam**-8.0 / power[0]
+    assert with_mean[0] ** 2 / with_mean[1] ** 2 == pytest.approx(expected, rel=1e-12)
 
 
 def test_sample_i_is_the_same_in_every_batch(make_strength):
-    strength, interface = make_strength(0.5), st.Interface(length=0.1, nodes=256)
-    whole = strength.sample(interface, samples=600, seed=3)
+    strength = make_strength(0.5)
+    whole = strength.sample(LINE, samples=600, seed=3)
     for first, samples in [(0, 1), (255, 2), (300, 300), (599, 1)]:
-        part = strength.sample(interface, samples=samples, seed=3, first=first)
+        part = strength.sample(LINE, samples=samples, seed=3, first=first)
         np.testing.assert_array_equal(part, whole[first : first + samples])
-    assert not np.array_equal(whole[0], strength.sample(interface, samples=1, seed=4)[0])
+    assert not np.array_equal(whole[0], strength.sample(LINE, samples=1, seed=4)[0])
 
 
 def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength):
-    interface = st.Interface(length=0.1, nodes=256)
-    few, many = make_strength(2.0), make_strength(0.25)
-    a = few.draws(interface, 5, seed=1, first=250)
-    b = many.draws(interface, 5, seed=1, first=250)
+    fields = make_strength(2.0), make_strength(0.25), make_strength(2.0, mean_mode=True)
+    a, b, with_mean = (field.draws(LINE, 5, seed=1, first=250) for field in fields)
     assert a.shape[1] < b.shape[1]
     np.testing.assert_array_equal(a, b[:, : a.shape[1]])
-    with_mean = make_strength(2.0, mean_mode=True).draws(interface, 5, seed=1, first=250)
     np.testing.assert_array_equal(with_mean[:, 1:], a)
 
 
 def test_streams_are_different(make_strength):
-    interface = st.Interface(length=0.1, nodes=256)
-    a = make_strength(1.0).draws(interface, 256, seed=1)
-    b = make_strength(1.0).draws(interface, 256, seed=1, stream=1)
+    a, b = (make_strength(1.0).draws(LINE, 256, seed=1, stream=i) for i in (0, 1))
     # 256 x 144 products of independent normals: standard deviation of the mean 0.0052.
     assert abs(np.mean(a * b)) < 5 * 0.0052
 
 
 def test_field_stays_between_the_bounds(make_strength):
-    profiles = make_strength(1.0).sample(st.Interface(length=0.1, nodes=256), samples=256)
+    profiles = make_strength(1.0).sample(LINE, samples=256)
     assert profiles.min() >= 0.66e6
     assert profiles.max() <= 1.66e6
 
@@ -194,11 +196,8 @@ def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
 
 def test_draws_are_defined_by_seed_stream_block_and_mode():
     """The promise of reproducibility, spelled out with numpy alone."""
-    field = st.RandomField(
-        marginal=scipy.stats.norm(), spectrum=st.PowerLawSpectrum(correlation_length=0.05)
-    )
-    interface = st.Interface(length=0.1, nodes=64)
-    found = field.draws(interface, 1, seed=7, first=300, stream=2)[0]
+    field = field_of(scipy.stats.norm(), 0.05)
+    found = field.draws(LINE, 1, seed=7, first=300, stream=2)[0]
     key = np.random.SeedSequence(entropy=7, spawn_key=(2, 1))  # sample 300 lies in block 1
     block = np.random.Generator(np.random.PCG64DXSM(key)).standard_normal((12, 256))
     np.testing.assert_array_equal(found, block[2:, 300 - 256])
@@ -237,9 +236,7 @@ def test_efolding_length_scales_with_the_unit_of_length(scale):
 def test_distributions_that_scipy_has_no_name_for():
     counts = np.histogram(np.random.default_rng(0).normal(5.0, 1.0, 1000), 20)
     distribution = scipy.stats.rv_histogram(counts)()
-    field = st.RandomField(
-        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=0.01)
-    )
+    field = field_of(distribution, 0.01)
     interface = st.Interface(length=0.1, nodes=64)
     z = np.array([[-1.0, 0.3]])
     values = from_normal(field.marginal, z)
@@ -268,36 +265,32 @@ def test_a_function_that_returns_its_own_array_keeps_it():
     assert all(np.all(values == 1.0) for values in table.values())
 
 
-@pytest.mark.parametrize("name", ["rice", "moyal", "genlogistic", "invgauss"])
-def test_correlation_of_families_whose_tails_scipy_inverts_poorly(name):
-    shapes = {"rice": (5.0,), "moyal": (), "genlogistic": (1.0,), "invgauss": (0.145,)}
-    field = st.RandomField(
-        marginal=getattr(scipy.stats, name)(*shapes[name]),
-        spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
-    )
-    interface = st.Interface(length=0.1, nodes=256)
-    strength, z = field.correlation(interface), field.correlation(interface, of="z")
+@pytest.mark.parametrize(
+    "distribution",
+    [
+        scipy.stats.rice(5.0),
+        scipy.stats.moyal(),
+        scipy.stats.genlogistic(1.0),
+        scipy.stats.invgauss(0.145),
+    ],
+    ids=lambda d: d.dist.name,
+)
+def test_correlation_of_families_whose_tails_scipy_inverts_poorly(distribution):
+    field = field_of(distribution, 2e-3)
+    strength, z = field.correlation(LINE), field.correlation(LINE, of="z")
     assert strength[0] == pytest.approx(1.0, rel=1e-12)
     # These maps are mildly nonlinear: the correlations stay close.
     np.testing.assert_allclose(strength, z, atol=0.03)
 
 
 def test_a_marginal_that_the_forty_terms_cannot_follow_has_correlation_one_at_zero_lag():
-    field = st.RandomField(
-        marginal=st.Beta(alpha=0.05, beta=0.05, low=0.0, high=1.0),
-        spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
-    )
-    interface = st.Interface(length=0.1, nodes=256)
-    assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)
+    field = field_of(st.Beta(alpha=0.05, beta=0.05, low=0.0, high=1.0), 2e-3)
+    assert field.correlation(LINE)[0] == pytest.approx(1.0, rel=1e-12)
 
 
 def _mapped(distribution, rho):
-    from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
-
-    field = st.RandomField(
-        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=2e-3)
-    )
-    return correlation_of_mapped(rho, hermite_coefficients(field.marginal))
+    coefficients = hermite_coefficients(field_of(distribution, 2e-3).marginal)
+    return correlation_of_mapped(rho, coefficients)
 
 
 def test_correlation_of_a_heavy_lognormal():
@@ -335,9 +328,7 @@ def test_narrow_marginals_have_the_correlation_of_wide_ones(width):
 
 @pytest.mark.parametrize("distribution", [scipy.stats.t(2.01), scipy.stats.pareto(2.01)])
 def test_tails_too_heavy_for_a_correlation_are_said(distribution):
-    field = st.RandomField(
-        marginal=distribution, spectrum=st.PowerLawSpectrum(correlation_length=0.1)
-    )
+    field = field_of(distribution, 0.1)
     with pytest.warns(st.AccuracyWarning, match=r"uncertain by up to 0\.\d"):
         field.correlation(st.Interface(length=1.0, nodes=64))
 
@@ -355,9 +346,8 @@ def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent, of):
     correlation = field.correlation(interface, of=of)
     # Without truncation the length was .0665 for exponent 1. Left over: the sum over modes, which
     # at exponent 0.7 meets a density that is sharp at k = 0, and the line between two nodes.
-    assert np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200]) == pytest.approx(
-        0.05, rel=2e-3
-    )
+    found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
+    assert found == pytest.approx(0.05, rel=2e-3)
 
 
 def test_truncated_correlation_is_the_sum_of_cosines():
@@ -368,9 +358,8 @@ def test_truncated_correlation_is_the_sum_of_cosines():
     for lag in (0.0, 1e-3, 0.3, 5.0, 300.0):
         expected = np.sum(g * np.cos(k * lag)) / g.sum()
         # The midpoint rule: (lag dk)^2/24 with dk = 4e-5.
-        assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(
-            expected, abs=1e-9 + (lag * k[0] * 2.0) ** 2 / 24.0
-        )
+        error = 1e-9 + (lag * k[0] * 2.0) ** 2 / 24.0
+        assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(expected, abs=error)
 
 
 def _top_hat(k):
@@ -403,9 +392,9 @@ def test_custom_spectra_with_steps_and_lines():
 
 
 def test_a_density_whose_integral_does_not_converge_is_refused():
+    def density(k):
+        return 1.0 / (1.0 + k)
+
     with pytest.raises(st.InputError, match=r"does not converge; give max_wavenumber"):
-        st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k))
-    assert (
-        st.CustomSpectrum(function=lambda k: 1.0 / (1.0 + k), max_wavenumber=1e3).cutoff()
-        == 1e3
-    )
+        st.CustomSpectrum(function=density)
+    assert st.CustomSpectrum(function=density, max_wavenumber=1e3).cutoff() == 1e3
