@@ -1,10 +1,11 @@
 """The local criterion against its definition and against theory."""
 
-import dataclasses
 import warnings
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
+from setups import make_problem
 
 import stiction as st
 from stiction.criterion.local import beyond_residual
@@ -13,16 +14,13 @@ from stiction.criterion.windows import exact_weight
 
 # With the error of the weights on the grid, a tenth of the strength's own variation at most.
 @pytest.mark.parametrize(("nodes", "error"), [(256, 3e-4), (512, 1e-5), (1024, 3e-7)])
-def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes, error):
+def test_nucleation_stress_is_the_weighted_integral(make_strength, nodes, error):
     """Direct quadrature of the definition on the trigonometric interpolant of the profile."""
-    problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=nodes), st.LinearWeakening(weakening_rate=0.5e12)
-    )
+    problem = make_problem(nodes)
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
     half = problem.nucleation_length / 2.0
-    t = (
-        (np.arange(400) + 0.5) * np.pi / 400.0
-    )  # midpoint rule in the angle: spectrally accurate
+    # Midpoint rule in the angle: spectrally accurate.
+    t = (np.arange(400) + 0.5) * np.pi / 400.0
     s, measure = np.cos(t), np.sin(t) * np.pi / 400.0
     spectrum = np.fft.rfft(tau_p, axis=1) / nodes
     spectrum[:, 1:-1] *= 2.0
@@ -40,11 +38,9 @@ def test_nucleation_stress_is_the_weighted_integral(solid, make_strength, nodes,
 @pytest.mark.parametrize(
     ("nodes", "rms", "largest"), [(256, 4e-3, 3e-2), (512, 5e-4, 2e-3), (1024, 4e-6, 2e-5)]
 )
-def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, largest):
+def test_minimum_is_that_of_the_interpolant(make_strength, nodes, rms, largest):
     """Against a grid sixteen times finer, made by padding the spectrum with zeros."""
-    problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=nodes), st.LinearWeakening(weakening_rate=0.5e12)
-    )
+    problem = make_problem(nodes)
     tau_p = make_strength(0.25).sample(problem.interface, samples=512, seed=2)
     tau_n = st.theory.nucleation_stress(problem, tau_p)
     result = st.onset(problem, tau_p, method=st.LocalCriterion())
@@ -71,20 +67,18 @@ def test_minimum_is_that_of_the_interpolant(solid, make_strength, nodes, rms, la
 
 
 @pytest.mark.parametrize("contrast", [10.0, 50.0, 200.0, 1000.0, 1e6])
-def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(solid, contrast):
+def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(contrast):
     """The patch that lets go lies where there is no barrier, so its strength does not matter."""
-    problem = st.Problem(
-        solid, st.Interface(length=0.1, nodes=384), st.LinearWeakening(weakening_rate=0.5e12)
-    )
+    problem = make_problem(384)
     x = problem.interface.x
     # Uniform, and with a dip in the middle of the rest.
     for weak in (np.full(384, 1e6), 1e6 - 3e5 * np.exp(-(((x - 0.08) / 0.004) ** 2))):
-        without = st.onset(problem, weak, method=st.LocalCriterion())
         barred = np.where((x > 0.025) & (x < 0.05), contrast * 1e6, weak)
-        found = st.onset(problem, barred, method=st.LocalCriterion())
-        assert float(found.critical_load[0]) == pytest.approx(
-            float(without.critical_load[0]), rel=1e-9
+        without, found = (
+            st.onset(problem, tau_p, method=st.LocalCriterion()).critical_load.item()
+            for tau_p in (weak, barred)
         )
+        assert found == pytest.approx(without, rel=1e-9)
         tau_n = st.theory.nucleation_stress(problem, barred)
         assert weak.min() <= tau_n.min()
         assert tau_n.max() <= barred.max()
@@ -110,8 +104,6 @@ def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength):
 
 
 def test_critical_position_is_uniform(problem, make_strength):
-    from scipy.stats import kstest
-
     result = st.monte_carlo(
         problem, make_strength(0.5), method=st.LocalCriterion(), samples=20_000, seed=5
     )
@@ -126,16 +118,23 @@ def warned(problem, tau_p):
     return local, [str(one.message) for one in found if "upper bound" in str(one.message)]
 
 
-def test_it_is_said_where_residual_strength_ends_the_upper_bound(solid):
+def lognormal(xi, cv=0.3):
+    return st.RandomField(st.Lognormal(mean=1e6, cv=cv), st.PowerLawSpectrum(xi), True)
+
+
+def both(problem, tau_p):
+    """Local and exact onsets, how far the first is above the second, and what was warned of."""
+    local, texts = warned(problem, tau_p)
+    exact = st.onset(problem, tau_p, method=st.Equilibrium(), progress=False)
+    return local, exact, (local.critical_stress / exact.first_instability - 1.0).values, texts
+
+
+def test_it_is_said_where_residual_strength_ends_the_upper_bound():
     """Exact onsets tell in which samples it is one; nothing was said of a fifth of them."""
-    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3)
-    weak = st.Problem(solid, st.Interface(0.0144, 128), friction)  # 30 nodes in h_n
+    weak = make_problem(128, 0.0144, residual_ratio=0.3)  # 30 nodes in h_n
     xi = 0.5 * weak.nucleation_length
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.3), st.PowerLawSpectrum(xi), True)
-    tau_p = field.sample(weak.interface, samples=200, seed=11)
-    local, texts = warned(weak, tau_p)
-    exact = st.onset(weak, tau_p, method=st.Equilibrium(), progress=False)
-    above = (local.critical_stress / exact.first_instability - 1.0).values
+    tau_p = lognormal(xi).sample(weak.interface, samples=200, seed=11)
+    local, exact, above, texts = both(weak, tau_p)
     reached, missing = beyond_residual(weak, weak.sample(tau_p), dict(local))
     assert np.mean(above < -1e-3) > 0.05
     assert reached[above < -1e-3].mean() > 0.8
@@ -144,22 +143,15 @@ def test_it_is_said_where_residual_strength_ends_the_upper_bound(solid):
     assert len(texts) == 1
     assert f"{100.0 * reached.mean():.2g} %" in texts[0]
     # With a strength that varies little it is one, and nothing is said.
-    calm = dataclasses.replace(field, marginal=st.Lognormal(mean=1e6, cv=0.05))
+    calm = lognormal(xi, 0.05)
     assert warned(weak, calm.sample(weak.interface, samples=100, seed=11))[1] == []
 
 
 def test_residual_strength_within_the_critical_patch_of_a_plane():
-    plane = st.Problem(
-        st.Solid(1e9, 0.33, 1170.0),
-        st.Interface((0.012, 0.012), (32, 32)),
-        st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.75),
-    )
-    xi = 0.3 * plane.nucleation_length
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.3), st.PowerLawSpectrum(xi), True)
+    plane = make_problem((32, 32), (0.012, 0.012), residual_ratio=0.75)
+    field = lognormal(0.3 * plane.nucleation_length)
     tau_p = field.sample(plane.interface, samples=10, seed=1)
-    local, texts = warned(plane, tau_p)
-    exact = st.onset(plane, tau_p, method=st.Equilibrium(), progress=False)
-    above = (local.critical_stress / exact.first_instability - 1.0).values
+    local, _, above, texts = both(plane, tau_p)
     reached = beyond_residual(plane, plane.sample(tau_p), dict(local))[0]
     assert np.any(above < -1e-3)
     assert reached[above < -1e-3].all()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from setups import make_problem
 
 import stiction as st
 from stiction.dynamics import slow_start as module
@@ -10,7 +11,6 @@ from stiction.dynamics.slow_start import slow_start, static_setting
 
 RATES = (2e5, 2e7, 2e8)
 RATIOS = (0.25, 0.5, 1.0, 2.0)
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
 ARRESTED = (18, 819, 1083)  # of the samples of seed 0 at xi_0/h_n = 0.5
 
 
@@ -31,6 +31,11 @@ def both(problem, tau_p, **options):
         Rupture(start=start, **options).prepare(problem)(rows)
         for start in ("equilibrium", "rest")
     ]
+
+
+def assert_same(near, rest):
+    for name, values in rest.items():
+        np.testing.assert_array_equal(near[name], values, err_msg=name)
 
 
 def assert_agree(near, rest, median=5e-5):
@@ -126,8 +131,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(problem, monk
 def test_loading_too_fast_begins_at_rest(problem):
     near, rest = both(problem, profiles(problem, 2.0, 2), loading_rate=3e10, stop="onset")
     assert np.all(near["start_error"] == 0.0)
-    for name, values in rest.items():
-        np.testing.assert_array_equal(near[name], values, err_msg=name)
+    assert_same(near, rest)
 
 
 @pytest.mark.parametrize(
@@ -136,45 +140,33 @@ def test_loading_too_fast_begins_at_rest(problem):
     ids=["barriers", "stress above the strength"],
 )
 def test_where_no_equilibrium_is_followed_it_begins_at_rest(initial_stress, factor):
-    interface = st.Interface(length=0.1, nodes=256)
-    load = st.Load(initial_stress=initial_stress)
-    problem = st.Problem(SOLID, interface, st.LinearWeakening(weakening_rate=0.5e12), load)
+    problem = make_problem(load=st.Load(initial_stress=initial_stress))
     tau_p = profiles(problem, 1.0, 1)[0]
     tau_p[100:110] *= factor
     method = Rupture(loading_rate=1e8, stop="onset")
     rows = problem.sample(tau_p, accept=method.accepts)
     near = method.prepare(problem)(rows)
     rest = Rupture(loading_rate=1e8, stop="onset", start="rest").prepare(problem)(rows)
-    for name, values in rest.items():
-        np.testing.assert_array_equal(near[name], values, err_msg=name)
+    assert_same(near, rest)
 
 
 def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_from():
-    line, plane = (
-        st.Interface(length=0.1, nodes=64),
-        st.Interface(length=(0.1, 0.1), nodes=(16, 16)),
-    )
-    linear = st.LinearWeakening(weakening_rate=2e10)
     curved = st.ExponentialWeakening(weakening_rate=2e10)
-    assert static_setting(st.Problem(SOLID, line, linear)) is not None
-    assert static_setting(st.Problem(SOLID, line, curved)) is None
-    assert static_setting(st.Problem(SOLID, plane, linear)) is None
+    plane = make_problem((16, 16), (0.1, 0.1), weakening_rate=2e10)
+    assert static_setting(make_problem(64, weakening_rate=2e10)) is not None
+    assert static_setting(make_problem(64, friction=curved)) is None
+    assert static_setting(plane) is None
 
 
 def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits(problem):
-    interface = st.Interface(length=0.1, nodes=256)
-    wave = np.cos(2.0 * np.pi * interface.x / interface.length)
-    other = st.Problem(
-        problem.solid,
-        interface,
-        st.LinearWeakening(
-            weakening_rate=4e11 + 5e10 * wave, residual_strength=1e5 + 2e4 * wave
-        ),
-        st.Load(profile=1.0 + 0.1 * np.roll(wave, 40), initial_stress=2e4 * np.roll(wave, 90)),
-    )
+    x = st.Interface(length=0.1, nodes=256).x
+    wave = np.cos(2.0 * np.pi * x / 0.1)
+    load = {"profile": 1.0 + 0.1 * np.roll(wave, 40), "initial_stress": np.roll(2e4 * wave, 90)}
+    weakening = {"weakening_rate": 4e11 + 5e10 * wave, "residual_strength": 1e5 + 2e4 * wave}
+    other = make_problem(solid=problem.solid, load=st.Load(**load), **weakening)
     rng = np.random.default_rng(7)
     phases = rng.uniform(0.0, 2.0 * np.pi, (3, 1, 30))
-    waves = np.cos(2.0 * np.pi * np.arange(1, 31) * interface.x[:, None] / 0.1 + phases)
+    waves = np.cos(2.0 * np.pi * np.arange(1, 31) * x[:, None] / 0.1 + phases)
     tau_p = 1.1e6 + 4e5 * np.tanh(waves.sum(axis=2) / np.sqrt(15.0))
     near, rest = both(other, tau_p, loading_rate=1e6, stop="runaway")
     assert_agree(near, rest)
@@ -202,8 +194,7 @@ def test_runaway_knows_the_loads_of_the_whole_run(problem):
 
 
 def test_runaway_on_a_plane_is_refused():
-    plane = st.Interface(length=(0.1, 0.1), nodes=(32, 32))
-    problem = st.Problem(SOLID, plane, st.LinearWeakening(weakening_rate=5e10))
+    problem = make_problem((32, 32), (0.1, 0.1), weakening_rate=5e10)
     method = Rupture(loading_rate=1e7, stop="runaway")
     with pytest.raises(st.InputError, match="stop: 'runaway' works on lines only"):
         st.onset(problem, np.full((32, 32), 1e6), method=method)

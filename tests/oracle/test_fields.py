@@ -4,8 +4,10 @@ import gstools
 import numpy as np
 import pytest
 import scipy.stats
+from setups import beta_strength
 
 import stiction as st
+from stiction.random.mapping import hermite_coefficients
 
 SAMPLES = 100_000
 
@@ -14,10 +16,7 @@ SAMPLES = 100_000
 def sampled():
     """1e5 samples on a short, coarse interface: 64 nodes, L = 16 xi_0."""
     interface = st.Interface(length=1.0, nodes=64)
-    strength = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=1.0 / 16.0),
-    )
+    strength = beta_strength(1.0 / 16.0)
     return strength, interface, strength.sample(interface, samples=SAMPLES, seed=11)
 
 
@@ -56,8 +55,6 @@ def test_correlation_of_z_and_of_the_strength_differ_as_the_hermite_expansion_sa
     z, tau = strength.correlation(interface, of="z"), strength.correlation(interface)
     assert np.all(np.abs(tau[1:]) < np.abs(z[1:]))
     # The first Hermite coefficient carries 0.966 of the variance of this Beta marginal.
-    from stiction.random.mapping import hermite_coefficients
-
     power = hermite_coefficients(strength.marginal)[1:] ** 2
     assert power[0] / power.sum() == pytest.approx(0.966, abs=5e-4)
     assert power.sum() == pytest.approx(strength.standard_deviation**2, rel=1e-6)

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.friction.kernels import strengths
@@ -48,24 +49,19 @@ def least_equilibrium(problem, strength, load, rest=1e-18):
     raise AssertionError("relaxation did not come to rest")
 
 
-@pytest.fixture
-def short(problem):
-    """Six nucleation lengths of 16 nodes."""
-    return dataclasses.replace(problem, interface=st.Interface(length=0.0185, nodes=96))
+def short(law):
+    """Six nucleation lengths of 16 nodes, of a rate of 0.5e12 Pa/m."""
+    return make_problem(96, 0.0185, friction=law)
 
 
 def wide_strength(interface, seed):
-    field = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.5e6, high=3e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=0.004, exponent=4.0),
-        mean_mode=True,
-    )
+    field = beta_strength(0.004, 0.5e6, 3e6, mean_mode=True)
     return field.sample(interface, samples=1, seed=seed)[0]
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_equilibria_along_polygons_against_relaxation(short, law):
-    problem = dataclasses.replace(short, friction=law)
+def test_equilibria_along_polygons_against_relaxation(law):
+    problem = short(law)
     strength = wide_strength(problem.interface, 3)
     found = st.onset(problem, strength, method=st.Equilibrium())
     critical = found.critical_load.item()
@@ -79,8 +75,8 @@ def test_equilibria_along_polygons_against_relaxation(short, law):
 
 
 @pytest.mark.parametrize("law", ["dual", "steepening"])
-def test_first_instability_is_where_slip_jumps(short, law):
-    problem = dataclasses.replace(short, friction=LAWS[law])
+def test_first_instability_is_where_slip_jumps(law):
+    problem = short(LAWS[law])
     strengths_ = np.stack([wide_strength(problem.interface, seed) for seed in range(8)])
     found = st.onset(problem, strengths_, method=st.Equilibrium())
     sample = int(np.argmax(found.arrested_events.values > 0))

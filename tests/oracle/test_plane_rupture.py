@@ -2,22 +2,16 @@
 
 import numpy as np
 import pytest
+from setups import RATE, beta_strength, make_problem
 
 import stiction as st
 
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-RATE = 0.5e12
 H_N = 2.0 * 0.57888694 * 1e9 / 0.67 / RATE
 
 
 def onsets(nodes, lengths, ratio, samples):
-    plane = st.Interface(length=(lengths * H_N, lengths * H_N), nodes=(nodes, nodes))
-    problem = st.Problem(SOLID, plane, st.LinearWeakening(weakening_rate=RATE))
-    field = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        st.PowerLawSpectrum(correlation_length=ratio * H_N),
-    )
-    tau_p = field.sample(plane, samples=samples, seed=5)
+    problem = make_problem((nodes, nodes), (lengths * H_N, lengths * H_N))
+    tau_p = beta_strength(ratio * H_N).sample(problem.interface, samples=samples, seed=5)
     exact = st.onset(problem, tau_p, method=st.Equilibrium())
     slow = st.onset(problem, tau_p, method=st.Rupture(loading_rate=1e4, stop="onset"))
     return exact, slow
@@ -32,9 +26,8 @@ def test_first_instability_at_a_slow_rate_is_the_exact_equilibrium_onset(ratio):
         exact.first_instability.values, rel=1e-5
     )
     apart = np.abs(slow.critical_position - exact.critical_position).max(axis=1).values
-    assert np.all(
-        (apart < H_N) | (apart > 4.0 * H_N)
-    )  # the same patch, perhaps around the period
+    # The same patch, perhaps around the period.
+    assert np.all((apart < H_N) | (apart > 4.0 * H_N))
 
 
 @pytest.mark.slow

@@ -138,9 +138,7 @@ def test_against_openturns_subset_sampling():
         algorithm.run()
         found.append(algorithm.getResult().getProbabilityEstimate())
     theirs, spread = np.mean(found), np.std(found, ddof=1) / math.sqrt(len(found))
-    ours = st.failure_probability(
-        problem, field, stress, method=LOCAL, algorithm="subset", target_cv=0.1
-    )
+    ours = by((problem, field), stress, "subset", 0.1)
     assert ours.probability < 1e-3
     error = math.hypot(spread, ours.probability * ours.cv)
     # Four joint standard errors; theirs from the spread of its own six runs.
