@@ -111,17 +111,17 @@ def run(
     workers: Workers = None,
     scheduler: Annotated[
         str | None,
-        Option(metavar="ADDRESS", help="Of a Dask scheduler, such as tcp://host:8786."),
+        Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
     ] = None,
     retry: Annotated[bool, Option("--retry", help="Compute failed samples again.")] = False,
-    time_limit: Annotated[float | None, Option(help="Seconds; the rest is left.")] = None,
+    time_limit: Annotated[float | None, Option(help="Stop after this many seconds.")] = None,
     part: Annotated[
         str | None,
         Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN."),
     ] = None,
-    pilot: Annotated[bool, Option(help="Compare with the exact onset.")] = True,
+    pilot: Annotated[bool, Option(help="Compare some samples with the exact onset.")] = True,
 ) -> None:
-    """Run the study of a file, or what is missing of it.
+    """Run the study in a file, or the missing part of it.
 
     The same command goes on where a run was interrupted, however it ended, and computes only the
     new samples if `samples` was raised in the study. The numbers do not depend on workers,
@@ -147,9 +147,7 @@ def run(
                 pilot=pilot,
             )
     except KeyboardInterrupt:
-        echo(
-            f"interrupted: what is done is stored in {out}; the same command goes on", err=True
-        )
+        echo(f"interrupted: samples so far are in {out}; rerun the command to resume", err=True)
         raise typer.Exit(130) from None
     dims = [axis.dim for axis in loaded.axes]
     for name in ("critical_stress", "friction_coefficient"):
@@ -165,12 +163,12 @@ def run(
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
     if "cut_short" in result.attrs and part is None:
-        echo(f"{result.attrs['cut_short']}; the same command goes on", err=True)
+        echo(f"{result.attrs['cut_short']}; rerun the command to resume", err=True)
         raise typer.Exit(3)
 
 
 def status(run: RunPath) -> None:
-    """Show what of a run is done, failed or damaged."""
+    """Show the completed, failed and damaged parts of a run."""
     from stiction.study.study import open_run
     from stiction.study.sweep import name_point
 
@@ -187,11 +185,13 @@ def status(run: RunPath) -> None:
     _show_some(behind if study.sweep else [], "  ")
     _show_some(state.damaged, "  damaged   ")
     if state.damaged:
-        echo("  running the study again mends this")
+        echo("  run the study again to repair this")
     else:
-        echo("  verified  everything that is stored is what was written")
+        echo("  verified  all stored chunks match their checksums")
     if state.failures:
-        echo(f"  failed    {len(state.failures)}; `stiction run ... --retry` tries again:")
+        echo(
+            f"  failed    {len(state.failures)}; `stiction run ... --retry` computes them again:"
+        )
         _show_some(state.failures, "    ")
 
 
@@ -230,9 +230,9 @@ def report(
 
 
 def check(study: StudyFile) -> None:
-    """Validate a study file and estimate its time and size, or list all mistakes.
+    """Validate a study file and estimate its time and size, or list all errors.
 
-    Solves a few samples: for the time, and for the error of the local criterion.
+    A few samples are solved to estimate the time and the error of the local criterion.
     """
     from stiction.study.study import Study
 
@@ -245,7 +245,7 @@ def check(study: StudyFile) -> None:
 
 
 def description(study: Any) -> dict[str, str]:
-    """Return what a study would do, in a few lines with titles."""
+    """Return a description of a study, in a few lines with titles."""
     from stiction.ensemble.dataset import distinct
 
     points, ensemble = study.experiments, study.ensemble
@@ -268,18 +268,18 @@ def description(study: Any) -> dict[str, str]:
 
 
 def _numbers(point: Any) -> dict[tuple[str, str], float]:
-    """What is worth knowing of a point, by title and unit."""
+    """Return key numbers of a point, by title and unit."""
     problem, field = point.problem, point.random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
     found = {
         ("mean strength", unit): field.mean,
-        ("its deviation", unit): field.standard_deviation,
-        ("its correlation", "m to 1/e"): field.efolding_length(),
+        ("standard deviation", unit): field.standard_deviation,
+        ("correlation length", "m (to 1/e)"): field.efolding_length(),
     }
     if problem.uniform_rate is None:  # the nucleation length varies along the interface
         return found
     length = found["nucleation length", "m"] = problem.nucleation_length
-    found["nodes in it", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
+    found["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
     for dim, whole in zip(problem.interface.dims, problem.interface.lengths, strict=True):
         found[f"L / h_n along {dim}", ""] = whole / length
     if hasattr(field.spectrum, "correlation_length"):
@@ -288,7 +288,7 @@ def _numbers(point: Any) -> dict[tuple[str, str], float]:
 
 
 def _methods_that_apply(experiment: Any) -> dict[str, str]:
-    """Which methods take the first point, and how far the local criterion is from the exact one."""
+    """Return the methods that apply to the first point, and the error of the local criterion."""
     from stiction.ensemble.pilot import compare
     from stiction.methods import methods
 
@@ -310,7 +310,7 @@ def _methods_that_apply(experiment: Any) -> dict[str, str]:
 
 
 def _cost(study: Any) -> dict[str, str]:
-    """How long a study takes, from a few timed samples, and how much it stores."""
+    """Estimate the time of a study from a few timed samples, and the size of its result."""
     import numpy as np
 
     from stiction.ensemble.batches import Span, solve_span, usable_cores
@@ -354,12 +354,14 @@ def read_strength(
     path: Path,
     problem: Any,
     *,
-    unit: Annotated[str | None, Option(help="Of the values in PROFILE, such as MPa.")] = None,
-    x_unit: Annotated[str | None, Option(help="Of x in PROFILE, such as mm.")] = None,
+    unit: Annotated[
+        str | None, Option(help="Unit of the values in PROFILE, such as MPa.")
+    ] = None,
+    x_unit: Annotated[str | None, Option(help="Unit of x in PROFILE, such as mm.")] = None,
     value: Annotated[str | None, Option(help="Column of the values: name or number.")] = None,
     x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
-    interpolate: Annotated[bool, Option("--interpolate", help="Points need no nodes.")] = False,
-    gaps: Annotated[Literal["refuse", "fill"], Option(help="Of missing values.")] = "refuse",
+    interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
+    gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
 ) -> Any:
     """Return the strength in a file, on the nodes of a problem."""
     from stiction.profiles.reading import read_profile
@@ -392,10 +394,10 @@ def _with_reading(command: Callable[..., None]) -> Callable[..., None]:
 def onset(
     study: StudyFile,
     strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
-    method: Annotated[list[str] | None, Option(help="Only this one (repeatable).")] = None,
+    method: Annotated[list[str] | None, Option(help="Use only this one (repeatable).")] = None,
     **reading: Any,
 ) -> None:
-    """At which load, and where, does one interface of given strength begin to slide?
+    """Compute the load and position at which one interface of given strength begins to slide.
 
     Takes the problem from a study file, which needs nothing else, and the strength from PROFILE:
     .npy, text (.csv, .txt, ...) or NetCDF, with or without x, in Pa and m unless it states units,
@@ -444,15 +446,15 @@ def rupture(
     out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
         "stiction-rupture"
     ),
-    sample: Annotated[int, Option(min=0, help="Of the study's strength.")] = 0,
+    sample: Annotated[int, Option(min=0, help="Sample of the study's strength.")] = 0,
     strength: Annotated[
         Path | None,
-        Option(metavar="PROFILE", help="Instead of a sample; see `stiction onset`."),
+        Option(metavar="PROFILE", help="Peak strength, instead of a sample."),
     ] = None,
-    film: Annotated[bool, Option("--film", help="Also a film, rupture.gif.")] = False,
+    film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
     **reading: Any,
 ) -> None:
-    """Simulate one interface from its first slip to global sliding, or as far as the study says.
+    """Simulate one interface from its first slip to global sliding, or as its study stops it.
 
     Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
     Writes `rupture.nc` (slip, slip rate and stress over time and x), and as PNG and PDF `rupture`
@@ -492,7 +494,7 @@ def rupture(
 
 
 def _summary(result: Any) -> str:
-    """Return the numbers of a rupture, one a line, without what is not known at its end."""
+    """Return the numbers of a rupture, one a line, without those that are NaN."""
     lines = []
     for name in RUPTURE:
         numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
@@ -505,12 +507,14 @@ def _summary(result: Any) -> str:
 def reliability(
     study: StudyFile,
     out: Annotated[Path, Option(help="Folder of the results.")] = Path("stiction-reliability"),
-    smallest: Annotated[float, Option(help="Probability down to which the curve goes.")] = 1e-9,
+    smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
     target_cv: Annotated[float, Option(help="Coefficient of variation at `smallest`.")] = 0.3,
     workers: Workers = None,
-    max_evaluations: Annotated[int | None, Option(help="Most samples to solve.", min=1)] = None,
+    max_evaluations: Annotated[
+        int | None, Option(help="Largest number of samples.", min=1)
+    ] = None,
 ) -> None:
-    """Failure probability of a study's interface, decade by decade.
+    """Compute the failure probability of a study's interface, decade by decade.
 
     Problem, strength, method and seed come from the study file; its number of samples does not
     matter here. Prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a figure
@@ -525,8 +529,8 @@ def reliability(
     loaded = Study.from_toml(study)
     if loaded.sweep:
         raise InputError(
-            f"sweep: `stiction reliability` takes one interface, and {study} sweeps; give the point"
-            " you mean its values and take [[sweep]] out"
+            "sweep: `stiction reliability` takes one interface; set the values of one"
+            f" point in {study} and remove [[sweep]]"
         )
     out.mkdir(parents=True, exist_ok=True)
     curve = failure_curve(
@@ -558,8 +562,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         echo(f"stiction {__version__}")
         raise typer.Exit
 
@@ -619,7 +623,7 @@ def main() -> None:
             echo(f"error: {text}", err=True)
         sys.exit(2)
     except (RunError, TimeoutError, MemoryError, OSError) as error:
-        _end(str(error) or "there is not enough memory for this")
+        _end(str(error) or "not enough memory")
 
 
 def _end(text: str) -> None:

@@ -1,4 +1,4 @@
-"""Errors and warnings: what a user can get wrong, and what can stop a run."""
+"""Errors and warnings: invalid input, and failures of a run."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=No
 
 @contextmanager
 def collect_warnings() -> Iterator[list[Warned]]:
-    """What this package warns of meanwhile, in the order in which it comes up.
+    """Collect the warnings of this package meanwhile, in the order in which they occur.
 
     In this thread, and in those that run in its context. `warnings.catch_warnings` is for one
     thread at a time: it changes the whole process, and two threads would take each other's.

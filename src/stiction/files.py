@@ -22,7 +22,7 @@ UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip
-"""What damaged archives have been seen to raise."""
+"""Errors that damaged archives raise."""
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:

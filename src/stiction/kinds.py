@@ -1,4 +1,4 @@
-"""Fields of a model that hold one of several classes, told apart by `type` in a study file."""
+"""Fields of a model that hold one of several classes, distinguished by `type` in a study file."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence

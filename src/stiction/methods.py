@@ -1,4 +1,5 @@
-"""What a method is, which there are, and the onset of given profiles by any of them."""
+"""The protocol of methods, the registered ones, and the onset of given profiles by any of
+them."""
 
 from __future__ import annotations
 
@@ -48,7 +49,7 @@ _OWN = {
 
 
 class Method(Protocol):
-    """What makes an object a method: options, and a solver that follows from them.
+    """Protocol of a method: options, and a solver that follows from them.
 
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
     package that names it under the entry points "stiction.methods" offers it in study files too;

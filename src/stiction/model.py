@@ -494,7 +494,7 @@ def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
     return pydantic.TypeAdapter(_instances(annotation))
 
 
-def check_memory(name: str, needed: float, advice: str = "ask for fewer") -> None:
+def check_memory(name: str, needed: float, advice: str = "take fewer") -> None:
     """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
     try:
         there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")

@@ -172,13 +172,13 @@ class Problem:
             self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
-                "solid.plane: on an interface of two dimensions the solids are in three, so"
-                f" there is no plane {self.solid.plane}; leave plane = 'strain'"
+                "solid.plane: the solids beside a plane interface are three-dimensional,"
+                f" not in plane {self.solid.plane}; leave plane = 'strain'"
             )
         if self.interface.is_plane and self.mode != "II":
             problems.append(
-                "mode: on an interface of two dimensions load and slip are along x, which is"
-                f" mode II along x and mode III along y; leave mode = 'II', got {self.mode!r}"
+                "mode: on a plane, slip along x is mode II along x and mode III along y;"
+                f" leave mode = 'II', got {self.mode!r}"
             )
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
         if problems:
@@ -216,8 +216,8 @@ class Problem:
         if patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-                f" ({length:.3g} m): all of it slides as one; check the units of the length, the"
-                " shear modulus and the weakening rate if that is not meant",
+                f" ({length:.3g} m), which slides as a whole; if this is not intended, check"
+                " the units of the length, the shear modulus and the weakening rate",
                 UnitWarning,
             )
 
@@ -296,8 +296,8 @@ class Problem:
             raise InputError(
                 f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g}"
                 f" nodes; at least {FEWEST_NODES} are needed, that is interface.nodes >="
-                f" {' x '.join(f'{n:.10g}' for n in finer)}, got {' x '.join(map(str, shape))}; if"
-                " that is far, check the units of all lengths, moduli and strengths"
+                f" {' x '.join(f'{n:.10g}' for n in finer)}, got {' x '.join(map(str, shape))};"
+                " if that is far off, check the units of all lengths, moduli and strengths"
             )
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
@@ -381,8 +381,8 @@ class Problem:
             rates = np.where(constant, slowest, rates)
             if "constant" not in accept:
                 warn_accuracy(
-                    f"strength is not above residual_strength at {100.0 * constant.mean():.2g} %"
-                    " of the nodes; these do not weaken: their strength stays as it is"
+                    f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
+                    " % of the nodes; these do not weaken: their strength is constant"
                 )
         self._check_resolution(steepest_rate(strength, residual, rates))
         load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
@@ -397,9 +397,9 @@ class Problem:
             where = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
             node = ", ".join(map(str, where[1:]))
             problems.append(
-                f"strength: must be above initial_stress everywhere; sample {where[0]}, node"
-                f" {node}: {strength[where]:g} against {initial[where]:g} Pa;"
-                " only st.Rupture() begins above the strength"
+                f"strength: must be above initial_stress everywhere; sample {where[0]},"
+                f" node {node}: {strength[where]:g} against {initial[where]:g} Pa; only"
+                " st.Rupture() accepts stress above the strength"
             )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():

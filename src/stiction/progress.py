@@ -36,7 +36,7 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Progress of one piece of work, and the clock it is allowed to run by; a context manager.
+    """Progress of a computation, and its time limit; a context manager.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Meter:
 
     @property
     def text(self) -> str:
-        """How much is done, and how long it took and will take."""
+        """Return the progress, the elapsed and the remaining time, in words."""
         of = f" of {self.total:,}" if self.total else ""
         parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
         parts.append(duration(math.floor(self.elapsed)))
@@ -147,7 +147,7 @@ def _watch(ended: threading.Event) -> None:
 
 
 def _display() -> AbstractContextManager[Callable[[Meter, bool], object]]:
-    """A function that shows a meter, and is told which time is the last."""
+    """A function that shows a meter, with a flag at its last call."""
     shell = sys.modules.get("IPython")
     active = shell.get_ipython() if shell is not None else None
     if type(active).__name__ == "ZMQInteractiveShell":
@@ -216,7 +216,7 @@ class Portions:
         return self._pace is not None and self._pace > 1e-3
 
     def __call__(self, count: int) -> Iterator[slice]:
-        """Slices that cover `count` rows; the time until the next is asked for is measured."""
+        """Slices that cover `count` rows; the time between two slices is measured."""
         first, size = 0, self._smallest
         while first < count:
             if self._pace is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Variable:
-    """What a number in a result means.
+    """Unit, meaning and dimensions of a variable of a result.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Variable:
         SI; "1" for a pure number.
     long_name : str
     dims : tuple of str
-        The first is 'sample' for everything a method returns.
+        The first is 'sample' for all variables of a method.
     """
 
     units: str
@@ -66,7 +66,7 @@ def position(interface: Interface, variable: Variable) -> Variable:
 
 
 def onset_variables(interface: Interface) -> dict[str, Variable]:
-    """What every method returns for each sample."""
+    """Return the variables that every method computes for each sample."""
     place = position(interface, ONSET_VARIABLES["critical_position"])
     return ONSET_VARIABLES | {"critical_position": place}
 

@@ -58,7 +58,7 @@ class Solid:
         if not isinstance(named, dict) or "youngs_modulus" not in named:
             return given
         if "shear_modulus" in named or (isinstance(given, ArgsKwargs) and given.args):
-            raise InputError("give shear_modulus or youngs_modulus, by name, and not both")
+            raise InputError("give either shear_modulus or youngs_modulus, by name")
         ratio: Any = named.get("poisson_ratio")
         named = dict(named)
         modulus = check("youngs_modulus", named.pop("youngs_modulus"), Positive)
@@ -81,9 +81,9 @@ class Solid:
         speed = self.shear_wave_speed
         if not SLOWEST <= speed <= FASTEST:
             warn_user(
-                f"solid: shear waves run at {speed:.4g} m/s, as in no solid; check the units of"
-                f" shear_modulus = {self.shear_modulus:g} Pa and density ="
-                f" {self.density:g} kg/m3",
+                f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has;"
+                f" check the units of shear_modulus = {self.shear_modulus:g} Pa and"
+                f" density = {self.density:g} kg/m3",
                 UnitWarning,
             )
         return self

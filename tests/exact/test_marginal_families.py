@@ -67,7 +67,7 @@ def test_names_of_scipy_still_mean_scipy():
     [
         (lambda: st.Lognormal(mean=1e5, cv=0.1, low=2e5), "mean must be above low"),
         (lambda: st.Weibull(mean=1e5, cv=-0.1), "Weibull.cv: must be greater than 0"),
-        (lambda: st.TruncatedNormal(mean=1e6, cv=0.5, low=0.6e6), "wider than the cut leaves"),
+        (lambda: st.TruncatedNormal(mean=1e6, cv=0.5, low=0.6e6), "these limit the scatter"),
         (lambda: st.TruncatedNormal(mean=1e6, cv=0.1, high=0.5e6), "must lie between"),
         (lambda: st.RandomField({"type": "lognormal", "mean": 1.0}, SPECTRUM), "cv: missing"),
         (lambda: st.RandomField({"type": "wiebull", "mean": 1.0}, SPECTRUM), "mean 'weibull'"),

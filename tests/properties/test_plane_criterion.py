@@ -175,7 +175,7 @@ def test_refusals_name_what_is_wrong(plane):
     with pytest.raises(st.InputError, match="rounded.*line"):
         st.theory.nucleation_stress(plane, np.full((48, 48), 1e6), weights="rounded")
     wide = dataclasses.replace(plane, interface=st.Interface((0.02, 0.014), (64, 48)))
-    with pytest.raises(st.InputError, match="changed places: the first axis of a profile is x"):
+    with pytest.raises(st.InputError, match="swapped: the first axis of a profile is x"):
         st.onset(wide, np.full((48, 64), 1e6), method=METHOD)
     varying = np.full((48, 48), RATE)
     varying[3, 4] *= 0.9

@@ -87,7 +87,7 @@ def test_run_grow_look_export_report(command, study):
     code, out, _ = command("status", "run")
     assert code == 0
     assert "450 of 450 (100.0 %)" in out
-    assert "everything that is stored is what was written" in out
+    assert "all stored chunks match their checksums" in out
     assert command("export", "run", "result.nc")[0] == 0
     with xr.open_dataset("result.nc") as result:
         assert result.load().identical(st.Study.from_toml(study).run())
@@ -103,7 +103,7 @@ def test_parts_and_the_time_limit(command):
     assert "part 1/2: 156 of 300 samples in run" in out
     code, _, err = command("run", "study.toml", "--out", "run", "--time-limit", "1e-9")
     assert code == 3
-    assert "the same command goes on" in err
+    assert "rerun the command to resume" in err
     code, out, _ = command("run", "study.toml", "--out", "run", "--part", "2/2")
     assert "300 of 300" in command("status", "run")[1]
 
@@ -148,7 +148,7 @@ def test_interrupted_from_outside(command, study, number):
         err = process.communicate(timeout=60.0)[1]
     assert process.returncode == 130
     assert "interrupted:" in err
-    assert "what is done is stored in run; the same command goes on" in err
+    assert "samples so far are in run; rerun the command to resume" in err
     assert "Traceback" not in err
     assert "of 9000000" in command("status", "run")[1]
 
@@ -189,7 +189,7 @@ def test_messages_are_in_the_words_of_the_command_line(command):
     assert (code, "local_criterion" in out) == (0, True)
     np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
     err = command("onset", "study.toml", "--strength", "three.csv")[2]
-    assert "say which are meant: --x, --value" in err
+    assert "give --x, --value" in err
     assert in_options('pass gaps="skip" or interpolate=True', onset) == (
         "pass --gaps skip or --interpolate"
     )

@@ -127,10 +127,12 @@ def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(st
     for words, call in {
         "lies outside the marginal": lambda: field.given(3.0 * known, noise=1e3).sample(line),
         "the interface is 0.1 m long": lambda: field.given(far, noise=1e3).sample(line),
-        "is given one already": lambda: given.given(known, noise=1e3),
-        "was measured in places": lambda: st.theory.nucleation_statistics(own.problem, given),
-        "measured in places": lambda: st.theory.rice_distribution(own.problem, given),
-        "strength was measured in places of one specimen": lambda: st.infer(
+        "the field already has one": lambda: given.given(known, noise=1e3),
+        "is conditioned on": lambda: st.theory.nucleation_statistics(own.problem, given),
+        "conditioned on measured values": lambda: st.theory.rice_distribution(
+            own.problem, given
+        ),
+        "strength is conditioned on one specimen": lambda: st.infer(
             own.problem, given, [7e5, 7.1e5, 7.3e5], method=own.method, prior=prior
         ),
     }.items():

@@ -102,7 +102,7 @@ def test_maps_are_fitted_too():
 
 INFINITE = np.where(np.arange(COUNT) == 3, np.inf, VALUES)
 REFUSED = {
-    "does not say how far its points are apart": VALUES,
+    "has no point spacing": VALUES,
     "x repeats": labelled(x=np.repeat(PIECE.x[::2], 2)),
     "not equally spaced": labelled(x=PIECE.x**1.2),
     "40 measured points, too short": labelled(VALUES[:40], PIECE.x[:40]),
@@ -114,10 +114,10 @@ REFUSED = {
         ("x", "y"),
     ),
     "must be numbers": "profile.csv",
-    "none were given": [],
+    "must not be empty": [],
     "400 of 400 values ... do not lie between the bounds": labelled(-VALUES),
     "unknown unit 'banana'": labelled(x_unit="banana"),
-    "no unit of stress": labelled(unit="um"),
+    "not a unit of stress": labelled(unit="um"),
 }
 WRONG_OPTIONS = {
     "detrend ... noise ... bootstrap ... confidence ... seed ... progress": {
@@ -126,7 +126,7 @@ WRONG_OPTIONS = {
     "did you mean 'lognormal' ... did you mean 'exponent'": {
         "marginal": "lognormul", "spectrum": {"type": "power_law", "exponnt": 2.0},
     },
-    "anisotropy: is of maps": {"anisotropy": True},
+    "anisotropy: applies to maps only": {"anisotropy": True},
 }  # fmt: skip
 
 

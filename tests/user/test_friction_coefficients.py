@@ -32,7 +32,7 @@ def test_youngs_modulus_is_the_shear_modulus_in_other_words():
 
 
 MODULI = {
-    "and not both": {"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3},
+    "give either": {"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3},
     "youngs_modulus: must be greater than 0": {"youngs_modulus": -1e9, "poisson_ratio": 0.3},
     "poisson_ratio: missing": {"youngs_modulus": 1e9},
 }

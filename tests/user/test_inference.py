@@ -137,9 +137,9 @@ MISTAKES = {
     "lies above ... highest come from ... marginal.low = 900000": {
         "peaks": PEAKS + 1e6, "prior": PRIOR
     },
-    "peaks: are 2 ... at least 3": {"peaks": PEAKS[:2]},
-    "peaks: are 0": {"peaks": []},
-    "are 5, 1 of them different ... scatter": {"peaks": [0.7e6] * 5},
+    "at least 3 different ... got 2 in 2 peaks": {"peaks": PEAKS[:2]},
+    "got 0 in 0 peaks": {"peaks": []},
+    "at least 3 different ... got 1 in 5 peaks": {"peaks": [0.7e6] * 5},
     "number 1 is nan": {"peaks": [0.7e6, np.nan, 0.71e6]},
     "positive ... number 1": {"peaks": [0.7e6, -0.7e6, 0.71e6]},
     "peaks ... numbers": {"peaks": ["0.7", "0.8", "0.9"]},
@@ -197,7 +197,7 @@ def test_peaks_from_a_file(tmp_path):
 BAD_FILES = {
     "unit of the peaks is not stated": "peak\n0.71\n0.69\n0.7\n",
     "Mstone": "peak [Mstone]\n0.71\n0.69\n0.7\n",
-    "no column is called peak": "a [MPa],b [MPa]\n0.7,1\n0.6,2\n0.7,1\n",
+    "no column has a name like": "a [MPa],b [MPa]\n0.7,1\n0.6,2\n0.7,1\n",
     "may both be the peak": "peak [MPa],stress [MPa]\n0.7,1\n0.6,2\n0.7,1\n",
     "number 1 is nan": "peak [MPa],n [1]\n0.7,1\n,2\n0.7,1\n",
     "length ... not stated": "peak [MPa],length\n0.7,1\n0.6,2\n0.7,1\n",

@@ -113,7 +113,7 @@ def test_no_certificate_where_the_residual_strength_is_reached_first(solid):
 def test_nodes_of_constant_strength(plane, found):
     residual = np.zeros((72, 64))
     residual[10:14, 20:30] = 2e6
-    with pytest.warns(st.AccuracyWarning, match="stays as it is"):
+    with pytest.warns(st.AccuracyWarning, match="strength is constant"):
         held = onset(plane, {"strength": STRENGTH, "residual_strength": residual})
     # Constant strength is more than what weakens from the same peak.
     weaker = found["first_instability"].values[0]
@@ -136,8 +136,8 @@ def test_refusals(solid, plane):
     elsewhere = labelled(plane).assign_coords(x=900.0 * plane.interface.x)
     elsewhere["x"].attrs["units"] = "mm"
     odd = plane_of(solid, (74, 64))
-    refuses("x and y have changed places", lambda: onset(plane, STRENGTH.T))
-    refuses("x lies elsewhere than the 72 nodes", lambda: onset(plane, elsewhere))
+    refuses("x and y are swapped", lambda: onset(plane, STRENGTH.T))
+    refuses("x does not coincide with the 72 nodes", lambda: onset(plane, elsewhere))
     refuses("one sample", lambda: st.equilibrium_path(plane, SAMPLES, [1e5]))
     refuses("gap", lambda: st.Equilibrium(gap=1.0))
     refuses(
@@ -191,4 +191,4 @@ def test_command(tmp_path):
     assert "critical_position_y (m)" in run.output
     np.save(profile, STRENGTH.T * 1e-6)
     run = CliRunner().invoke(app, [*ask, "equilibrium"])
-    assert "changed places" in str(run.exception)
+    assert "are swapped" in str(run.exception)

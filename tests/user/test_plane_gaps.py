@@ -84,7 +84,7 @@ def heights(request, tmp_path):
 
 def test_heights_of_a_map_are_no_strength(heights):
     path, options = heights
-    with pytest.raises(st.InputError, match="plainly the strength|no unit of stress"):
+    with pytest.raises(st.InputError, match="clearly the strength|not a unit of stress"):
         st.read_profile(path, interface=PLANE, **options)
     found = st.read_profile(path, interface=PLANE, quantity="height", **options)
     np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
@@ -111,11 +111,11 @@ def test_other_maps_are_refused(tmp_path):
     for words, source, options in (
         ("x reaches from 0 to 19.375 m ... check the unit of x", metres, {}),
         ("16 columns without names, as of a matrix ... np.save", tmp_path / "matrix.csv", {}),
-        ("x and y have changed places", tmp_path / "turned.npy", {}),
+        ("x and y are swapped", tmp_path / "turned.npy", {}),
         ("y reaches from 0 to 0.019375 m", MAP.rename(x="y", y="x"), {}),
         ("x must be finite", unknown, {}),
         ("interpolate: are options of profiles of a line", MAP, {"interpolate": True}),
-        ("value: 'q' is not the one variable here, 'strength'", MAP, {"value": "q"}),
+        ("value: 'q' is not the name of the only variable, 'strength'", MAP, {"value": "q"}),
     ):
         refuses(words, lambda: st.read_profile(source, interface=PLANE, **options))  # noqa: B023
 

@@ -95,5 +95,5 @@ def test_load_of_a_plane_from_a_file(path, tmp_path):
     assert np.array_equal(study.experiments[0].problem.load.profile, profile)
     assert st.Study.from_dict(study.to_dict()) == study
     path.write_text(text.replace("load.npy", "turned.npy"))
-    with pytest.raises(st.InputError, match="load.profile.*x and y have changed places"):
+    with pytest.raises(st.InputError, match="load.profile.*x and y are swapped"):
         st.Study.from_toml(path)

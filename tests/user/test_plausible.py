@@ -28,7 +28,7 @@ def problem(modulus=1e9, density=1170.0, rate=0.5e12, length=LENGTH, pressure=No
 
 DOUBTS = {
     "units of shear_modulus = 1e.09 Pa and density = 1.17 kg/m3": lambda: problem(density=1.17),
-    "shear waves run at 0.02924 m/s, as in no solid": lambda: st.Solid(1.0, 0.33, 1170.0),
+    "shear wave speed is 0.02924 m/s, which no solid has": lambda: st.Solid(1.0, 0.33, 1170.0),
     "nucleation length 3.46e.03 m. fills the interface": lambda: problem(rate=0.5e6),
     "fills the interface": lambda: problem(slip=2.0).warn_of_units(1e6),
     "is 1e.03 of the shear modulus": lambda: problem(slip=2.0).warn_of_units(1e12),

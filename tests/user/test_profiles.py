@@ -196,7 +196,7 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
         np.testing.assert_allclose(profile, STRENGTH, rtol=1e-9)
     heights = st.read_profile(table, quantity="height", x=1)
     np.testing.assert_allclose(heights, 1e-6 * STRENGTH, rtol=1e-10)
-    refuses("strength is in m, which is no unit of stress", lambda: onset(heights))
+    refuses("strength is in m, which is not a unit of stress", lambda: onset(heights))
     table.write_text(table.read_text().replace("height (um)", "quality"))
     np.testing.assert_allclose(st.read_profile(table, interface=LINE), STRENGTH, rtol=1e-9)
     given = labelled().rename("tau")
@@ -204,10 +204,10 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
 
 
 COLUMNS = {
-    "say which are meant: x=..., value=": {},
+    "give x=..., value=": {},
     "unknown 'Local'; did you mean 'Local strength'": {"value": "Local"},
-    "strength is in um, which is no unit of stress": {"value": "height", "x": 1},
-    "said to be in kPa, the source states MPa": {"unit": "kPa", "x": 1},
+    "strength is in um, which is not a unit of stress": {"value": "height", "x": 1},
+    "given in kPa, but the source states MPa": {"unit": "kPa", "x": 1},
     "unknown 'stress'": {"quantity": "stress"},
     "interface: needed": {"interpolate": True},
     "unit: must be a valid string, got 3": {"unit": 3},
@@ -223,15 +223,15 @@ def test_columns_that_are_not_taken(table, words):
 def test_heights_are_no_strength(tmp_path, head):
     path = tmp_path / "p.csv"
     path.write_text(text_of([X * 1e3, STRENGTH], head=head))
-    words = "no variable that is plainly the strength ... 'height'"
+    words = "no variable that is clearly the strength ... 'height'"
     refuses(words, lambda: st.read_profile(path, interface=LINE))
-    with pytest.raises(st.InputError, match="no unit of stress|no variable that is plainly"):
+    with pytest.raises(st.InputError, match="not a unit of stress|no variable that is clearly"):
         st.read_profile(path, value=1, unit="um")
 
 
 TEXTS = {
     "1,5\n2,6\n": "may be one number or two",
-    "x;tau\n0;1e6\n0.05;strong\n": "line 3: 'strong' is no number",
+    "x;tau\n0;1e6\n0.05;strong\n": "line 3: 'strong' is not a number",
     "0;1\n0.05\n": "line 2 has 1 columns, line 1 has 2",
     "a;b;c\n1;2;3\n": "got 'a', 'b', 'c'",
     "x;tau;mu\n0;1\n": "line 1 names 3 columns",
@@ -240,9 +240,9 @@ TEXTS = {
     "x;tau\n": "holds no numbers",
     "x\0;tau\n": "not a text file",
     "x;tau\n;1e6\n0.05;1e6\n": "x must be finite; entry 0",
-    "x;tau\nmm;Pa\nmean;1\n0;1\n": "line 3: 'mean' is no number",
+    "x;tau\nmm;Pa\nmean;1\n0;1\n": "line 3: 'mean' is not a number",
     "x (mm);tau\nmm;Pa\n0;1\n": "line 2: 'mm' is neither a number nor a unit",
-    "x;tau\n0;1_000\n": "'1_000' is no number",
+    "x;tau\n0;1_000\n": "'1_000' is not a number",
 }
 
 
@@ -258,24 +258,24 @@ TENT = labelled(1e6 + 1e7 * np.minimum(COARSE, 0.1 - COARSE), COARSE)
 SQUARE = xr.DataArray(np.ones((NODES, NODES)), dims=("a", "b"))
 REFUSED = {
     # Units
-    "strength is in um, which is no unit of stress; give it in Pa": labelled(units="um"),
+    "strength is in um, which is not a unit of stress; give it in Pa": labelled(units="um"),
     "unknown unit 'mpa'; did you mean MPa?": labelled(units="mpa"),
     "unknown unit 'V'": labelled(units="V"),
-    "no unit of stress": labelled(units="1"),
+    "not a unit of stress": labelled(units="1"),
     "unknown unit": labelled(units="m/s/s/"),
     # Names
     "not clear from (a, b) ... call it 'x'": SQUARE,
     "strength: has no dimension along": xr.DataArray(STRENGTH, dims="sample"),
     # Places
-    "x lies elsewhere than the 128 nodes": labelled(x=np.linspace(0.0, 0.1, NODES)),
+    "x does not coincide with the 128 nodes": labelled(x=np.linspace(0.0, 0.1, NODES)),
     "128 points from 0 to 0.0982 ... check the unit of x": labelled(x=X * 0.99),
     "x reaches from 0 to 99.2 ... check the unit of x": labelled(x=X * 1e3),
-    "x = 0 and 0 m are one place": labelled(x=np.r_[X[0], X[0], X[2:]]),
-    "x = 0 and 0.1 m are one place": labelled(np.r_[STRENGTH, 2e6], np.r_[X, 0.1]),
+    "x = 0 and 0 m are the same position": labelled(x=np.r_[X[0], X[0], X[2:]]),
+    "x = 0 and 0.1 m are the same position": labelled(np.r_[STRENGTH, 2e6], np.r_[X, 0.1]),
     "x must be finite; entry 3": labelled(x=np.r_[X[:3], np.nan, X[4:]]),
     "crop the record ... or make interface.length 0.198": labelled(x=2.0 * X),
     "interpolate=True": labelled(x=UNEVEN),
-    "x=... names its column ... interpolate=True": xr.DataArray(STRENGTH[:60], dims="x"),
+    "the column of x (x=...) ... interpolate=True": xr.DataArray(STRENGTH[:60], dims="x"),
     "64 points from 0 to ... interpolate": labelled(STRENGTH[::2], X[::2]),
     # Gaps
     "(NaN) at x = 0.00078125 m (1 of 128": labelled(np.delete(STRENGTH, 1), np.delete(X, 1)),
@@ -293,7 +293,7 @@ def test_what_is_no_strength_here_is_refused(words):
 
 
 REFUSED_CALLS = {
-    "load.profile: x lies elsewhere": lambda: dataclasses.replace(
+    "load.profile: x does not coincide": lambda: dataclasses.replace(
         SYSTEM, load=st.Load(profile=labelled(1.0 + X, X * 0.99))
     ),
     "profile: load_profile is in Pa": lambda: dataclasses.replace(
@@ -304,8 +304,8 @@ REFUSED_CALLS = {
         TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True
     ),
     "gaps: must be 'refuse' or 'fill'": lambda: onset(STRENGTH, gaps="drop"),
-    "plainly the strength ... 'z'": lambda: st.read_profile(labelled().to_dataset(name="z")),
-    "value: 'q' is not the one variable here, 'tau'": lambda: st.read_profile(
+    "clearly the strength ... 'z'": lambda: st.read_profile(labelled().to_dataset(name="z")),
+    "value: 'q' is not the name of the only variable, 'tau'": lambda: st.read_profile(
         labelled().rename("tau"), value="q"
     ),
 }
@@ -317,7 +317,7 @@ def test_calls_that_are_refused(words):
 
 
 def test_centres_of_cells_are_taken_with_a_word():
-    with pytest.warns(st.AccuracyWarning, match="0.5 of a spacing beside the nodes"):
+    with pytest.warns(st.AccuracyWarning, match="0.5 of a spacing from the nodes"):
         assert found(labelled(x=X + 0.05 / NODES)) == found(STRENGTH)
 
 
@@ -439,7 +439,7 @@ def test_profiles_in_a_study_file(study, tmp_path):
 @pytest.mark.parametrize(
     ("words", "profile"),
     [
-        ("problem: load.profile: x lies elsewhere", {"file": "load.csv"}),
+        ("problem: load.profile: x does not coincide", {"file": "load.csv"}),
         ("did you mean 'interpolate'", {"file": "tau_r.csv", "interpol": True}),
         ("gaps: must be 'refuse' or 'fill'", {"file": "load.csv", "gaps": "skip"}),
         ("tau_r.csv: holds no variable", "tau_r.csv"),

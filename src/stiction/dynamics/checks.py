@@ -51,8 +51,8 @@ def at_first_slip(run: Run) -> State:
     step = run.medium.step
     if not resolves_steps(run, time):
         warn_accuracy(
-            f"the first slip comes after {time:.3g} s, too late for floating-point times to tell "
-            f"steps of {step:.2g} s apart: rupture speeds are nan, times rounded"
+            f"the first slip comes after {time:.3g} s, too late for floating-point times"
+            f" to resolve steps of {step:.2g} s: rupture speeds are NaN, times rounded"
         )
     scale = run.scale_at(float(load_at(*run.history, time)))
     if not scale > 0.0:
@@ -78,7 +78,7 @@ def at_first_slip(run: Run) -> State:
 
 
 def resolves_steps(run: Run, time: float) -> bool:
-    """Return whether the time since zero load, as a float, tells explicit steps apart."""
+    """Return whether the time since zero load, as a float, resolves explicit steps."""
     return float(np.spacing(time)) <= 0.01 * run.medium.step
 
 
@@ -109,7 +109,7 @@ def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: floa
 
 
 def check_finite(run: Run, state: State, reason: int) -> None:
-    """Raise a `FloatingPointError` that says when and where a run became non-finite."""
+    """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
     if reason == Reason.NOT_FINITE:
         now = state.now
         node = int(now["bad_node"])

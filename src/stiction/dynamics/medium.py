@@ -1,4 +1,4 @@
-"""What all runs of one problem share: stiffness, memory kernel, explicit time step."""
+"""Shared by all runs of one problem: stiffness, memory kernel, explicit time step."""
 
 import dataclasses
 import functools

@@ -163,7 +163,7 @@ class Rupture:
     def _consistent(self) -> Rupture:
         problems = []
         if (self.loading_rate is None) == (self.load is None):
-            problems.append("loading_rate: give it or `load`, and not both")
+            problems.append("loading_rate: give either loading_rate or load")
         if self.stop == "time" and self.end_time is None:
             problems.append("end_time: needed with stop='time', got None")
         if problems:

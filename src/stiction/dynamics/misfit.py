@@ -1,4 +1,4 @@
-"""How far is a simulated rupture from what gauges recorded, after the best shift in time?"""
+"""The misfit between a simulated rupture and gauge records, after the best shift in time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Misfit(NamedTuple):
         Root of the mean square difference over the root of the mean square of the record, all
         gauges together: 0 is perfect, 1 as bad as a record of zeros.
     time_shift : float
-        s, added to the times of the record.
+        Shift, s, that is added to the times of the record.
     by_gauge : (gauges,) array
         The misfit of each gauge alone, at the common shift.
     """

@@ -1,4 +1,4 @@
-"""What is kept of a rupture: frames, the record of every step, and a folder on disk."""
+"""Stored results of a rupture: frames, the record of every step, and a folder on disk."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ class Recorder:
         self._frames.append(frame)
 
     def take(self) -> xr.Dataset:
-        """Return all that was gathered since the last time, labelled."""
+        """Return the data gathered since the last call as a dataset."""
         interface, save = self.run.medium.interface, self.save
         names = ("time", *SCALARS, *save.fields)
         data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
@@ -279,7 +279,7 @@ class Recorder:
             ) from error
 
     def finish(self, dataset: xr.Dataset) -> None:
-        """Write what belongs to the run as a whole beside its frames."""
+        """Write the variables of the whole run beside its frames."""
         if self.save.to is not None:
             whole = dataset.drop_dims(["time", "step"], errors="ignore")
             write_whole(

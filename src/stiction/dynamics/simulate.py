@@ -134,7 +134,7 @@ def simulate_rupture(
 
 
 def _attributes(problem: Problem, method: Rupture) -> dict[str, Any]:
-    """Return what the result is labelled with; a friction law of one's own has no plain form."""
+    """Return the attributes of the result; a user-defined friction law has no plain form."""
     try:
         study: dict[str, Any] = {"problem": to_plain(problem), "method": to_plain(method)}
     except InputError as error:
@@ -143,7 +143,7 @@ def _attributes(problem: Problem, method: Rupture) -> dict[str, Any]:
 
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
-    """Take steps and keep frames until the run ends; return why it did."""
+    """Take steps and keep frames until the run ends; return the reason."""
     every, reversed_ = recorder.save.every, False
     while state.steps < most:
         count = every if state.explicit else max(1, every // 10)
@@ -170,7 +170,7 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
 def _complete(
     dataset: xr.Dataset, problem: Problem, method: Rupture, run: Run, state: State
 ) -> xr.Dataset:
-    """Add what belongs to the run as a whole."""
+    """Add the variables of the whole run."""
     interface = problem.interface
     found: dict[str, Any] = {
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),

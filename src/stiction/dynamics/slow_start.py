@@ -29,7 +29,7 @@ _TRIALS = 5
 
 
 def static_setting(problem: Problem) -> LineProgram | None:
-    """What finding equilibria of a problem needs; None where they are not followed."""
+    """Return the setting for equilibria of a problem; None where they are not followed."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return LineProgram(problem)

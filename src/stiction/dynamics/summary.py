@@ -47,7 +47,8 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
-    """What a run returns besides what every method does; speeds along x and y on a plane."""
+    """Return the variables of a run beside those of every method; on a plane, speeds along
+    x and y."""
     found = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     for name in ("rupture_speed", "median_rupture_speed"):
         found[name] = position(interface, found[name])

@@ -223,8 +223,8 @@ def fit_exponentials(
                 order = np.argsort(-poles.real)
                 return ExponentialSum(poles[order], weights[order], error, t_max)
     raise InputError(
-        f"kernel tolerance: {tolerance!r} on [0, {t_max:g}] was not reached with {MAX_PAIRS} "
-        f"pairs of exponentials (mode {mode}, c_d/c_s = {eta:.6g}); ask for less"
+        f"kernel tolerance: {tolerance!r} on [0, {t_max:g}] was not reached with {MAX_PAIRS}"
+        f" pairs of exponentials (mode {mode}, c_d/c_s = {eta:.6g}); use a larger tolerance"
     )
 
 

@@ -146,7 +146,7 @@ def solve_spans(
     the number of samples. An empty list is yielded about every second while nothing is done.
     Closing the generator cancels what has not begun.
 
-    `workers` is the number of threads, or of workers if an executor does not say how many it has.
+    `workers` is the number of threads, or of workers if an executor does not report theirs.
     A worker that is lost, or has other versions, is a `WorkerError`.
     """
     waiting = deque(spans)
@@ -189,7 +189,7 @@ def solve_spans(
 def _result(future: Future[Table], span: Span, seed: int) -> Table:
     try:
         return future.result()
-    except WorkerError:  # it was refused, and says why
+    except WorkerError:  # it was refused, with a reason
         raise
     except Exception as error:
         last = span.first + span.samples - 1

@@ -116,7 +116,7 @@ class Gathered:
         """Return everything as a dataset, in the order in which the method names it.
 
         Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
-        missing too, the attribute 'cut_short' says how many are done.
+        missing too, the attribute 'cut_short' gives the number that are done.
 
         Parameters
         ----------

@@ -61,7 +61,7 @@ class LimitState:
     def draws(self, seed: int, first: int, samples: int) -> Array:
         """Return the draws of samples first .. first + samples - 1 of this seed.
 
-        The same samples as `stiction.monte_carlo` takes, shape (samples, dimension).
+        They are those of `stiction.monte_carlo`, of shape (samples, dimension).
         """
         return self.experiment.draws(seed, first, samples)
 

@@ -21,7 +21,7 @@ from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
 FEW, SHOWN = 4, 3
-"""Warnings and failures that are told one by one."""
+"""Warnings and failures that are reported one by one."""
 HOPELESS = 16
 """Samples that fail, with none solved, before the whole ensemble is given up."""
 

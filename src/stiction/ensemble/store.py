@@ -1,4 +1,4 @@
-"""The store: a folder of chunks that say what they hold.
+"""The store: a folder of self-describing chunks.
 
 ``study.json`` says which study it is, and ``chunks/`` holds the samples. A chunk is a table of
 samples with a mark of their study; its name is a digest of its content. Chunks are written whole or
@@ -40,7 +40,7 @@ LARGE = 16 * 2**20
 
 
 class Damaged(ValueError):
-    """A file is not what was written; the message says what is wrong with it."""
+    """A stored file is damaged; the message gives the defect."""
 
 
 class Chunk(NamedTuple):
@@ -104,7 +104,7 @@ class Store:
         except (FileNotFoundError, Damaged):
             if list(store.chunks()) or STUDY in others:
                 store._warn(
-                    f"{STUDY} is damaged or gone; it is made of the study that is given"
+                    f"{STUDY} is damaged or missing; it is rebuilt from the given study"
                 )
         if before != study:
             _write_json(path / STUDY, study)
@@ -121,7 +121,7 @@ class Store:
         Raises
         ------
         StoreError
-            If something is there and cannot be read: nobody knows then whether it is damaged.
+            If something is there and cannot be read, so that damage cannot be ruled out.
         """
         self.damage = {}
         seen: set[str] = set()
@@ -155,8 +155,8 @@ class Store:
             found.add(chunk.versions)
         for other in sorted(found - {versions()}):
             self._warn(
-                f"was begun with {other}, this is {versions()}: samples of both may differ in"
-                " their last digits"
+                f"was begun with {other}, not {versions()}: samples of the two may differ"
+                " in their last digits"
             )
         for name, text in self.damage.items():
             self._warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")

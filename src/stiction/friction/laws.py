@@ -89,7 +89,7 @@ class FrictionLaw(ABC):
     @property
     @abstractmethod
     def parameters(self) -> Any:
-        """What f and kernels are given, with `initial_slope`: a NamedTuple of the law's own."""
+        """Parameters of f for kernels, with `initial_slope`: a NamedTuple type of this law."""
 
     @abstractmethod
     def area(self, u: Any) -> Array:
@@ -397,7 +397,7 @@ LAWS = {law.type: law for law in (LinearWeakening, ExponentialWeakening, Piecewi
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return in what a law of somebody else breaks the promises that every method relies on.
+    """Return the assumptions of the methods that a user-defined law violates.
 
     Strength begins at tau_p and never rises with slip; slope, area and inverse are those of f.
     """

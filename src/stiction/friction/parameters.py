@@ -1,4 +1,4 @@
-"""What kernels are given of a friction law, and the functions f by the type of these parameters."""
+"""Parameters of friction laws for kernels, and the functions f by the type of the parameters."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Scatter from specimen to specimen: what the means of several records tell of it."""
+"""Scatter from specimen to specimen, estimated from the means of several records."""
 
 import math
 from collections.abc import Sequence

@@ -41,7 +41,7 @@ PLACES = ("mean", "marginal.mean", "marginal.loc")
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """On which side of the mean a bound lies."""
 SAME = 1e-3
-"""As a share of an end of a range: how near to it an interval that tells nothing lies."""
+"""As a share of an end of a range: the distance within which an interval is uninformative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +344,7 @@ def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
 def cut(
     interval: tuple[float, float], limits: tuple[float, float], at: float
 ) -> tuple[float, float]:
-    """Cut an interval at limits; one that lies at a limit or beyond tells nothing, and is all.
+    """Cut an interval at limits; one at a limit or beyond becomes the whole range.
 
     Where there is no limit, it reaches to the estimate.
     """

@@ -125,7 +125,7 @@ def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
 ) -> list[tuple[dict[float | None, int], list[int]]]:
     """Return numbers of tests by length, m, and the places of parameters that are not known."""
-    problems = [] if designs else ["designs: are none"]
+    problems = [] if designs else ["designs: must not be empty"]
     plans = []
     for name, one in designs.items():
         table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}

@@ -31,7 +31,7 @@ from stiction.random.random_field import RandomField
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
-"""Correlation lengths below which a record says little of any parameter."""
+"""Correlation lengths below which a record constrains no parameter well."""
 FAR = 0.01
 """p-value below which a family does not suit."""
 ADVICE = {
@@ -70,12 +70,12 @@ Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
 class Goodness(NamedTuple):
-    """How well a family of marginals describes the values: its best member, and two measures.
+    """Quality of a family of marginals: its best member, and two measures of the fit.
 
     `distance` is the largest difference of the distribution functions (Kolmogorov). `score`
     is the log likelihood of as many independent values as the records hold correlation
     lengths, less the number of parameters, and less that of the best family; differences
-    below about 2 mean nothing.
+    below about 2 are not significant.
     """
 
     marginal: Any
@@ -85,36 +85,36 @@ class Goodness(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FieldFit:
-    """A random field fitted to measured profiles, and how far it may be trusted.
+    """Random field fitted to measured profiles, with intervals and doubts.
 
     Attributes
     ----------
     field : RandomField
-        To simulate with, without the measurement noise; it has the mean mode.
+        The fitted field for simulation, without measurement noise and with the mean mode.
     parameters : dict of str to float
-        What was estimated, in SI: ``efolding_length`` (m), at which the correlation of z falls to
-        1/e; ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
+        Estimates, in SI: ``efolding_length`` (m), at which the correlation of z falls to 1/e;
+        ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
         the names that study files use; ``anisotropy``; ``noise``, the standard deviation of the
         measurement noise; and ``between``, the coefficient of variation between specimens.
     interval : dict of str to (float, float)
-        Of each of them, from the bootstrap. That of the noise may begin at zero, those of bounds of
-        the marginal end outside the values, those of an exponent and of an anisotropy at the ranges
-        that are searched, 0.65 to 16 and 0.05 to 20.
+        Bootstrap interval of each parameter. The interval of the noise may begin at zero;
+        those of bounds of the marginal end outside the values; those of an exponent and of
+        an anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
         The fits to records simulated from `field`: what another measurement might have given.
     families : dict of str to Goodness
-        Of every family of marginals that was asked for.
+        Quality of every requested family of marginals.
     p_values : dict of str to float
-        Shares of the repetitions that are as far from their own marginal, and spectrum, as the
-        data are from the fitted ones (Barnard's test); small where a family does not suit.
+        Shares of the repetitions that are as far from their own marginal, and spectrum, as
+        the data are from the fitted ones (Barnard's test); small if a family does not fit.
     lengths_held : float
         Correlation lengths (on a plane, areas) that the records hold together.
     missing : (int, int)
-        Points without a value, which are left out, and all points.
+        Number of points without a value, which are left out, and of all points.
     doubts : tuple of str
-        Reasons not to trust it; empty if there are none.
+        Reasons not to trust the fit; empty if there are none.
     """
 
     field: RandomField
@@ -273,7 +273,9 @@ def fit_field(
         raise InputError(unknown_name("quantity", quantity, UNITS))
     records = records_of(profiles, interface, quantity)
     if anisotropy != 1.0 and records[0].values.ndim == 1:
-        raise InputError("anisotropy: is of maps; the profiles are lines, leave it out")
+        raise InputError(
+            "anisotropy: applies to maps only; the profiles are lines, leave it out"
+        )
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
     name, fixed = spectrum
@@ -396,20 +398,20 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: in
     held, noise = _lengths_held(found), found.model.noise
     if held < ENOUGH_LENGTHS:
         doubts.append(
-            f"the records hold {held:.2g} correlation lengths, too few for intervals to be trusted:"
-            f" at least {ENOUGH_LENGTHS:g} are needed; measure a longer piece, or several"
+            f"the records hold {held:.2g} correlation lengths, too few for reliable intervals:"
+            f" at least {ENOUGH_LENGTHS:g} are needed; measure a longer profile, or several"
         )
     left = max(_power_at_cutoff(found, window) for window in set(found.setting.windows))
     if left <= noise**2:
         doubts.append(
-            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
-            f" {math.sqrt(left):.3g} left: the correlation length rests on the family, not on the"
-            " data"
+            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field"
+            f" has {math.sqrt(left):.3g} left: the correlation length depends on the"
+            " family, not on the data"
         )
     for name, value, end in found.setting.spectrum.ends_met(found.model):
         doubts.append(
-            f"{name} {value:.3g} lies at the end of the range that is searched, {end:.3g}: the data"
-            " do not determine it; give it"
+            f"{name} {value:.3g} lies at the end of the searched range, {end:.3g}: the"
+            " data do not determine it; fix its value"
         )
     for name, p in p_values.items():
         if p <= FAR:

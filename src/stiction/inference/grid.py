@@ -19,7 +19,7 @@ NEGLIGIBLE = 1e-6
 """Mass outside that is given up on either side of a parameter when the grid closes in."""
 BATCH = 5_000
 FIRST = 500
-"""Points that tell how likely it gets."""
+"""Points from which the largest likelihood is estimated."""
 HOPELESS = 40.0
 """Points so many nats less likely than another hold nothing."""
 

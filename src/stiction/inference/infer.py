@@ -210,7 +210,7 @@ def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[
 
 
 def _out_of_reach(likelihood: Likelihood) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return which peaks nothing in the prior can produce, and the texts that refuse them."""
+    """Return the peaks that no parameters in the prior can produce, with the error messages."""
     masks, texts = [], []
     for number, peaks in enumerate(likelihood.peaks):
         low, high, places = likelihood.model.reach(number)
@@ -263,7 +263,7 @@ def _posterior(
 
 
 def _notes(likelihood: Likelihood, errors: Sequence[float], u: Array) -> tuple[str, ...]:
-    """Return what limits the posterior; what is serious is a warning as well."""
+    """Return the limitations of the posterior; serious ones are also issued as warnings."""
     model = likelihood.model
     notes = _piled_up(model.prior, u)
     middle = model.prior.theta(u.mean(axis=0, keepdims=True))

@@ -29,7 +29,7 @@ LEAST = 1e-12
 """Probability of a bin."""
 DIFFERENCE = 1e-5
 WIDEST = 10.0
-"""Ranges of the values that free bounds may lie away from them: beyond, they are not seen."""
+"""Ranges of the values that free bounds may lie away from them: beyond, they have no effect."""
 INSIDE = 1e-2
 """Of the range: how near to a bound noise leaves a value, for a first guess."""
 NEGLIGIBLE = 1e-4

@@ -45,8 +45,8 @@ def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[
     if len(simulated) not in NODES:
         names = ", ".join(prior.names[i] for i in simulated)
         raise InputError(
-            f"prior: {len(simulated)} parameters would have to be simulated on a grid, {names}; at"
-            f" most {max(NODES)} are possible: give the best known a value"
+            f"prior: {len(simulated)} parameters would have to be simulated on a grid,"
+            f" {names}; at most {max(NODES)} are possible: fix the best-known ones"
         )
     axes = []
     for i, (first, last) in enumerate(prior.theta(np.array([low, high])).T):
@@ -91,7 +91,7 @@ def experiments_at(
         with prior.named(theta):
             if length is not None and own.is_plane:
                 raise InputError(
-                    "peaks: lengths of specimens are of lines; the interface is a plane"
+                    "peaks: specimen lengths apply to lines only; the interface is a plane"
                 )
             if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
                 nodes = 2 * max(4, round(0.5 * length / own.spacing))

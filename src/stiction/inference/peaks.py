@@ -24,7 +24,7 @@ class Peaks(NamedTuple):
     Attributes
     ----------
     lengths : tuple of float or None
-        m, one for each kind of specimen; None for that of the problem.
+        Length of each kind of specimen, m; None for that of the problem.
     values : tuple of arrays
         Peaks of each kind: Pa, or coefficients of friction.
     coefficients : bool
@@ -62,8 +62,8 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
-            "peaks: of several specimens must map each length (m) to its peaks, such as"
-            f" {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
+            "peaks: for several specimens, map each length (m) to its peaks, such"
+            f" as {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
         )
     problems: list[str] = []
     values = []
@@ -78,9 +78,9 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     every = np.concatenate([np.zeros(0), *values])
     if every.size < FEWEST or np.ptp(every) == 0.0:
         raise InputError(
-            f"peaks: are {every.size}, {np.unique(every).size} of them different; at least"
-            f" {FEWEST} that scatter are needed, and fewer than about ten constrain little: see"
-            " st.design_of_tests"
+            f"peaks: at least {FEWEST} different values are needed, got"
+            f" {np.unique(every).size} in {every.size} peaks; fewer than about ten"
+            " constrain little: see st.design_of_tests"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
     return Peaks(lengths, tuple(values), is_in(unit, "1"))
@@ -106,7 +106,7 @@ def _values(name: str, given: Any, unit: str) -> Array:
     if values.ndim != 1:
         raise InputError(
             f"{name}: must be one list of numbers for one kind of specimen, got {describe(given)};"
-            " of several map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
+            " for several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
@@ -164,9 +164,7 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
     if peak is None and len(names) == 1:
         peak = names[0]
     if peak is None:
-        raise InputError(
-            f"no column is called peak [MPa] or the like; found {', '.join(names)}"
-        )
+        raise InputError(f"no column has a name like 'peak [MPa]'; found {', '.join(names)}")
     stated = table[peak].attrs.get("units", unit)
     if stated is None:
         raise InputError(
@@ -174,7 +172,7 @@ def _from_table(table: Any, unit: str | None) -> Peaks:
             " unit="
         )
     if unit is not None and unit != stated:
-        raise InputError(f"the peaks are in {stated} by the heading, but unit = {unit!r}")
+        raise InputError(f"the heading gives the peaks in {stated}, but unit = {unit!r}")
     values = table[peak].values
     if length is None:
         return make_peaks(values, stated)

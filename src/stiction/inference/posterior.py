@@ -28,12 +28,12 @@ class Posterior:
     names : tuple of str
         The keys of the prior.
     draws : dict of (draws,) arrays
-        Of each parameter, in its own unit.
+        Draws of each parameter, in its own unit.
     information : dict of float
-        Kullback-Leibler divergence of the posterior of each parameter alone from its prior, nats.
-        0 is nothing; ln 2 = 0.69 halves a uniform range.
+        Kullback-Leibler divergence of the posterior of each parameter alone from its prior,
+        nats. Halving a uniform range gives ln 2 = 0.69.
     total_information : float
-        The same of all parameters together.
+        The same for all parameters together.
     log_evidence : float
         Logarithm of the density of the peaks under the prior, for comparing models.
     monte_carlo_error : dict of float
@@ -42,9 +42,9 @@ class Posterior:
     method : str
         By what the onset was found.
     peaks : Peaks
-        What was measured.
+        The measured peaks.
     notes : tuple of str
-        What limits the result.
+        Limitations of the result.
     """
 
     peaks: Peaks

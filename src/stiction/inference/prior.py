@@ -1,4 +1,4 @@
-"""The prior: which parameters are not known, and what is thought of each before the tests."""
+"""The prior: the unknown parameters, and their distributions before the tests."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -163,8 +163,8 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     for name, field in random.properties.items():
         if field.conditions is not None:
             raise InputError(
-                f"random: {name} was measured in places of one specimen, and parameters are of all;"
-                " give the field without `given`"
+                f"random: {name} is conditioned on one specimen, but parameters apply to"
+                " all; pass the field without `given`"
             )
     prior = Prior(problem, random, found)
     for corner in itertools.product(*prior.ends.T):

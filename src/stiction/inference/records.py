@@ -11,7 +11,7 @@ from stiction.model import real_array
 from stiction.profiles.reading import is_labelled, points_of, simplified
 
 FEWEST = 64
-"""Measured points below which a record says nothing of a spectrum."""
+"""Fewest measured points from which a spectrum can be estimated."""
 NARROWEST = 8
 """Points in each direction."""
 UNEVEN = 0.02
@@ -41,9 +41,9 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
         except InputError as error:
             problems += error.problems
     if not found and not problems:
-        problems.append("profiles: none were given")
+        problems.append("profiles: must not be empty")
     if len({record.values.ndim for record in found}) > 1:
-        problems.append("profiles: are of lines and of planes; fit them one after the other")
+        problems.append("profiles: lines and planes are mixed; fit them separately")
     if problems:
         raise InputError(problems)
     return found
@@ -82,8 +82,8 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
         ) from None
     if interface is None:
         raise InputError(
-            f"an array of shape {array.shape} does not say how far its points are apart; give the"
-            " interface, or a DataArray over 'x' (m) such as st.read_profile returns"
+            f"an array of shape {array.shape} has no point spacing; give the interface,"
+            " or a DataArray over 'x' (m) such as st.read_profile returns"
         )
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):

@@ -35,7 +35,7 @@ RANGES = {
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
     "anisotropy": (0.05, 20.0),
     # A negative share stands for less at high wavenumbers than the field alone would have, by
-    # chance; were it cut at zero, the errors of small noises could not be told.
+    # chance; were it cut at zero, the errors of small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
 """Between which ends parameters are looked for; of noise, its share of the variance."""
@@ -182,7 +182,7 @@ class SpectrumFamily:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """What is estimated, in the order of the vector of parameters."""
+        """Names of the free parameters, in the order of the vector of parameters."""
         known: dict[str, Any] = self.fixed | {"anisotropy": self.anisotropy}
         known["noise_share"] = self.noise
         others = ("exponent",) if self.name != "power_law" else ()
@@ -191,7 +191,7 @@ class SpectrumFamily:
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Between which ends each of them is looked for."""
+        """Ends of the searched range of each parameter."""
         ranges = RANGES | {"correlation_length": self.lengths}
         return {name: ranges[name] for name in self.free}
 

@@ -1,4 +1,4 @@
-"""What a finite window does to a spectrum: taper, gaps and the removal of a trend, exactly.
+"""The exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
 A record is no period of the interface. Its periodogram, tapered and with a trend removed,
 has an expectation that is linear in the correlation,

@@ -1,4 +1,4 @@
-"""Failure probability: the curve over decades, and what weak interfaces have in common."""
+"""Failure probability: the curve over decades, and the weak spots of failing interfaces."""
 
 from contextlib import suppress
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a fit is judged by: a random field fitted to profiles, a posterior from peaks."""
+"""Figures for checking fits: a random field fitted to profiles, a posterior from peaks."""
 
 from dataclasses import replace
 from typing import Any
@@ -134,7 +134,7 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     factor = float(np.prod(one.window.spacings)) * scale**2
     k, measured, fitted = bands(one, model.expectation(one.window), 4).T
     spread = [factor * bands(one, power, 4)[:, 2] for power in simulated]
-    labels = "measured, averaged", "fitted, through the window"
+    labels = "measured, averaged", "fitted, with the window"
     _compare(axes, k, factor * measured, factor * fitted, spread, *labels)
     if model.noise**2 > 1e-6 * fitted.max():
         level = factor * model.noise**2

@@ -11,7 +11,7 @@ from stiction.interface import Interface
 from stiction.plot.axes import unit_for
 
 GREYS = LinearSegmentedColormap.from_list("pale greys", ["#6e6e6e", "#fbfbfb"])
-"""Light enough for outlines to be seen on it."""
+"""Light enough for visible outlines on it."""
 
 
 def edges(interface: Interface) -> tuple[float, float, float, float]:

@@ -223,7 +223,7 @@ def equilibrium_path(
     loads = path["load"].values * factor
     balanced = np.flatnonzero(~path["sliding"].values)
     if balanced.size == 0:
-        raise InputError("path: the interface slides at every load of it; give lower ones")
+        raise InputError("path: the interface slides at every load; give lower loads")
     if interface.is_plane:
         number = int(balanced[-1])
         slip = path["slip"].values[number]

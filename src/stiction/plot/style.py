@@ -92,7 +92,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def series(index: int, *, marker: bool = False) -> dict[str, Any]:
-    """Colour, dashes and (if asked) marker of series number `index`, as plot keywords."""
+    """Colour, dashes and (on request) marker of series number `index`, as plot keywords."""
     color, dashes, symbol = _SERIES[index % len(_SERIES)]
     style: dict[str, Any] = {"color": color, "linestyle": dashes}
     if marker:

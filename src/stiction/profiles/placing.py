@@ -1,7 +1,7 @@
 """Values put on the nodes of a line or a plane, and their gaps.
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
-anywhere. What is missing stays NaN until somebody asks for it to be filled.
+anywhere. What is missing stays NaN unless it is filled on request.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ def place(
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
             hint = (
-                "; give a value for each node, or x beside the values (x=... names its column),"
-                " with interpolate=True where points lie elsewhere than the nodes"
+                "; give a value for each node, or the column of x (x=...), with"
+                " interpolate=True if points do not lie on the nodes"
             )
             hint = turned(shape, interface.shape) if interface.is_plane else hint
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
@@ -103,9 +103,9 @@ def place(
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """What to add to a message on the shape of a plane if its axes have changed places."""
+    """Return the hint for a message on the shape of a plane if its axes are swapped."""
     if len(shape) == 2 and given == shape[::-1]:
-        return "; x and y have changed places: the first axis of a profile is x"
+        return "; x and y are swapped: the first axis of a profile is x"
     return ""
 
 
@@ -133,9 +133,9 @@ def _offset(dim: str, x: Array, interface: Interface) -> float | None:
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
         warn_accuracy(
-            f"{dim} lies {offset:.2g} of a spacing beside the nodes {dim}_i = i L/n, as at the"
-            f" centres of cells: node i stands for {dim}_i {offset * spacing:+.4g} m, to be"
-            " added to positions in the result"
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {dim}_i = i"
+            f" L/n, as at the centres of cells: node i stands for {dim}_i"
+            f" {offset * spacing:+.4g} m, to be added to positions in the result"
         )
     return offset
 
@@ -143,17 +143,17 @@ def _offset(dim: str, x: Array, interface: Interface) -> float | None:
 def _elsewhere(
     points: Points, offsets: dict[str, float | None], interface: Interface, gaps: Gaps
 ) -> list[str]:
-    """Why points cannot be put on the nodes as they are, and all that is to be decided."""
+    """Return the reason why points do not lie on the nodes, with the options of the user."""
     problems = []
     advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
     for dim, n, h in zip(interface.dims, interface.shape, interface.spacings, strict=True):
         if offsets[dim] is None:
             x = np.unique(points.places[dim])
             problems.append(
-                f"{dim} lies elsewhere than the {n} nodes {dim}_i = i L/n, which are {h:.6g} m"
-                f" apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m; check the unit of"
-                f" {dim}, give values at the nodes, as np.linspace(0, L, n, endpoint=False)"
-                f" does{advice}"
+                f"{dim} does not coincide with the {n} nodes {dim}_i = i L/n, which are"
+                f" {h:.6g} m apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m;"
+                f" check the unit of {dim}, give values at the nodes, as np.linspace(0,"
+                f" L, n, endpoint=False) does{advice}"
             )
     missing = int(np.isnan(points.values).sum())
     if missing and gaps == "refuse":
@@ -177,8 +177,8 @@ def _check_repeats(points: Points, twins: NDArray[np.int64], interface: Interfac
                 for dim, x in points.places.items()
             )
             raise InputError(
-                f"{where} are one place of an interface with the period {interface.length} m; keep"
-                f" one of the two values{'' if interface.is_plane else OF_A_PLANE}"
+                f"{where} are the same position on an interface of period {interface.length}"
+                f" m; keep one of the two values{'' if interface.is_plane else OF_A_PLANE}"
             )
 
 
@@ -216,7 +216,7 @@ def close_gaps(
     if not missing.any():
         return values, measured
     text = describe_gaps(missing, interface)
-    how = "smoothly from around them" if interface.is_plane else "with straight lines"
+    how = "smoothly from their rim" if interface.is_plane else "with straight lines"
     if gaps == "refuse":
         raise InputError(
             f"must be finite: there {text}; give what was measured, make interface.length that of"

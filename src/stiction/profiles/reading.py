@@ -1,7 +1,7 @@
 """Measured profiles: read from files and labelled arrays, and put on the nodes of an interface.
 
 Units that are stated are converted, coordinates decide where a value belongs, and gaps stay gaps
-until somebody asks for them to be filled. All of it is the same on a line and on a plane.
+unless they are filled on request. All of it is the same on a line and on a plane.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def read_profile(
             values, measured = place(points, interface, interpolate, gaps)
             places = interface.coordinates
         elif places and np.unique(places["x"]).size < values.size:
-            raise InputError(f"x repeats: one place stands beside two values{OF_A_PLANE}")
+            raise InputError(f"x repeats: there are two values at one position{OF_A_PLANE}")
     coords: dict[str, Any] = {
         dim: (dim, at, {"units": "m", "long_name": f"position along {dim}"})
         for dim, at in places.items()
@@ -199,7 +199,7 @@ def _values(array: Any, what: str, given: str | None, si: str) -> Any:
         factor = factor_to(si, given or stated or si)
         known = given and stated and parse(stated)
         if known and not np.isclose(factor_to(si, str(stated)), factor, rtol=1e-12):
-            raise InputError(f"is said to be in {given}, the source states {stated}")
+            raise InputError(f"is given in {given}, but the source states {stated}")
     return values * factor
 
 
@@ -228,7 +228,9 @@ def points_of(
     if hasattr(data, "data_vars"):
         data, x = _variable(data, quantity, dims, x, value)
     elif value is not None and value != data.name:
-        raise InputError(f"value: {value!r} is not the one variable here, {data.name!r}")
+        raise InputError(
+            f"value: {value!r} is not the name of the only variable, {data.name!r}"
+        )
     array = _along(data, dims, x)
     values = _values(array, quantity, unit, UNITS[quantity])
     if not {*dims, "row"} & set(array.dims):  # one value a sample
@@ -299,7 +301,7 @@ def _place_column(data: Any, names: list[str], quantity: str, value: Column) -> 
 
 
 def _named(data: Any, names: list[str], quantity: str, value: Column) -> str:
-    """The variable that was asked for, or the one that is plainly the quantity."""
+    """Return the requested variable, or the one that is clearly the quantity."""
     if value is not None:
         return _column(data, names, "value", value)
     if len(names) == 1 and _is_unnamed(data[names[0]]):
@@ -308,7 +310,7 @@ def _named(data: Any, names: list[str], quantity: str, value: Column) -> str:
     for called in (quantity, *NAMES.get(quantity, ()), *alone):
         if found := [name for name in names if _plain(name) == called]:
             return found[0]
-    # Any number is dimensionless: for such a quantity a unit says nothing.
+    # Any number is dimensionless: such a quantity cannot be recognised by its unit.
     si = UNITS[quantity]
     fitting = [name for name in names if si != "1" and is_in(_unit_of(data[name]), si)]
     if len(fitting) != 1:
@@ -331,9 +333,9 @@ def _unclear(data: Any, names: list[str], quantity: str) -> str:
     hint = OF_A_PLANE * (matrix or {"x", "y"} <= {_plain(name) for name in data.data_vars})
     hint += "; heights are read with quantity='height'" * (quantity == "strength")
     return (
-        f"holds no variable that is plainly the {quantity} ({UNITS[quantity]}): got"
-        f" {_listed(data, names)}. Call it {quantity!r}, state its unit, or say which are meant:"
-        f" x=..., value=... and unit=...{hint}"
+        f"holds no variable that is clearly the {quantity} ({UNITS[quantity]}): got"
+        f" {_listed(data, names)}. Call it {quantity!r}, state its unit, or give x=...,"
+        f" value=... and unit=...{hint}"
     )
 
 

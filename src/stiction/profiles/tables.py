@@ -53,7 +53,7 @@ def load(path: Path, dims: tuple[str, ...]) -> xr.Dataset | xr.DataArray:
             AttributeError,
             TypeError,
         ) as error:
-            raise InputError(f"is no NetCDF file of numbers: {error}") from None
+            raise InputError(f"is not a NetCDF file of numbers: {error}") from None
     if ending != ".npy":
         raise InputError(
             f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r};"
@@ -137,7 +137,7 @@ def read_table(path: Path) -> xr.Dataset:
             if value is not None:
                 columns[column, place] = value
             elif cell.lower() not in _EMPTY:
-                raise InputError(f"line {number}: {describe(cell)} is no number")
+                raise InputError(f"line {number}: {describe(cell)} is not a number")
     if not header and comment:
         cells = [comment] if width == 1 else _split(comment, separator)
         header = [(0, cells)] if len(cells) == width else []
@@ -202,8 +202,8 @@ def _headings(
     if not rows:
         number, cells = header[-1]
         raise InputError(
-            f"line {number} names {len(cells)} columns, the numbers below it have {width}; begin"
-            " lines that are no names with '#'"
+            f"line {number} names {len(cells)} columns, the numbers below it have"
+            f" {width}; begin comment lines with '#'"
         )
     found = []
     for column, heading in enumerate(rows[0][1]):

@@ -94,5 +94,5 @@ def factor_to(si: str, text: str) -> float:
         )
     if given.dimension != wanted.dimension:
         what = _MEANING.get(si, si)
-        raise InputError(f"is in {text}, which is no unit of {what}; give it in {si}")
+        raise InputError(f"is in {text}, which is not a unit of {what}; give it in {si}")
     return given.factor / wanted.factor

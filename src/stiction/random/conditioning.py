@@ -107,7 +107,7 @@ Points = Annotated[
 
 @model
 class Conditions:
-    """What was measured of a field: values and their error, in its unit (`RandomField.given`)."""
+    """Measured values of a field and their error, in its unit (`RandomField.given`)."""
 
     profile: Points
     noise: Positive

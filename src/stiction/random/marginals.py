@@ -23,7 +23,7 @@ from stiction.model import Positive, Real, describe, is_finite, model
 
 
 class Marginal:
-    """What all marginals share: a frozen `scipy.stats` distribution."""
+    """Base class of marginals: a frozen `scipy.stats` distribution."""
 
     type: str
 
@@ -251,10 +251,10 @@ class TruncatedNormal(_ByMoments):
         found = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if found is None or not np.abs(moments(found.x)).max() < 1e-8:
             raise InputError(
-                f"no normal distribution cut at low={self.low:g} and high={high:g} has"
-                f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between them, and it"
-                " would have to be wider than the cut leaves; lower cv or the bound, or take"
-                " st.Lognormal or st.Beta"
+                f"no normal distribution truncated at low={self.low:g} and high={high:g}"
+                f" has mean={self.mean:g} and cv={self.cv:g}: the mean must lie between"
+                " the bounds, and these limit the scatter; lower cv or the bound, or"
+                " take st.Lognormal or st.Beta"
             )
         return scipy.stats.truncnorm(*parameters(found.x))
 
@@ -267,7 +267,7 @@ class TruncatedNormal(_ByMoments):
 class ScipyMarginal(Marginal):
     """A continuous `scipy.stats` distribution, known by scipy's name and the given parameters.
 
-    One that scipy has no name for is kept `frozen`: for Python only, equal to itself only.
+    One without a name in scipy is kept `frozen`: it exists in Python only and equals only itself.
     """
 
     type: str

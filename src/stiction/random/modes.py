@@ -1,4 +1,4 @@
-"""The discrete spectrum of a field: which waves an interface holds, and how strong each is."""
+"""The discrete spectrum of a field: the waves on an interface and their amplitudes."""
 
 import math
 from dataclasses import dataclass
@@ -138,6 +138,6 @@ def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
 def _refuse_too_many(modes: float) -> None:
     if not modes <= MOST_MODES:
         raise InputError(
-            f"spectrum: has {modes:.10g} modes on this interface, at most {MOST_MODES} may be;"
-            " truncate it earlier, or check the units of the lengths"
+            f"spectrum: has {modes:.10g} modes on this interface, at most {MOST_MODES}"
+            " are allowed; truncate it earlier, or check the units of the lengths"
         )

@@ -188,7 +188,7 @@ class RandomField:
         True
         """
         if self.conditions is not None:
-            raise InputError("profile: this field is given one already; join both into one")
+            raise InputError("profile: the field already has one; join both into one")
         known: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=known)
 
@@ -325,7 +325,9 @@ class RandomField:
         The correlation is that of the mapped field or of the Gaussian one, z.
         """
         if isinstance(self.spectrum, CustomSpectrum):
-            raise InputError("spectrum: a spectrum of your own has no length that could be set")
+            raise InputError(
+                "spectrum: a user-defined spectrum has no correlation length to set"
+            )
         xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
         spectrum = dataclasses.replace(self.spectrum, correlation_length=xi)
         return dataclasses.replace(self, spectrum=spectrum)

@@ -35,7 +35,7 @@ LARGEST_ERROR = 1e-6
 
 
 class SpectralDensity:
-    """What all spectra share; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
+    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
 
     power_kept: float | None
     default_power: ClassVar[float] = 0.9997
@@ -134,7 +134,7 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 
 @model
 class ScaledSpectrum(SpectralDensity):
-    """Spectra known by one length: g depends on k times it only."""
+    """Base class of spectra with one length: g depends on k times it only."""
 
     correlation_length: Positive
     truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
@@ -390,8 +390,9 @@ def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array
     last = 1.0 - np.interp(1e-3 * SHORTEST, edges, sums) / sums[-1]
     if spectrum.max_wavenumber is None and last > 1e-3:
         raise InputError(
-            f"function: {100.0 * last:.2g} % of its power lie above {1e-3 * SHORTEST:g} rad/m: the"
-            f" integral of g(k){' k' * (dimensions - 1)} does not converge; give max_wavenumber"
+            f"function: {100.0 * last:.2g} % of its power lies above {1e-3 * SHORTEST:g}"
+            f" rad/m: the integral of g(k){' k' * (dimensions - 1)} does not converge;"
+            " give max_wavenumber"
         )
     return edges, sums
 

@@ -1,4 +1,4 @@
-"""What is random on a problem, as stresses: friction coefficients times the normal pressure."""
+"""Random properties of a problem as stresses: friction coefficients times the normal pressure."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -133,6 +133,6 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
             " residual strength, or check the unit of both (Pa)"
         )
     warn_accuracy(
-        f"{said}; there the interface does not weaken. If that is not meant, lower the residual"
-        " strength or choose a marginal that stays above it"
+        f"{said}; there the interface does not weaken. If this is not intended, lower the"
+        " residual strength or choose a marginal that stays above it"
     )

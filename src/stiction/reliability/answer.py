@@ -1,4 +1,4 @@
-"""What the three questions share: options and their checks, answers, and doubts about them."""
+"""Common parts of the reliability functions: checks of options, answers, and warnings."""
 
 import math
 from collections.abc import Sequence
@@ -44,26 +44,26 @@ class Answer:
     stress : float
         Pa.
     probability : float
-        Of an onset below `stress`.
+        Probability of an onset below `stress`.
     interval : tuple of float
-        Confidence interval of what was asked for.
+        Confidence interval of the result.
     cv : float
         Coefficient of variation of the probability at `stress`: estimated standard error over the
-        estimate; infinite if no failure was seen, zero if exact.
+        estimate; infinite without a failure, zero if exact.
     evaluations, first_stage_evaluations : int
-        Samples that the method was asked for, and only its less expensive first stage.
+        Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
         Pa; no sample slides below `lower_bound`.
     algorithm : str
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled).
     reason : str
-        Why this algorithm.
+        Reason for the choice of the algorithm.
     confidence : float
-        Of `interval`.
+        Confidence level of `interval`.
     warnings : tuple of str
-        Why the answer is not to be trusted; empty if it is.
+        Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
-        Mean over the interface, Pa, and `stress` over it; NaN if the problem has none.
+        Mean pressure, Pa, and `stress` over it; NaN without a normal pressure.
     """
 
     stress: float
@@ -116,7 +116,7 @@ class FailureProbability(Answer):
     Attributes
     ----------
     failing_profiles : xarray.Dataset
-        Some samples from the failure set over ('sample', 'x'), as likely as they are there:
+        Some samples of the failure set over ('sample', 'x'), drawn with its distribution:
         `strength` (and what else is random), `critical_stress`, `critical_position`, ...
     """
 
@@ -180,8 +180,9 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
         return None
     return (
         f"{CHAIN:,} evaluations of subset simulation by {kind!r} would take about"
-        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or count"
-        " (failure_probability with algorithm='plain', or quantiles of st.monte_carlo)"
+        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or use"
+        " plain Monte Carlo (failure_probability with algorithm='plain', or quantiles of"
+        " st.monte_carlo)"
     )
 
 
@@ -191,7 +192,7 @@ def bounded(lowest: float) -> bool:
 
 
 def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
-    """Return that the estimate is less precise than asked for, if so, and what to do."""
+    """Return a warning if the estimate is less precise than `target_cv`."""
     text = (
         f"the coefficient of variation is {cv:.3g}, not {target_cv:g}: {evaluations} evaluations"
         " do not suffice; raise max_evaluations"

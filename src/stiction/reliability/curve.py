@@ -37,11 +37,11 @@ VARIABLES = {
     name: Variable(unit, text, ("point",))
     for name, unit, text in (
         ("stress", "Pa", "stress"),
-        ("stress_above_bound", "Pa", "stress above the least possible one"),
+        ("stress_above_bound", "Pa", "stress above its lower bound"),
         ("friction_coefficient", "1", "stress over the mean normal pressure"),
         ("probability", "1", "probability of an onset below the stress"),
-        ("probability_low", "1", "lower end of its interval"),
-        ("probability_high", "1", "upper end of its interval"),
+        ("probability_low", "1", "lower end of the interval of the probability"),
+        ("probability_high", "1", "upper end of the interval of the probability"),
         ("cv", "1", "coefficient of variation of the probability"),
         ("stress_low", "Pa", "lower end of the interval of the stress"),
         ("stress_high", "Pa", "upper end of the interval of the stress"),
@@ -123,15 +123,16 @@ def design_stress(
             if on_it >= probability:
                 stress, cv = lowest, tail.cv(least)
                 doubts.append(
-                    f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa, as far as"
-                    f" the method can tell: the stress at P = {probability:g} is the bound itself"
+                    f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
+                    " within the accuracy of the method: the stress at P ="
+                    f" {probability:g} is the bound itself"
                 )
             interval = tail.stress_interval(probability, cv, confidence, lowest)
             doubts += imprecise(cv, target_cv, tail.spent)
             if tail.algorithm == "subset":
                 near = tail.repetitions[-1].around(stress)
                 doubts += exact_doubts(state, near, stress, probability)
-        else:  # below the lowest value seen of the tail nothing is known
+        else:  # the tail ends at its lowest sample
             cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
             interval = (lowest, stress) if stress > lowest else state.bounds
             doubts.append(tail.short_of(f"P = {probability:g}"))

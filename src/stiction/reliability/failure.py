@@ -42,7 +42,7 @@ SHOWN = 20
 CHECKED = 32
 """Failures among the samples that are solved by equilibrium too."""
 COVERED = 0.8
-"""Share of the failures that the first stage must reach, or a warning says that it does not."""
+"""Share of the failures that the first stage must reach to avoid a warning."""
 
 
 @checked
@@ -153,9 +153,12 @@ def failure_probability(
 
 def _certain(stress: float, low: float, high: float) -> dict[str, Any]:
     """Return the attributes of an answer where no sample is needed."""
-    chance, reason = 0.0, f"no interface slides at or below {low:g} Pa, where nothing slips"
+    chance, reason = 0.0, f"no interface slides at or below {low:g} Pa"
     if stress >= high:
-        chance, reason = 1.0, f"no interface holds more than the greatest strength, {high:g} Pa"
+        chance, reason = (
+            1.0,
+            f"no interface carries more than the greatest strength, {high:g} Pa",
+        )
     found = {"probability": chance, "interval": (chance, chance), "cv": 0.0, "evaluations": 0}
     return found | {"algorithm": "exact", "reason": reason}
 
@@ -170,7 +173,7 @@ def _sampled(
     confidence: float,
 ) -> dict[str, Any]:
     """Choose the algorithm, and return the attributes of an answer by sampling."""
-    reason, pilot = "as asked", None
+    reason, pilot = "as requested", None
     start, least = 0, min(PILOT, max(budget // 5, 50))
     if algorithm == "auto" and slow is not None:
         algorithm, reason = "plain", slow

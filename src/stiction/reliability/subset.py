@@ -50,7 +50,7 @@ class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
     Below the threshold lies the share of the last population that would go on: the failures, if the
-    repetition is complete, that is if it reached the threshold or the probability asked for.
+    repetition is complete, that is if it reached the threshold or the requested probability.
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -62,7 +62,7 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest value seen."""
+        """Lowest and highest value of the samples."""
         return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
 
     def light(self) -> Self:

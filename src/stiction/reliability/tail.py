@@ -39,7 +39,7 @@ class Tail(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether it reaches as far down as asked for."""
+        """Whether the tail reaches the requested level."""
         return bool(self.repetitions[0].complete)
 
     @property
@@ -48,7 +48,7 @@ class Tail(NamedTuple):
         return float(np.nextafter(self.repetitions[0].threshold, math.inf))
 
     def short_of(self, goal: str) -> str:
-        """Return in words that it does not reach as far down as asked for."""
+        """Return a message that the tail does not reach the requested level."""
         text, advice = f"{self.spent} evaluations do not reach {goal}", "raise max_evaluations"
         if self.algorithm == "two_level":
             return f"{text}: {advice}"
@@ -59,13 +59,13 @@ class Tail(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress seen, Pa."""
+        """Lowest and highest stress of the samples, Pa."""
         lowest, highest = zip(*(one.extent for one in self.repetitions), strict=True)
         return min(lowest), max(highest)
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """What an answer holds of it."""
+        """Attributes of an answer."""
         return {
             "evaluations": self.spent,
             "first_stage_evaluations": sum(o.first_stage_evaluations for o in self.repetitions),
@@ -117,7 +117,7 @@ class Tail(NamedTuple):
     def stress_interval(
         self, probability: float, cv: float, confidence: float, lowest: float
     ) -> tuple[float, float]:
-        """Return stresses whose estimated probabilities bracket the one asked for."""
+        """Return stresses whose estimated probabilities bracket the requested one."""
         least, highest = self.extent
         if not math.isfinite(cv):
             return lowest, highest
@@ -188,7 +188,7 @@ def sample_tail(
     budget: int,
     stress: float = -math.inf,
     probability: float = 0.0,
-    reason: str = "as asked",
+    reason: str = "as requested",
     pilot: tuple[Array, Array] | None = None,
 ) -> Tail:
     """Sample the lower tail down to a stress, or down to a probability.

@@ -30,7 +30,7 @@ STEPS = 10
 FORGOTTEN = 5
 """Exact steps of each walk in the failure set, and how many of them are forgotten."""
 MARGIN = 2.5
-"""The guide's level should be this many times likelier than the probability asked for, or more."""
+"""The guide's level should be this many times likelier than the requested probability, or more."""
 
 
 class Bridge(NamedTuple):
@@ -62,7 +62,7 @@ class Bridge(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress seen, Pa; of no sample, infinity and less."""
+        """Lowest and highest stress of the samples, Pa; without any, plus and minus infinity."""
         if not self.values.size:
             return math.inf, -math.inf
         return float(self.values.min()), float(self.values.max())
@@ -140,13 +140,13 @@ def bridge(
         if probability:
             share = probability / math.exp(population.log_probability)
             limit = float(np.quantile(values, share)) if share < 1.0 else -math.inf
-            if limit == floor:  # so many lie on it that the probability asked for does, too
+            if limit == floor:  # so many lie on it that the requested probability does, too
                 limit = math.nextafter(floor, math.inf)
         failed = values < limit
         if not failed.any():
             if best is not None:
                 break
-            if probability:  # this level is rarer than the probability asked for
+            if probability:  # this level is rarer than the requested probability
                 continue
         last, last_variance = 1.0, 0.0
         failing, stresses = draws[failed], values[failed]

@@ -1,4 +1,4 @@
-"""How far an estimated probability may be off: intervals, and the variance of correlated chains."""
+"""Errors of estimated probabilities: intervals, and the variance of correlated chains."""
 
 import math
 

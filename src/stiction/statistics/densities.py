@@ -28,7 +28,7 @@ class Density:
     x, value : (m,) arrays
         Centres of equal cells, in the unit of the values, and the density there, 1/unit.
     error : (m,) array
-        Its standard error from sampling; smoothing over `bandwidth` is not part of it.
+        Standard error of the density from sampling, without the effect of smoothing.
     bandwidth : float
         Standard deviation of the smoothing kernel at the median, in the unit of the values.
     """

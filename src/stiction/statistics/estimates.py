@@ -29,13 +29,13 @@ Share: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and how well it is known.
+    """An estimated number and its standard error.
 
     Attributes
     ----------
     value : float
     error : float
-        Standard error; zero for what is exact.
+        Standard error; zero if exact.
     """
 
     value: float

@@ -121,7 +121,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
         "load.normal_pressure: varies and strength is in coefficients": (
             pressure is not None and np.ptp(pressure) > 0.0
         ),
-        "strength: was measured in places": strength.conditions is not None,
+        "strength: is conditioned on measured values": strength.conditions is not None,
         "friction.weakening_rate: varies or follows from the strength": (
             problem.uniform_rate is None
         ),

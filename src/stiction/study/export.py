@@ -1,4 +1,4 @@
-"""Results as files for other programs: the suffix says which kind, and units go along."""
+"""Results as files for other programs: the suffix selects the format, and units are kept."""
 
 import errno
 import os
@@ -18,16 +18,16 @@ SUFFIXES = (".nc", ".csv")
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a file name whose suffix does not say what can be written."""
+    """Refuse a file name whose suffix names no format that can be written."""
     if path.suffix not in SUFFIXES:
         raise InputError(
-            f"{path}: the suffix says what is written, and must be one of {', '.join(SUFFIXES)};"
-            f" got {path.suffix or 'none'!r}"
+            f"{path}: the suffix must be one of {', '.join(SUFFIXES)}; got"
+            f" {path.suffix or 'none'!r}"
         )
 
 
 def export(result: xr.Dataset, path: Path) -> None:
-    """Write a result as its suffix says, whole or not at all.
+    """Write a result in the format of its suffix, whole or not at all.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as one NetCDF file with checksums, whole or not at all."""
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
-        # The NetCDF library does not say that the disk is full, and holds on to what it has begun.
+        # The NetCDF library does not report a full disk, and keeps its unfinished file open.
         if free < 1.05 * result.nbytes + OVERHEAD:
             raise cannot("written", path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     encoding = {

@@ -1,4 +1,4 @@
-"""Runs on disk: parts of a study for several jobs, and what is stored read back."""
+"""Runs on disk: parts of a study for several jobs, and reading of stored samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,28 +49,28 @@ def as_part(value: Any) -> Part:
         if part.number <= part.of:
             return part
     raise InputError(
-        "part: must be which part of how many, such as 3/100 (in Python also (3, 100)), from"
-        f" 1/100 to 100/100; got {describe(value)}"
+        "part: must be a part and the number of parts, such as 3/100 (in Python also (3,"
+        f" 100)), from 1/100 to 100/100; got {describe(value)}"
     )
 
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is.
+    """State of a run.
 
     Attributes
     ----------
     samples, done : int
-        Of all points together.
+        Total of all points.
     done_by_point : (points,) array
     failures : tuple of Failure
     damaged : tuple of str
-        What is wrong with which chunk; running the study again mends it.
+        Defect of each damaged chunk; running the study again repairs it.
     chunks, bytes : int
     seconds : float
         Computing time of all workers together.
     versions : tuple of str
-        Versions of what computed it.
+        Versions of the packages that computed the samples.
     """
 
     samples: int
@@ -109,12 +109,12 @@ class StoredRun:
         return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
 
     def status(self) -> Status:
-        """Return how far it is, after a comparison of everything with its digests.
+        """Return the state of the run, after a comparison of all chunks with their checksums.
 
         Raises
         ------
         StoreError
-            If something is there and cannot be read.
+            If a stored file cannot be read.
         """
         rows, chunks = self._read(only=())
         return Status(
@@ -130,17 +130,17 @@ class StoredRun:
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
-        """Return everything that is stored, labelled, NaN where a sample is missing.
+        """Return all stored samples as a dataset, with NaN for missing samples.
 
         Parameters
         ----------
         only : sequence of str, optional
-            Names of the variables to read; all if left out.
+            Names of the variables to read; all by default.
 
         Warns
         -----
         UserWarning
-            If something is damaged.
+            If a chunk is damaged.
         """
         rows, _ = self._read(only)
         for name, text in self._store.damage.items():
@@ -162,14 +162,14 @@ class StoredRun:
         return rows, chunks
 
     def export(self, path: str | Path) -> None:
-        """Write `dataset` as the suffix says (.nc or .csv), whole or not at all.
+        """Write `dataset` in the format of its suffix (.nc or .csv), whole or not at all.
 
         Raises
         ------
         InputError
-            If the suffix is another one.
+            If the suffix is neither.
         StoreError
-            If it cannot be written.
+            If the file cannot be written.
         """
         target = check("path", path, FilePath)
         check_suffix(target)

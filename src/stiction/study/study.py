@@ -249,7 +249,7 @@ class Study:
         if part is not None:
             mine = as_part(part)
             if out is None:
-                raise InputError("part: a part is stored; say where with out=")
+                raise InputError("part: needs out=, the folder in which the parts are stored")
             others = ~mine.mask(len(self.experiments), self.ensemble.samples)
             pilot = pilot and mine.number == 1
         if out is not None:
@@ -319,13 +319,13 @@ class Study:
         try:
             given = json.loads(result.attrs["study"])
         except (TypeError, ValueError, RecursionError) as error:
-            raise InputError(f"result: its attribute 'study' is no JSON: {error}") from None
+            raise InputError(f"result: its attribute 'study' is not JSON: {error}") from None
         return cls.from_dict(given)
 
 
 @model(kw_only=True)
 class _Parts:
-    """What a point of a sweep consists of, each part valid by itself."""
+    """The parts of a point of a sweep, each valid by itself."""
 
     problem: Problem
     random: AnyRandom
@@ -411,5 +411,5 @@ def open_run(path: Any) -> StoredRun:
     except FileNotFoundError:
         raise StoreError(f"{place}: holds no run") from None
     except Damaged as error:
-        raise StoreError(f"{error}; running the study again into the folder mends it") from None
+        raise StoreError(f"{error}; run the study again into the folder to repair it") from None
     return StoredRun(Store(place, study), Study.from_dict(study))
