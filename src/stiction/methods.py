@@ -1,5 +1,4 @@
-"""The protocol of methods, the registered ones, and the onset of given profiles by any of
-them."""
+"""The protocol of methods, all methods, and the onset of given profiles by any of them."""
 
 from __future__ import annotations
 

@@ -47,8 +47,7 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
-    """Return the variables of a run beside those of every method; on a plane, speeds along
-    x and y."""
+    """Return the additional variables of a run; on a plane, speeds along x and y."""
     found = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     for name in ("rupture_speed", "median_rupture_speed"):
         found[name] = position(interface, found[name])

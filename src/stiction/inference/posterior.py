@@ -40,7 +40,7 @@ class Posterior:
         Standard error of the posterior mean that is due to the number of simulated samples, as a
         share of the standard deviation of the posterior.
     method : str
-        By what the onset was found.
+        Method that found the onset.
     peaks : Peaks
         The measured peaks.
     notes : tuple of str
@@ -65,7 +65,7 @@ class Posterior:
 
     @property
     def method(self) -> str:
-        """By what the onset was found."""
+        """Method that found the onset."""
         return str(self.likelihood.model.method.label)
 
     @property
