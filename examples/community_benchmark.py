@@ -26,7 +26,7 @@ AROUND, INSIDE = 70.0e6, 81.6e6
 FAULT, SQUARE = (30 * KM, 15 * KM), 3 * KM
 PERIOD = (60 * KM, 42 * KM)  # images of the fault are 27 km away: 4.5 s for the fastest waves
 BROKEN = (
-    1e-3  # share of the strength lost; 0.4 mm of slip, at once after a point begins to slip
+    1e-3  # share of the strength lost, by 0.4 mm of slip: soon after a point begins to slip
 )
 STATIONS = {"along the slip": (7.5, 0.0), "across it": (0.0, 6.0), "oblique": (7.5, 4.5)}  # km
 RECORDED = ("slip", "slip_rate", "shear_stress")
@@ -45,12 +45,8 @@ def benchmark(spacing: float) -> tuple[st.Problem, np.ndarray]:
     """The problem and its peak strength (Pa) on nodes `spacing` (m) apart."""
     nodes = tuple(round(length / spacing) for length in PERIOD)
     plane = st.Interface(length=PERIOD, nodes=nodes)
-    x, y = (
-        np.abs(place - length / 2)
-        for place, length in zip(
-            np.meshgrid(*plane.coordinates.values(), indexing="ij"), PERIOD, strict=True
-        )
-    )
+    places = np.meshgrid(*plane.coordinates.values(), indexing="ij")
+    x, y = (np.abs(place - side / 2) for place, side in zip(places, PERIOD, strict=True))
     fault = (x <= FAULT[0] / 2 + 1e-6) & (y <= FAULT[1] / 2 + 1e-6)
     # A node stands for its cell: one on the edge of the square lies in it by half.
     inside = [np.clip((SQUARE / 2 - away) / spacing + 0.5, 0.0, 1.0) for away in (x, y)]
@@ -64,19 +60,13 @@ def simulate(spacing: float, end_time: float = 9.0) -> Found:
     """Run it, with a record of every step at the stations."""
     problem, tau_p = benchmark(spacing)
     middle = np.array(PERIOD) / 2
+    none = ([0.0, 100.0], [0.0, 0.0])  # the initial stress is all there is
+    method = st.Rupture(
+        load=none, implicit=False, stop="time", end_time=end_time, arrival=BROKEN
+    )
+    stations = {name: middle + KM * np.array(at) for name, at in STATIONS.items()}
     run = st.simulate_rupture(
-        problem,
-        tau_p,
-        method=st.Rupture(
-            load=([0.0, 100.0], [0.0, 0.0]),  # the initial stress is all there is
-            implicit=False,
-            stop="time",
-            end_time=end_time,
-            arrival=BROKEN,
-        ),
-        save=st.Save(
-            [], stations={n: middle + KM * np.array(at) for n, at in STATIONS.items()}
-        ),
+        problem, tau_p, method=method, save=st.Save([], stations=stations)
     )
     x, y = (run[dim].values - length / 2 for dim, length in zip("xy", PERIOD, strict=True))
     return Found(x, y, run.arrival_time.values, run)
@@ -95,9 +85,8 @@ def draw(found: Found, title: str) -> Figure:
     figure = Figure(figsize=(6.75, 7.6), layout="constrained")
     upper, lower, lowest = figure.subplots(3, 1, height_ratios=[1.3, 1.0, 1.0])
     levels = np.arange(0.5, np.nanmax(found.rupture_time), 0.5)
-    lines = upper.contour(
-        found.x / KM, found.y / KM, found.rupture_time.T, levels, cmap="viridis"
-    )
+    places = found.x / KM, found.y / KM
+    lines = upper.contour(*places, found.rupture_time.T, levels, cmap="viridis")
     upper.clabel(lines, levels[1::2], fmt="%.0f s")
     upper.set(xlim=(-15.5, 15.5), ylim=(-8, 8), aspect="equal", title=title)
     upper.set(xlabel="$x$, along the slip (km)", ylabel="$y$ (km)")
@@ -118,13 +107,8 @@ def report(spacing: float, out: Path) -> None:
     found = simulate(spacing)
     along, across = at_axes(found, [3 * KM, 6 * KM, 7.5 * KM, 9 * KM, 12 * KM])
     print(f"{spacing:g} m: rupture time (s) at 3, 6, 7.5 km")
-    print(
-        "  along x:",
-        "  ".join(f"{t:.3f}" for t in along[:3]),
-        " 9, 12 km:",
-        *along[3:].round(3),
-    )
-    print("  along y:", "  ".join(f"{t:.3f}" for t in across[:3]))
+    print("  along x:", *along[:3].round(3), " 9, 12 km:", *along[3:].round(3))
+    print("  along y:", *across[:3].round(3))
     for number, name in enumerate(STATIONS):
         record = found.run.sel(station=name)
         top, slip = float(record.station_slip_rate.max()), float(record.station_slip[-1])
@@ -136,9 +120,8 @@ def report(spacing: float, out: Path) -> None:
             header=f"{name}, x and y = {STATIONS[name]} km\nt (s), h-slip (m), h-slip-rate (m/s),"
             " h-shear-stress (Pa)",
         )
-    draw(found, f"rupture time, nodes {spacing:g} m apart").savefig(
-        out / f"community_benchmark_{spacing:g}m.png", dpi=150
-    )
+    figure = draw(found, f"rupture time, nodes {spacing:g} m apart")
+    figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=150)
 
 
 def main() -> None:

@@ -45,11 +45,9 @@ def draw(folder: Path, tau_p: np.ndarray, onset: xr.Dataset, path: xr.Dataset) -
         lower.plot(x, path.stress.values[-1] / 1e6, color="k", linewidth=0.9, label="stress")
         share = onset.sensitivity.values
         base = 0.3 + 0.0 * x
-        lower.fill_between(
-            x, base, base + 0.3 * share / share.max(), color=ACCENT, lw=0.0, label="sensitivity"
-        )
-        lower.set_xlabel("position (mm)")
-        lower.set_ylabel("MPa")
+        top = base + 0.3 * share / share.max()
+        lower.fill_between(x, base, top, color=ACCENT, lw=0.0, label="sensitivity")
+        lower.set(xlabel="position (mm)", ylabel="MPa")
         lower.legend(ncols=3)
         figure.savefig(folder / "equilibrium_path.png", dpi=150)
 
@@ -59,9 +57,7 @@ def main() -> None:
     tau_p, onset, path = compute()
     slipping = (path.slip.values > 0.0).mean(axis=1)
     print(f"critical stress {onset.critical_stress.item() / 1e6:.4f} MPa, by")
-    print(
-        f"{onset.slip_patches.item()} patches on {100 * slipping[-1]:.0f} % of the interface;"
-    )
+    print(f"{onset.slip_patches.item()} patches on {slipping[-1]:.0%} of the interface;")
     print(f"certified to {onset.certificate_gap.item():.1e} Pa")
     draw(folder, tau_p, onset, path)
 

@@ -52,14 +52,8 @@ def answer(**v):
     """Return what the page shows for slider values."""
     try:
         problem, strength = parts(v)
-        many = st.monte_carlo(
-            problem,
-            strength,
-            method=st.LocalCriterion(),
-            samples=SAMPLES,
-            pilot=False,
-            progress=False,
-        )
+        options = {"samples": SAMPLES, "pilot": False, "progress": False}
+        many = st.monte_carlo(problem, strength, method=st.LocalCriterion(), **options)
         tau_p = strength.sample(problem.interface, first=v["sample"], seed=0)[0]
         exact = st.onset(problem, tau_p, method=st.Equilibrium(), progress=False)
         load = v["load"] * float(exact.first_instability[0])

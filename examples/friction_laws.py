@@ -13,13 +13,12 @@ def main(nodes: int = 512) -> None:
     linear = st.paper.problem(nodes=nodes)
     tau_p = st.paper.strength(linear, correlation_ratio=1.0).sample(linear.interface, seed=1)[0]
     W = linear.friction.weakening_rate
-    exponential = st.ExponentialWeakening(weakening_rate=W)
-    dual = st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.4, 0.0], weakening_rate=W)
-    for name, law in {
+    laws = {
         "linear": linear.friction,
-        "exponential": exponential,
-        "dual": dual,
-    }.items():
+        "exponential": st.ExponentialWeakening(weakening_rate=W),
+        "dual": st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.4, 0.0], weakening_rate=W),
+    }
+    for name, law in laws.items():
         problem = dataclasses.replace(linear, friction=law)
         run = st.onset(problem, tau_p, method=st.Rupture(loading_rate=2e7)).isel(sample=0)
         # Equilibrium follows straight pieces: 32 of them stand for the exponential law.

@@ -18,9 +18,7 @@ SHARES = {"a tenth": 0.1, "a third": 1 / 3, "all": 1.0}
 STRESS, NOISE = 0.68e6, 20e3  # Pa
 
 
-def probabilities(
-    specimens: int = 40, samples: int = 1000
-) -> tuple[float, dict[str, np.ndarray]]:
+def probabilities(specimens: int = 40, samples: int = 1000):
     """Return P of an unknown specimen, and of each one given a scan of each share."""
     problem = st.paper.problem(nodes=512)
     strength = st.paper.strength(problem, correlation_ratio=1.0)
@@ -34,9 +32,8 @@ def probabilities(
         return float((found.critical_stress < STRESS).mean())
 
     found = {name: [] for name in SHARES}
-    for number, specimen in enumerate(
-        strength.sample(problem.interface, samples=specimens, seed=1)
-    ):
+    profiles = strength.sample(problem.interface, samples=specimens, seed=1)
+    for number, specimen in enumerate(profiles):
         measured = specimen + NOISE * rng.standard_normal(x.size)
         for name, share in SHARES.items():
             scan = xr.DataArray(measured, {"x": x}, "x")[: round(share * x.size)]
@@ -50,18 +47,14 @@ def draw(before: float, after: dict[str, np.ndarray]):
         figure, axes = plt.subplots(figsize=(4.5, 3.0))
         rng = np.random.default_rng(0)
         for place, values in enumerate(after.values()):
-            axes.plot(
-                place + rng.uniform(-0.2, 0.2, values.size), values, "o", ms=3, mfc="none"
-            )
+            around = place + rng.uniform(-0.2, 0.2, values.size)
+            axes.plot(around, values, "o", ms=3, mfc="none")
             axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color="k")
         axes.axhline(before, color="0.6", ls="--", lw=0.8)
         axes.text(2.45, before, "without a scan", ha="right", va="bottom", color="0.4")
         axes.set_xticks(range(len(after)), after)
-        axes.set(
-            xlabel="scanned part of the interface",
-            ylabel="failure probability",
-            ylim=(-0.02, 1.02),
-        )
+        axes.set(xlabel="scanned part of the interface", ylabel="failure probability")
+        axes.set_ylim(-0.02, 1.02)
     return figure
 
 

@@ -24,15 +24,9 @@ power_law = st.PowerLawSpectrum(correlation_length=1e-3)
 alike = power_law.with_efolding_length(own.efolding_length)
 onsets = {}
 for name, spectrum in {"machined": own, "power law": alike}.items():
-    onsets[name] = st.monte_carlo(
-        problem,
-        st.RandomField(marginal, spectrum),
-        method=st.Equilibrium(),
-        samples=300,
-        seed=0,
-    ).critical_stress
-    mean, spread = float(onsets[name].mean()), float(onsets[name].std())
-    print(
-        f"{name}: critical stress {mean / 1e6:.3f} MPa, standard deviation {spread / 1e3:.1f} kPa"
-    )
+    strength = st.RandomField(marginal, spectrum)
+    found = st.monte_carlo(problem, strength, method=st.Equilibrium(), samples=300, seed=0)
+    onsets[name] = found.critical_stress
+    mean, spread = float(onsets[name].mean()) / 1e6, float(onsets[name].std()) / 1e3
+    print(f"{name}: critical stress {mean:.3f} MPa, standard deviation {spread:.1f} kPa")
 st.plot.monte_carlo({name: onset.to_dataset() for name, onset in onsets.items()})

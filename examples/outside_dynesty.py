@@ -5,6 +5,7 @@ are the user's own. Nothing of `st.infer` is used, so that the two check each ot
 """
 
 import dataclasses
+import functools
 
 import dynesty
 import numpy as np
@@ -21,14 +22,10 @@ h_n = problem.nucleation_length
 names = ("correlation_length", "marginal.low")
 prior = {names[0]: {"low": 0.5 * h_n, "high": 2.0 * h_n, "spacing": "log"},
          names[1]: (0.5e6, 0.8e6)}  # fmt: skip
-setting = {"method": st.LocalCriterion(), "load_cell_error": 1e4}
-
-truth = (h_n, 0.66e6)
-peaks = st.external.simulator(problem, strength, names, samples=25, seed=7, **setting)(truth)
-
-simulate = st.external.simulator(
-    problem, strength, names, samples=1000, seed=0, method=setting["method"]
-)
+method, error = st.LocalCriterion(), 1e4
+simulator = functools.partial(st.external.simulator, problem, strength, names, method=method)
+peaks = simulator(samples=25, seed=7, load_cell_error=error)((h_n, 0.66e6))
+simulate = simulator(samples=1000, seed=0)
 
 
 def transform(u):
@@ -40,7 +37,7 @@ def log_likelihood(theta):
     """A kernel density of simulated peaks with the load cell's error."""
     onsets = simulate(theta)
     density = scipy.stats.gaussian_kde(onsets, "silverman")
-    width = np.hypot(np.sqrt(density.covariance[0, 0]), setting["load_cell_error"])
+    width = np.hypot(np.sqrt(density.covariance[0, 0]), error)
     each = scipy.stats.norm.logpdf(peaks[:, None], onsets, width)
     return float(np.sum(logsumexp(each, axis=1) - np.log(onsets.size)))
 
@@ -51,7 +48,7 @@ sampler = dynesty.NestedSampler(
 sampler.run_nested(dlogz=0.5, print_progress=False)
 draws = sampler.results.samples_equal(np.random.default_rng(2))
 posterior = st.infer(
-    problem, strength, peaks, prior=prior, method=setting["method"], load_cell_error=1e4
+    problem, strength, peaks, prior=prior, method=method, load_cell_error=error
 )
 for i, name in enumerate(names):
     low, high = np.quantile(draws[:, i], [0.05, 0.95])

@@ -20,9 +20,7 @@ RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400
 
 
-def main(
-    folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024
-) -> tuple[float, float]:
+def main(folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024):
     """Draw both; the median critical stress at the ends of the range, MPa."""
     folder = Path(folder)
     problem = st.paper.problem(nodes=nodes)
@@ -39,19 +37,15 @@ def main(
         save=st.Save(every=4),
     )  # fmt: skip
     save(rupture(run, problem), folder / "rupture.png")
-    first, last = (
-        1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3]
-    )
-    return first, last
+    return [1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3]]
 
 
 def save(figure: Figure, path: Path) -> None:
     """With 1400 pixels across, and a palette instead of true colour, to keep it small."""
     with paper_style():
         figure.savefig(path, dpi=PIXELS / figure.get_figwidth())
-    Image.open(path).convert("RGB").quantize(240, dither=Image.Dither.NONE).save(
-        path, optimize=True
-    )
+    picture = Image.open(path).convert("RGB").quantize(240, dither=Image.Dither.NONE)
+    picture.save(path, optimize=True)
 
 
 def monte_carlo(
@@ -79,35 +73,28 @@ def monte_carlo(
                 onsets[ratio].critical_stress.values * 1e-6, bounds=(0.66, 1.66)
             )
             seen = estimate.value > 2e-3 * estimate.value.max()
-            onset.fill_betweenx(
-                estimate.x[seen],
-                0,
-                estimate.value[seen],
-                color=color(i),
-                alpha=0.18,
-                linewidth=0,
-            )
+            values, height = estimate.value[seen], estimate.x[seen]
+            onset.fill_betweenx(height, 0, values, color=color(i), alpha=0.18, linewidth=0)
             label = rf"$\xi_0/h_\mathrm{{n}} = {ratio:g}$"
-            onset.plot(estimate.value[seen], estimate.x[seen], label=label, **style)
+            onset.plot(values, height, label=label, **style)
         strength = st.Beta(alpha=1.5, beta=3.0, low=0.66, high=1.66).distribution
         y = np.linspace(0.63, 1.69, 300)
         beside[0].fill_betweenx(y, 0, strength.pdf(y), color=QUIET, alpha=0.2, linewidth=0)
         beside[0].plot(strength.pdf(y), y, color=INK, linewidth=1.0)
         for axes in (above, below, *beside, onset):
             axes.axhline(0.66, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=0)
+        for axes in (above, below):
+            axes.axhline(strength.mean(), color=PALE, linewidth=0.7, zorder=0)
         above.set(ylabel="peak strength (MPa)", xlim=(0, 1), ylim=(0.63, 1.69))
         below.set(ylabel="nucleation stress (MPa)", xlabel="position $x/L$")
         above.tick_params(labelbottom=False)
         for axes, name in zip(beside, "pn", strict=True):
             axes.set(xlim=(0, None), xlabel=rf"density $f(\tau_\mathrm{{{name}}})$")
             axes.tick_params(labelleft=False, labelbottom=False, bottom=False)
-        onset.set(xlim=(0, None), ylim=(0.655, 0.84))
-        onset.set_ylabel(r"critical stress $\tau_\mathrm{cr}$ (MPa)")
-        onset.set_xlabel(r"density $f(\tau_\mathrm{cr})$")
+        onset.set(xlim=(0, None), xlabel=r"density $f(\tau_\mathrm{cr})$")
+        onset.set(ylim=(0.655, 0.84), ylabel=r"critical stress $\tau_\mathrm{cr}$ (MPa)")
         onset.tick_params(labelbottom=False, bottom=False)
         onset.legend(loc="upper right")
-        above.axhline(strength.mean(), color=PALE, linewidth=0.7, zorder=0)
-        below.axhline(strength.mean(), color=PALE, linewidth=0.7, zorder=0)
     return figure
 
 
@@ -125,7 +112,5 @@ def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
 
 
 if __name__ == "__main__":
-    found = main(*sys.argv[1:2])
-    print(
-        "median critical stress: {:.4f} MPa at xi_0/h_n = 0.25, {:.4f} MPa at 2".format(*found)
-    )
+    short, long = main(*sys.argv[1:2])
+    print(f"median critical stress: {short:.4f} MPa at xi_0/h_n = 0.25, {long:.4f} MPa at 2")

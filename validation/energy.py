@@ -36,11 +36,12 @@ def rupture(steps: int, barrier: float = 1e6, end: float = 40e-6):
 
 def compute() -> list[tuple[int, float]]:
     """Relative error of the radiated energy for ever smaller steps."""
-    reference = float(rupture(8000)["radiated_energy"][-1])
-    return [
-        (steps, abs(float(rupture(steps)["radiated_energy"][-1]) / reference - 1.0))
-        for steps in (400, 800, 1600)
-    ]
+
+    def radiated(steps: int) -> float:
+        return float(rupture(steps)["radiated_energy"][-1])
+
+    reference = radiated(8000)
+    return [(steps, abs(radiated(steps) / reference - 1.0)) for steps in (400, 800, 1600)]
 
 
 def draw(folder: Path) -> None:
@@ -51,11 +52,9 @@ def draw(folder: Path) -> None:
         names = ("work", "fracture_energy", "strain_energy", "radiated_energy")
         for letter, axes, run in zip("ab", figure.subplots(1, 2), runs, strict=True):
             for i, name in enumerate(names):
-                axes.plot(
-                    run["time"] * 1e6, run[name], label=name.replace("_", " "), **series(i)
-                )
-            axes.set_xlabel("$t$ (µs)")
-            axes.set_ylabel("energy (J/m)")
+                label = name.replace("_", " ")
+                axes.plot(run["time"] * 1e6, run[name], label=label, **series(i))
+            axes.set(xlabel="$t$ (µs)", ylabel="energy (J/m)")
             axes.legend(loc="upper left" if letter == "a" else (0.5, 0.5))
             panel(axes, letter)
         figure.savefig(folder / "validation_energy.png")

@@ -5,14 +5,11 @@ noise of a fifth of the field's standard deviation. Intervals of 90 % should hol
 in 100; of 100 records the count itself scatters by 3.
 
     python validation/fit_coverage.py [--records 100] [--first 0] [--bootstrap 100] [--only NAME]
-        [--out FILE]
 """
 
 import argparse
-import json
 import time
 import warnings
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -117,9 +114,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first record")
     parser.add_argument("--bootstrap", type=int, default=100)
     parser.add_argument("--only", default="")
-    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    table = {}
     for name, case in CASES.items():
         for size, lengths in SIZES.items():
             for noise in NOISES:
@@ -127,17 +122,13 @@ def main() -> None:
                 if options.only not in title:
                     continue
                 begin = time.process_time()
-                found = coverage(
-                    case, lengths, noise, options.records, options.bootstrap, options.first
-                )
-                table[title] = found
+                how = (options.records, options.bootstrap, options.first)
+                found = coverage(case, lengths, noise, *how)
                 cells = ", ".join(
                     f"{key.rpartition('.')[2]} {100 * share:.0f} % ({100 * bias:+.1f} %)"
                     for key, (share, bias) in found.items()
                 )
                 print(f"{title}: {cells}; {time.process_time() - begin:.0f} s", flush=True)
-                if options.out:
-                    options.out.write_text(json.dumps(table, indent=1))
 
 
 if __name__ == "__main__":

@@ -21,12 +21,8 @@ def after_onset(nodes: int, ratio: float, sample: int) -> tuple[np.ndarray, floa
         warnings.simplefilter("ignore", st.AccuracyWarning)
         field = st.paper.strength(problem, correlation_ratio=ratio)
         tau_p = field.sample(problem.interface, samples=1, seed=5, first=sample)[0]
-        run = st.simulate_rupture(
-            problem,
-            tau_p,
-            method=st.Rupture(loading_rate=2e7),
-            save=st.Save(["slip"], every=1),
-        )
+        method, save = st.Rupture(loading_rate=2e7), st.Save(["slip"], every=1)
+        run = st.simulate_rupture(problem, tau_p, method=method, save=save)
     drop = FALL * np.mean(tau_p - problem.friction.residual_strength)
     stress, slip = run["mean_stress"].values, run["slip"].values
     peak = int(np.argmax(stress))
@@ -49,10 +45,8 @@ def compute(
             errors = []
             for i, (fine, critical) in enumerate(reference):
                 slip, stress = after_onset(nodes, ratio, i)
-                same = fine[:: grids[-1] // nodes]
-                errors.append(
-                    (np.abs(slip - same).max() / fine.max(), abs(stress / critical - 1))
-                )
+                change = np.abs(slip - fine[:: grids[-1] // nodes]).max() / fine.max()
+                errors.append((change, abs(stress / critical - 1)))
             found[ratio, nodes] = np.array(errors).T
     return found
 

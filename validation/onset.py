@@ -8,6 +8,7 @@ Run: python validation/onset.py [folder for the figure]
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,23 +23,19 @@ def compute(
 ) -> dict[float, np.ndarray]:
     """Relative difference of the first instability, (rates, samples), by correlation ratio."""
     problem = st.paper.problem(nodes=nodes, plane="stress")
+
+    def first(tau_p: np.ndarray, method: Any) -> np.ndarray:
+        return st.onset(problem, tau_p, method=method)["first_instability"].values
+
     found = {}
     for ratio in (0.25, 0.5, 2.0):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", st.AccuracyWarning)
             field = st.paper.strength(problem, correlation_ratio=ratio)
             tau_p = field.sample(problem.interface, samples=samples, seed=3)
-        exact = st.onset(problem, tau_p, method=st.Equilibrium())["first_instability"].values
-        found[ratio] = np.array(
-            [
-                st.onset(problem, tau_p, method=st.Rupture(loading_rate=rate))[
-                    "first_instability"
-                ].values
-                / exact
-                - 1.0
-                for rate in rates
-            ]
-        )
+        exact = first(tau_p, st.Equilibrium())
+        ruptures = [first(tau_p, st.Rupture(loading_rate=rate)) for rate in rates]
+        found[ratio] = np.array(ruptures) / exact - 1.0
     return found
 
 
@@ -53,8 +50,7 @@ def draw(folder: Path, found: dict[float, np.ndarray]) -> None:
             axes.loglog(RATES, np.abs(difference).mean(axis=1), label=label, **style)
         axes.axhline(1e-3, color="0.6", linewidth=0.7)
         axes.text(1.2e3, 1.2e-3, "0.1 %", va="bottom")
-        axes.set_xlabel("loading rate (Pa/s)")
-        axes.set_ylabel("mean |rupture/equilibrium - 1|")
+        axes.set(xlabel="loading rate (Pa/s)", ylabel="mean |rupture/equilibrium - 1|")
         axes.legend()
         figure.savefig(folder / "validation_onset.png")
 

@@ -15,8 +15,6 @@ import warnings
 import numpy as np
 
 import stiction as st
-from stiction.criterion.local import LocalCriterion
-from stiction.equilibrium.method import Equilibrium
 
 MILLION = 1_000_000
 REPEATS = 50
@@ -31,17 +29,9 @@ def longer(problem, times):
 def repetition(problem, field, stress, reference, method, algorithm, target):
     """Mean ratio, observed and reported error, coverage and time of repeated runs."""
     start = time.perf_counter()
+    options = {"method": method, "algorithm": algorithm, "target_cv": target, "workers": 1}
     found = [
-        st.failure_probability(
-            problem,
-            field,
-            stress,
-            method=method,
-            algorithm=algorithm,
-            target_cv=target,
-            seed=seed,
-            workers=1,
-        )
+        st.failure_probability(problem, field, stress, seed=seed, **options)
         for seed in range(1, REPEATS + 1)
     ]
     ratio = np.array([one.probability for one in found]) / reference
@@ -59,7 +49,7 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
 
 def main():
     warnings.simplefilter("ignore")
-    local, exact = LocalCriterion(), Equilibrium()
+    local, exact = st.LocalCriterion(), st.Equilibrium()
     problem = st.paper.problem(nodes=512)
     field = st.paper.strength(problem, correlation_ratio=0.5)
     state = st.external.limit_state(problem, field, local, workers=1)
@@ -84,9 +74,7 @@ def main():
     counts = [
         np.concatenate([s(s.draws(7, i, 1000)) for i in range(0, 40_000, 1000)]) for s in states
     ]
-    print(
-        "four times the length: P(L), P(4L) by 40,000 plain samples each, weakest link, subset"
-    )
+    print("four times the length: P(L) and P(4L) by 40,000 samples each, weakest link, subset")
     for chance in (0.1, 0.01):
         stress = float(np.quantile(counts[0], chance))
         counted = float(np.mean(counts[1] < stress))

@@ -23,11 +23,8 @@ def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
     """Distance from the patch's centre in h_n, and speed in c_R, up to 0.85 of the half period."""
     modulus = SOLID.effective_modulus("II")
     spacing = 1.158 * modulus / RATE / 20.0
-    problem = st.Problem(
-        SOLID, st.Interface(length=nodes * spacing, nodes=nodes), st.LinearWeakening(
-            weakening_rate=RATE
-        ),
-    )  # fmt: skip
+    interface = st.Interface(length=nodes * spacing, nodes=nodes)
+    problem = st.Problem(SOLID, interface, st.LinearWeakening(weakening_rate=RATE))
     load = STRENGTH / (1.0 + ratio)
     # Griffith length of a crack with fracture energy tau_p^2/(2 W) under the drop tau_0.
     griffith = 2.0 * modulus * STRENGTH**2 / (np.pi * RATE * load**2)
@@ -63,9 +60,7 @@ def draw(folder: Path, curves: dict[float, tuple]) -> None:
                             (fast, "$c_d$")):  # fmt: skip
             axes.axhline(value, color="0.7", linewidth=0.6, zorder=0)
             axes.text(1.01, value, name, transform=axes.get_yaxis_transform(), va="center")
-        axes.set_xlabel("distance ($h_n$)")
-        axes.set_ylabel("rupture speed ($c_R$)")
-        axes.set_ylim(0.0, 2.1)
+        axes.set(xlabel="distance ($h_n$)", ylabel="rupture speed ($c_R$)", ylim=(0.0, 2.1))
         axes.legend(ncols=2, loc="lower right")
         figure.savefig(folder / "validation_rupture_speed.png")
 

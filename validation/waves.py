@@ -74,15 +74,13 @@ def draw(folder: Path, errors: list[tuple[int, float]]) -> None:
         points = np.linspace(0.0, END, 41)
         left.plot(points, [exact(p) for p in points], "o", color="0.5", markersize=2.5,
                   label="Laplace inversion")  # fmt: skip
-        left.set_xlabel("$|k| c_s t$")
-        left.set_ylabel("$a/a_0$")
+        left.set(xlabel="$|k| c_s t$", ylabel="$a/a_0$")
         left.legend()
         steps = END / np.array([s for s, _ in errors])
         right.loglog(steps, [e for _, e in errors], **series(0, marker=True))
         right.loglog(steps, errors[0][1] * (steps / steps[0]) ** 2, color="0.6", linewidth=0.8)
         right.text(steps[2], 1.6 * errors[2][1], "order 2", ha="right")
-        right.set_xlabel(r"$|k| c_s \Delta t$")
-        right.set_ylabel("error at the end")
+        right.set(xlabel=r"$|k| c_s \Delta t$", ylabel="error at the end")
         right.xaxis.set_minor_formatter(NullFormatter())
         right.set_xticks(steps, [f"{step:g}" for step in steps])
         panel(left, "a")
@@ -94,9 +92,8 @@ def main() -> None:
     """Print and draw."""
     errors = compute()
     for (steps, error), (_, next_error) in zip(errors, [*errors[1:], (0, np.nan)], strict=True):
-        print(
-            f"{steps:5d} steps: error {error:.2e}, ratio to the next {error / next_error:.3f}"
-        )
+        ratio = error / next_error
+        print(f"{steps:5d} steps: error {error:.2e}, ratio to the next {ratio:.3f}")
     draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), errors)
 
 

@@ -25,12 +25,10 @@ def peaks() -> list[tuple[float, float]]:
     rng = np.random.default_rng(15)
     found = []
     for length, nodes, tests in TESTS:
-        problem = dataclasses.replace(
-            PROBLEM, interface=st.Interface(length=length, nodes=nodes)
-        )
-        onset = st.monte_carlo(
-            problem, STRENGTH, method=st.Equilibrium(), samples=tests, seed=15, first=nodes
-        )
+        interface = st.Interface(length=length, nodes=nodes)
+        problem = dataclasses.replace(PROBLEM, interface=interface)
+        options = {"samples": tests, "seed": 15, "first": nodes}
+        onset = st.monte_carlo(problem, STRENGTH, method=st.Equilibrium(), **options)
         stress = onset.critical_stress.values + LOAD_CELL * rng.standard_normal(tests)
         found += [(length * 1e3, value * 1e-6) for value in stress]
     return [found[i] for i in rng.permutation(len(found))]

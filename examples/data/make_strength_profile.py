@@ -39,10 +39,8 @@ def record() -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     """Write the file beside this script."""
-    lines = [
-        "# synthetic: made by make_strength_profile.py, not measured",
-        "x (mm); strength (MPa)",
-    ]
+    first = "# synthetic: made by make_strength_profile.py, not measured"
+    lines = [first, "x (mm); strength (MPa)"]
     for x, strength in zip(*record(), strict=True):
         lines.append(f"{x:.1f}; " + ("" if np.isnan(strength) else f"{strength:.4f}"))
     path = Path(__file__).with_name("strength_profile.csv")
