@@ -61,10 +61,10 @@ def line(nodes=1024, **friction):
     return st.Problem(SOLID, interface, st.LinearWeakening(**friction))
 
 
-def plane(nodes):
-    """Return a square plane of 8 h_n and the paper's strength at xi_0/h_n = 0.5."""
+def plane(nodes, size=8):
+    """Return a square plane of `size` h_n and the paper's strength at xi_0/h_n = 0.5."""
     h_n = line().nucleation_length
-    interface = st.Interface((8 * h_n, 8 * h_n), (nodes, nodes))
+    interface = st.Interface((size * h_n, size * h_n), (nodes, nodes))
     return st.Problem(SOLID, interface, line().friction), field(0.5 * h_n)
 
 
@@ -229,7 +229,7 @@ def residual_strength():
 @case
 def planes():
     """The local criterion and exact onsets on planes, beside numpy and HiGHS."""
-    problem, strength = plane(24)
+    problem, strength = plane(24, size=4)
     tau_p = strength.sample(problem.interface, samples=1, seed=0)
     ours, found = solver_time(problem, st.Equilibrium(), tau_p)
     k, share = problem.interface.wavenumbers, problem.interface.in_plane_share
