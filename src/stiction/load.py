@@ -60,7 +60,10 @@ SHAPES: dict[str, Any] = {}
 
 
 def register(shape: Shape) -> Shape:
-    """Make a load shape known to study files by its `type`; a decorator of its class."""
+    """Make a load shape known to study files by its `type`; a decorator of its class.
+
+    In any program that has imported the class; the commands take only those of this package.
+    """
     SHAPES[shape.type] = shape  # type: ignore[attr-defined]  # the default of a field
     return shape
 
@@ -146,7 +149,7 @@ class Load:
 
     Parameters
     ----------
-    profile : float, (nodes,) array, GradientLoad or EdgeLoad
+    profile : float, (nodes,) array, GradientLoad, EdgeLoad or another LoadShape
         p, dimensionless, positive.
     initial_stress : float or (nodes,) array
         tau_i, Pa, below the peak strength everywhere.

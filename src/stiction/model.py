@@ -437,8 +437,9 @@ def to_plain(value: Any) -> Any:
             value, mode="json", exclude_none=True, by_alias=True
         )
     except pydantic_core.PydanticSerializationError as error:
-        reason = str(error).removeprefix("Error calling function ").split(": ", 1)[-1]
-        raise InputError(f"{type(value).__name__}: cannot be written down: {reason}") from None
+        words = "cannot be written down: "  # the innermost reason, without names of exceptions
+        reason = str(error).rsplit(words, 1)[-1].rsplit("Error: ", 1)[-1]
+        raise InputError(f"{type(value).__name__}: {words}{reason}") from None
     except pydantic.errors.PydanticSchemaGenerationError:
         raise InputError(f"{type(value).__name__}: exists in Python only") from None
 

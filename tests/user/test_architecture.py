@@ -57,11 +57,17 @@ def test_an_edited_message_compiles_no_kernel_anew():
             assert module == "stiction.jit" or "InputError" not in imported, (path, module)
 
 
+def test_the_files_that_the_page_names_exist():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    known = [path.as_posix() for path in ROOT.glob("*/**/*.py") if ".venv" not in path.parts]
+    for name in re.findall(r"`([\w/]+\.py)`", page):
+        assert any(path.endswith(f"/{name}") for path in known), name
+
+
 def test_the_worked_examples_run():
     """A friction law, a load, a spectrum and a marginal of one's own, as the page shows them."""
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     names: dict = {"__name__": __name__}
-    exec(PRELUDE, names)
     for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
         exec(block, names)
     base = st.paper.problem(nodes=256)
@@ -69,17 +75,3 @@ def test_the_worked_examples_run():
     sample = problem.sample(names["field"].sample(base.interface, samples=2, seed=0))
     found = st.onset(problem, sample, method=st.LocalCriterion(), progress=False)
     assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
-
-
-PRELUDE = """
-from typing import Literal, NamedTuple
-
-import numpy as np
-import scipy.stats
-
-import stiction as st
-from stiction import friction
-from stiction.friction import FrictionLaw
-from stiction.load import LoadShape, distance, register
-from stiction.model import Positive, model
-"""

@@ -9,6 +9,8 @@ import scipy.stats
 from refusals import refuses
 
 import stiction as st
+from stiction.random.marginals import Marginal
+from stiction.random.spectra import SpectralDensity
 from stiction.reliability import subset
 
 GOOD_SOLID = {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}
@@ -269,3 +271,33 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.mode = "III"
     with pytest.raises(ValueError, match="read-only"):
         a.load.profile[0] = 2.0
+
+
+def test_a_study_says_which_part_exists_in_python_only():
+    strength = dataclasses.replace(make_strength(), spectrum=st.CustomSpectrum(function=_flat))
+    study = st.Study(
+        problem=make_problem(), random=strength, method=st.LocalCriterion(),
+        ensemble=st.Ensemble(samples=1),
+    )  # fmt: skip
+    words = (
+        "Study: cannot be written down: spectrum.function is the Python function '_flat'; use"
+    )
+    refuses(words, lambda: study.to_toml("study.toml"))
+
+
+def test_a_spectrum_and_a_marginal_name_what_they_lack():
+    class Ring(SpectralDensity):
+        def density(self, wavenumber, dimensions=1):
+            return np.exp(-(wavenumber**2))
+
+    class Nameless(Marginal):
+        type = "nameless"
+
+    with pytest.raises(TypeError, match="power_within, quantile"):
+        Ring()
+    with pytest.raises(TypeError, match="distribution"):
+        Nameless()
+
+
+def _flat(k):
+    return 1.0 * (k < 1e3)

@@ -197,9 +197,79 @@ class SteeperParameters(NamedTuple):
     initial_slope: float = 2.0
 
 
+class PlateauParameters(NamedTuple):
+    initial_slope: float = 1.0
+
+
+class ShapelessParameters(NamedTuple):
+    scale: float = 1.0
+
+
 register(HumpParameters, lambda law, u: (np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0]), 1.0))
 register(LateParameters, lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)))
 register(SteeperParameters, lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)))
+register(PlateauParameters, lambda law, u: _plateau(u))
+register(ShapelessParameters, lambda law, u: _plateau(u))
+
+
+def _plateau(u):
+    """Falls to a half, rests, and falls three times as steeply to zero at u = 1."""
+    if u < 0.5:
+        return 1.0 - u, 1.0
+    if u < 5.0 / 6.0:
+        return 0.5, 0.0
+    return (3.0 * (1.0 - u), 3.0) if u < 1.0 else (0.0, 0.0)
+
+
+@model
+class Plateau(FrictionLaw):
+    parameters = PlateauParameters()
+
+    def area(self, u):
+        u = np.minimum(np.asarray(u, dtype=float), 1.0)
+        first, last = np.minimum(u, 0.5), np.maximum(u - 5.0 / 6.0, 0.0)
+        return first - first**2 / 2 + 0.5 * (u - first) - 1.5 * last**2
+
+    def slip_at(self, fraction):
+        return 1.0 - fraction if fraction >= 0.5 else 1.0 - fraction / 3.0
+
+
+@model
+class Instant(Plateau):
+    """Its inverse says that the residual strength is there at once."""
+
+    def slip_at(self, fraction):
+        return fraction
+
+
+@model
+class Shorter(Plateau):
+    def slip_at(self, fraction):
+        return 0.9 * Plateau.slip_at(self, fraction)
+
+
+@model
+class Shapeless(Plateau):
+    parameters = ShapelessParameters()
+
+
+def test_a_plateau_is_followed_and_its_later_slope_counts(with_law, tau_p):
+    law = Plateau(weakening_rate=0.5e12)
+    assert law.steepest_slope == 3.0
+    polygon = st.PiecewiseWeakening.from_law(law, 32)
+    assert (
+        st.onset(with_law(polygon), tau_p, method=st.Equilibrium()).critical_stress.item() > 0.0
+    )
+    refuses(
+        "up to 3 times as steeply",
+        lambda: st.onset(with_law(law), tau_p, method=st.LocalCriterion()),
+    )
+    refuses(
+        "strength: must fall at every corner ... got (0.5, 0.5, 0.0); give a plateau a small fall",
+        lambda: st.PiecewiseWeakening(
+            slip=[0.5, 0.8, 1.0], strength=[0.5, 0.5, 0.0], critical_slip=1e-6
+        ),
+    )
 
 
 @model
@@ -229,6 +299,9 @@ class Steeper(OwnLaw):
     [
         (Hump, "Hump: strength must not rise with slip, as beyond u = 0"),
         (Late, "Late: f(0) must be 1, got 0.5"),
+        (Instant, "Instant: slip_at(0) must be positive ... got 0"),
+        (Shorter, "Shorter: f(slip_at(0)) must be 0, got 0.3"),
+        (Shapeless, "Shapeless: its parameters need a field initial_slope"),
         (Steeper, "Steeper: initial_slope is 2, but 1 by its f ... Steeper: -f'(0.568) is"),
     ],
 )

@@ -69,12 +69,12 @@ def simulate_rupture(
     Returns
     -------
     xarray.Dataset
-        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, energies and more;
-        over 'step' some of these at every step, with `step_time`; over ('step', 'station')
-        `station_slip`, `station_slip_rate` and `station_shear_stress`, and `station_x` (and
-        `station_y`), where their nodes are; over 'x' `peak_strength`, `arrival_time` and
-        `front_speed`; and the scalars of `Rupture` for the run so far. The attribute
-        `stopped` is the reason why it ended.
+        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, `mean_slip`,
+        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over 'step'
+        some of these at every step, with `step_time`; over ('step', 'station') `station_slip`,
+        `station_slip_rate` and `station_shear_stress`, and `station_x` (and `station_y`), where
+        their nodes are; over 'x' `peak_strength`, `arrival_time` and `front_speed`; and the scalars
+        of `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
 
     Raises
     ------

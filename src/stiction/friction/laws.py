@@ -38,6 +38,8 @@ SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
 NEARLY_RESIDUAL = 0.01
 """Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
+SLIPS = 4097
+"""Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
 
 
 _VALID = {
@@ -97,7 +99,10 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def slip_at(self, fraction: float) -> float:
-        """Return u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
+        """Return u at which f has fallen to a fraction in [0, 1]; infinite if it never does.
+
+        On a plateau any u of it will do.
+        """
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) at slips u in units of d_c, any shape."""
@@ -112,8 +117,13 @@ class FrictionLaw(ABC):
 
     @property
     def steepest_slope(self) -> float:
-        """The largest -f'(u)."""
-        return self.initial_slope
+        """The largest -f'(u); that at zero slip unless another is larger by 0.1 %."""
+        parameters, first = self.parameters, self.initial_slope
+        if isinstance(parameters, Linear | Exponential):
+            return first
+        shape = SHAPES[type(parameters)]
+        later = max(float(shape(parameters, u)[1]) for u in np.linspace(0.0, self.reach, SLIPS))
+        return later if later > 1.001 * first else first
 
     @property
     def integral(self) -> float:
@@ -291,8 +301,12 @@ class PiecewiseWeakening(FrictionLaw):
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
             raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
-            words = "must fall from below 1 to exactly 0 (the residual strength)"
-            raise InputError(f"strength: {words}, got {self.strength}")
+            words = (
+                "must fall at every corner, from below 1 to exactly 0 (the residual strength)"
+            )
+            flat = np.any(np.diff(strength) == 0.0)
+            hint = "; give a plateau a small fall, such as 0.5, 0.4999" if flat else ""
+            raise InputError(f"strength: {words}, got {self.strength}{hint}")
         return self
 
     @property
@@ -406,27 +420,39 @@ def contradictions(law: FrictionLaw) -> list[str]:
     name, parameters = type(law).__name__, law.parameters
     if type(parameters) not in SHAPES:
         return [f"{name}: register its f for the type of its parameters (friction.register)"]
-    step, u = 1e-6 * law.reach, np.linspace(0.0, law.reach, 4097)
+    if not hasattr(parameters, "initial_slope"):
+        return [f"{name}: its parameters need a field initial_slope, -f'(0)"]
+    end, reach = law.slip_at(0.0), law.reach
+    if not 0.0 < reach < np.inf:
+        return [
+            f"{name}: slip_at(0) must be positive; it may be infinite if slip_at({NEARLY_RESIDUAL})"
+            f" is not; got {end:g} and {law.slip_at(NEARLY_RESIDUAL):g}"
+        ]
+    step, u = 1e-6 * reach, np.linspace(0.0, reach, SLIPS)
     f = law.fraction(u)
-    if abs(f[0] - 1.0) > 1e-9:
+    if not abs(f[0] - 1.0) <= 1e-9:
         return [f"{name}: f(0) must be 1, got {f[0]:g}"]
     if (rising := np.flatnonzero(np.diff(f) > 1e-9)).size:
         return [f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}"]
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, (1.0 - law.fraction(step)) / step),
-        "area(reach)": (law.area(law.reach), np.trapezoid(f, u)),
-        "f(slip_at(0.5))": (law.fraction(law.slip_at(0.5)), 0.5),
+        f"area({reach:.3g})": (law.area(reach), np.trapezoid(f, u)),
     }
-    for at in law.reach * np.array([0.1234, 0.5678]):
+    for at in reach * np.array([0.1234, 0.5678]):
         slope = SHAPES[type(parameters)](parameters, at)[1]
         fall = law.fraction(at) - law.fraction(at + step)
         pairs[f"-f'({at:.3g})"] = (slope, fall / step)
     tolerance = 1e-3 * max(1.0, law.steepest_slope)
-    return [
+    problems = [
         f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its f"
         for what, (found, own) in pairs.items()
-        if abs(found - own) > tolerance
+        if not abs(found - own) <= tolerance
     ]
+    for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
+        found = float(law.fraction(law.slip_at(share)))
+        if not abs(found - share) <= tolerance:
+            problems.append(f"{name}: f(slip_at({share:g})) must be {share:g}, got {found:.3g}")
+    return problems
 
 
 def _law(value: Any, handler: Any) -> Any:
@@ -439,7 +465,10 @@ def _law(value: Any, handler: Any) -> Any:
 
 def _written(value: Any, handler: Any) -> Any:
     if type(value) not in LAWS.values():
-        raise ValueError(f"{type(value).__name__}, a friction law of your own")
+        raise ValueError(
+            f"friction is {type(value).__name__}, a law of your own; in a study file use"
+            " st.PiecewiseWeakening.from_law(law, pieces=32)"
+        )
     return handler(value)
 
 

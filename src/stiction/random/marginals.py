@@ -2,10 +2,12 @@
 
 In the families that are given by mean and coefficient of variation, `mean` is the mean of
 the field and `cv` its standard deviation over its mean, whatever the bound `low`. To add a
-family, write one class with a `distribution` and add it to `MARGINALS`.
+family, derive from `Marginal`, with a `distribution`, and add it to `MARGINALS`; study files take
+every continuous distribution of `scipy.stats` by its name as it is.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,15 +24,15 @@ from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, is_finite, model
 
 
-class Marginal:
+class Marginal(ABC):
     """Base class of marginals: a frozen `scipy.stats` distribution."""
 
     type: str
 
-    @cached_property
+    @property
+    @abstractmethod
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-        raise NotImplementedError
 
     @property
     def affine(self) -> tuple[str, ...]:

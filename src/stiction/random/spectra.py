@@ -4,8 +4,8 @@ On a plane the field is isotropic, and a line cut through it has the correlation
 field on a line. That fixes the density in D dimensions as a function of the length of the
 wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
 added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the truncated
-spectrum, so correlations and lengths are of that. To add a spectrum, write one class and
-add it to `SPECTRA`.
+spectrum, so correlations and lengths are of that. To add a spectrum, derive from
+`SpectralDensity`, or from `ScaledSpectrum` if it has one length, and add it to `SPECTRA`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
@@ -34,28 +35,32 @@ LARGEST_ERROR = 1e-6
 """Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
 
 
-class SpectralDensity:
-    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
+class SpectralDensity(ABC):
+    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite.
 
-    power_kept: float | None
+    One of your own has `density`, `power_within` and its inverse `quantile`.
+    """
+
+    power_kept: float | None = None
     default_power: ClassVar[float] = 0.9997
     """Share of the power retained by truncation if nothing is given."""
 
+    @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         """Return the density at wave vectors of length k (rad/m), up to a factor."""
-        raise NotImplementedError
 
+    @abstractmethod
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         """Return the share of the power at wave vectors shorter than `wavenumber` (rad/m)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def quantile(self, share: float, dimensions: int = 1) -> float:
         """Return the wavenumber (rad/m) below which a share of the power lies."""
-        raise NotImplementedError
 
     def _edges(self, end: float) -> Array:
-        """Wavenumbers (rad/m) from 0 to `end` between which the density is smooth."""
-        raise NotImplementedError
+        """Wavenumbers (rad/m) from 0 to `end` between which the density is smooth: octaves."""
+        octaves = np.exp2(np.arange(math.log2(LONGEST), math.log2(SHORTEST)))
+        return np.unique([0.0, *octaves[octaves < end], end])
 
     def cutoff(self, dimensions: int = 1) -> float:
         """Return the wavenumber above which the spectrum is truncated, rad/m."""
@@ -354,8 +359,7 @@ class CustomSpectrum(SpectralDensity):
         return self
 
     def _edges(self, end: float) -> Array:
-        octaves = np.exp2(np.arange(math.log2(LONGEST), math.log2(SHORTEST)))
-        return np.unique([0.0, *(k for k in (*octaves, *self.break_points) if k < end), end])
+        return np.unique([*super()._edges(end), *(k for k in self.break_points if k < end)])
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
