@@ -225,9 +225,21 @@ class Problem:
         """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
         ratio = strength / self.solid.shear_modulus
         if not WEAKEST <= ratio <= STRONGEST:
+            coefficient = 0.0 < strength < 10.0 and self.load.normal_pressure is not None
             warn_user(
                 f"strength: its mean, {strength:.4g} Pa, is {ratio:.2g} of the shear modulus; check"
-                " the units of both",
+                " the units of both"
+                + (
+                    ", and give coefficients as of='friction_coefficient'"
+                    if coefficient
+                    else ""
+                ),
+                UnitWarning,
+            )
+        elif 0.0 < residual < WEAKEST * self.solid.shear_modulus:
+            warn_user(
+                f"residual_strength: its mean, {residual:.4g} Pa, is"
+                f" {residual / strength:.2g} of that of the strength; check the units of both",
                 UnitWarning,
             )
         elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
@@ -261,8 +273,9 @@ class Problem:
         """
         if self.uniform_rate is None:
             raise InputError(
-                "friction.weakening_rate: a nucleation length exists only for a uniform weakening"
-                " rate; where it varies, use st.Equilibrium() or st.Rupture()"
+                "friction.weakening_rate: a nucleation length needs a uniform weakening rate; pass"
+                " weakening_rate = (strength - residual_strength)/critical_slip if both are"
+                " uniform, otherwise use st.Equilibrium() or st.Rupture()"
             )
         return self.nucleation_lengths(self.uniform_rate)[0]
 
@@ -405,9 +418,11 @@ class Problem:
         if nowhere.any():
             number = int(np.argmax(nowhere))
             least, most = strength[number].min(), strength[number].max()
+            lower = np.broadcast_to(residual, strength.shape)[number]
             problems.append(
-                "strength: must be finite and above residual_strength somewhere; sample"
-                f" {number} is nowhere, from {least:g} to {most:g} Pa: check the units of both"
+                "strength: must be finite and above residual_strength at one node or more; in"
+                f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
+                f" {lower.min():g} to {lower.max():g} Pa: check the units of both"
             )
         return problems
 

@@ -169,7 +169,9 @@ MISTAKES = {
     "strength ... no samples": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),
     "strength ... masked": lambda: onset(np.ma.masked_less(np.arange(256.0), 3)),
-    "residual_strength ... sample 0 is nowhere": lambda: onset(ONE, residual_strength=2e6),
+    "residual_strength ... in sample 0 ... residual_strength 2e+06 to 2e+06 Pa": lambda: onset(
+        ONE, residual_strength=2e6
+    ),
     "initial_stress ... (2, 256) ... (3, 256)": lambda: onset(
         np.ones((3, 256)), initial_stress=np.zeros((2, 256))
     ),

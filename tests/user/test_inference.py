@@ -223,6 +223,16 @@ def test_simulated_tests_are_those_of_monte_carlo():
     np.testing.assert_array_equal(later[:20], PEAKS[10:])
 
 
+def test_a_limit_state_takes_the_object_and_not_the_class():
+    with pytest.raises(st.InputError, match=r"write st.LocalCriterion\("):
+        st.external.limit_state(PROBLEM, STRENGTH, st.LocalCriterion)
+
+
+def test_a_parameter_of_the_marginal_without_its_prefix_is_named():
+    with pytest.raises(st.InputError, match=r"did you mean 'marginal\.mean'"):
+        st.infer(PROBLEM, STRENGTH, PEAKS, prior={"mean": (1.0, 2.0)}, method=LOCAL)
+
+
 def test_a_limit_state_of_one_row_and_of_many():
     state = st.external.limit_state(PROBLEM, STRENGTH, LOCAL)
     draws = state.draws(seed=99, first=0, samples=30)

@@ -35,6 +35,7 @@ DOUBTS = {
     "its mean, 1 Pa, is 1e-09 of the shear modulus": lambda: st.onset(
         problem(), np.ones(NODES), method=st.LocalCriterion()
     ),
+    "residual_strength: its mean, 0.45 Pa": lambda: problem().warn_of_units(1e6, 0.45),
 }
 
 

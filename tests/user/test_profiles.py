@@ -273,7 +273,7 @@ REFUSED = {
     "x = 0 and 0 m are the same position": labelled(x=np.r_[X[0], X[0], X[2:]]),
     "x = 0 and 0.1 m are the same position": labelled(np.r_[STRENGTH, 2e6], np.r_[X, 0.1]),
     "x must be finite; entry 3": labelled(x=np.r_[X[:3], np.nan, X[4:]]),
-    "crop the record ... or make interface.length 0.198": labelled(x=2.0 * X),
+    "crop the record ... or make interface.length 0.2": labelled(x=2.0 * X),
     "interpolate=True": labelled(x=UNEVEN),
     "the column of x (x=...) ... interpolate=True": xr.DataArray(STRENGTH[:60], dims="x"),
     "64 points from 0 to ... interpolate": labelled(STRENGTH[::2], X[::2]),

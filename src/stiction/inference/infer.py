@@ -291,7 +291,7 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
     The box that was simulated needs no such look: it grew until it held the posterior.
     """
     texts = [
-        f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of it"
+        f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
         for name, own, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
         for side, near, end in (
             ("lower", own < EDGE, ends[0]),
@@ -303,7 +303,7 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
         return []
     return [
         f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within {EDGE:.0%} of"
-        " the prior; where such an end is a guess, so is the result"
+        " the prior; check the unit of the peaks, and widen the prior where its end is a guess"
     ]
 
 

@@ -20,6 +20,8 @@ from stiction.random.random_interface import RandomInterface, as_random_interfac
 TAIL = 1e-4
 """Probability that is cut from either end of a prior without bounds."""
 MOST = 8
+MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
+"""Parameters of a marginal, whose keys begin with its name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,8 @@ def full_key(key: str) -> str:
         return f"random.{key}"
     if first in {field.name for field in fields(RandomField)}:
         return f"random.strength.{key}"
+    if first in MARGINAL:
+        raise InputError(f"unknown {key!r}; did you mean 'marginal.{key}'?")
     return f"random.strength.spectrum.{key}"
 
 

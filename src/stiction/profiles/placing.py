@@ -120,9 +120,10 @@ def _offset(dim: str, x: Array, interface: Interface) -> float | None:
         raise InputError(f"{dim} must be finite; entry {int(np.argmin(np.isfinite(x)))} is not")
     at = np.unique(x) / spacing
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
+        period = np.ptp(x) + np.median(np.diff(np.unique(x)))  # both ends are not one place
         raise InputError(
             f"{dim} reaches from {x.min():g} to {x.max():g} m, the interface is {length:g} m long:"
-            f" check the unit of {dim}, crop the record, or make interface.length {np.ptp(x):.6g}"
+            f" check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
     if not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5):
         return None
@@ -220,7 +221,7 @@ def close_gaps(
     if gaps == "refuse":
         raise InputError(
             f"must be finite: there {text}; give what was measured, make interface.length that of"
-            f" the record, or fill gaps {how}, which the result then remembers: gaps='fill'"
+            f" the record, or fill gaps {how}: gaps='fill'"
         )
     if gaps == "fill":
         filled = values.reshape(-1, *interface.shape).copy()
@@ -228,7 +229,8 @@ def close_gaps(
             if hole.any():
                 _fill(row, hole, interface.spacings)
         values = filled.reshape(values.shape)
-        warn_accuracy(f"there {text}; filled {how}")
+        doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
+        warn_accuracy(f"there {text}; filled {how}{doubt}")
     return values, ~missing & measured
 
 

@@ -35,7 +35,7 @@ PILOT = 1_000
 """Plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """From here on plain sampling needs no more evaluations than subset simulation."""
-DOUBTFUL = 1e-3
+DOUBTFUL = 1e-2
 """Share of the mean strength below which a stress is probably in another unit."""
 SHOWN = 20
 """Failing profiles kept."""
@@ -113,7 +113,7 @@ def failure_probability(
         the local criterion, some samples near the stress are also solved by equilibrium,
         and both probabilities are given if they differ by more than their error.
     UnitWarning
-        If the stress is below a thousandth of the mean strength.
+        If the stress is below a hundredth of the mean strength.
 
     Examples
     --------

@@ -154,7 +154,9 @@ def repeat_until_precise(
             return done or [one]
         done = [*(earlier.light() for earlier in done), one]
         cv = judge(done)
-        meter.note = f"{len(done)} repetitions, c.o.v. {cv:.2g} (target {target_cv:g})"
+        if cv > 0.0:  # zero is no estimate: no more repetitions are wanted
+            number = f"{len(done)} repetition{'s' if len(done) > 1 else ''}"
+            meter.note = f"{number}, c.o.v. {cv:.2g} (target {target_cv:g})"
         if cv <= target_cv:
             break
         total = sum(each.samples for each in done)
