@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import ks_2samp, kstest
 
-from reproduction import setting
+from reproduction import rules, setting
 from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import (
     Number,
@@ -19,17 +19,7 @@ from reproduction.numbers_with_errors import (
     share,
     skewness,
 )
-from reproduction.rules import (
-    above,
-    below,
-    by_chance,
-    each,
-    falling,
-    graded,
-    printed,
-    rising,
-    within,
-)
+from reproduction.rules import above, below, each, falling, graded, rising, within
 from reproduction.setting import DEVIATION, HIGH, LOW, MEAN, RATIOS, SIMULATED
 from reproduction.studies import infinite_variance_ratio
 
@@ -118,18 +108,18 @@ _HUMP = (
 
 PARAMETERS = [
     Check("mean-strength", "The mean peak strength is 1 MPa.", "Sec. 3.1, par. 2, sentence 7",
-        printed("1"), lambda d: ([one("<tau_p>", MEAN * MPA, "MPa")], [])),
+        rules.printed("1"), lambda d: ([one("<tau_p>", MEAN * MPA, "MPa")], [])),
     Check("strength-deviation", "The standard deviation of the peak strength is 0.2 MPa.",
-        "Sec. 3.1, par. 2, sentence 7", printed("0.2"),
+        "Sec. 3.1, par. 2, sentence 7", rules.printed("0.2"),
         lambda d: ([one("standard deviation", DEVIATION * MPA, "MPa")], [])),
     Check("lower-bound", "The lower bound of the strength is 0.66 of its mean.",
-        "Sec. 4.2, par. 3, sentence 7", printed("0.66"),
+        "Sec. 4.2, par. 3, sentence 7", rules.printed("0.66"),
         lambda d: ([one("tau_p,min/<tau_p>", LOW / MEAN)], [])),
     Check("nucleation-factor", "The critical nucleation length is 1.158 G*/W.",
-        "Sec. 3.2, par. 2, sentence 1 (Eq. 8)", printed("1.158"),
+        "Sec. 3.2, par. 2, sentence 1 (Eq. 8)", rules.printed("1.158"),
         lambda d: ([one("h_n W/G*", setting.H * setting.W / setting.G_STAR)], [])),
     Check("unit-weight", "The factor 0.751 makes the integral of the printed eigenfunction one.",
-        "App. B, par. 1, sentence 2 (Eq. B.1)", printed("0.751"),
+        "App. B, par. 1, sentence 2 (Eq. B.1)", rules.printed("0.751"),
         lambda d: ([one("factor", 1.0 / (math.pi / 2.0 * (0.925 - 0.308 / 4.0)))], [])),
     Check("long-interface", "The interface is considerably longer than the nucleation length.",
         "Sec. 3.1, par. 3, sentence 1; Sec. 3.3, par. 1, sentence 3", above(10.0),
@@ -139,7 +129,7 @@ PARAMETERS = [
         lambda d: ([over_ratios("change of tau_cr, root mean square", "%", lambda r:
                     root_mean_square(d.at("modes", "rounded", r)) * PER_CENT)], [])),
     Check("power-kept", "Truncation at 2.5 times the cutoff keeps 0.9997 of the power.",
-        "Sec. 2.3, par. 1, sentence 6 (Eq. 7)", printed("0.9997"),
+        "Sec. 2.3, par. 1, sentence 6 (Eq. 7)", rules.printed("0.9997"),
         lambda d: ([one("power kept", SPECTRUM.power_within(SPECTRUM.cutoff()))], [])),
     Claim("higher-modes", "Modes beyond the truncation would have negligible amplitudes.",
         "Sec. 2.3, par. 1, sentence 7", below(0.1, "%: a tenth of what a plot can show"),
@@ -306,7 +296,7 @@ ONSET = [
         lambda d: _pair(Series("mean of (tau_cr - min tau_p)/<tau_p>, L/xi_0 fixed", "",
                                _window(d, _excess)), -1)),
     Claim("density-of-minimum", "For xi_0 much longer than h_n, the density of tau_cr approaches"
-        " that of min tau_p.", "Sec. 6, par. 1, sentence 7", each(falling(), by_chance()),
+        " that of min tau_p.", "Sec. 6, par. 1, sentence 7", each(falling(), rules.by_chance()),
         lambda d: ([Series("distance of the distributions", "", _window(d, _apart)),
                     Series("p-value at the longest", "", _window(d, _chance)[-1:])], []),
         note="Kolmogorov-Smirnov distance between halves of the samples"),
@@ -330,12 +320,12 @@ ONSET = [
         note="our reading: the minimum lies far below the mean. Read as the third moment it holds"
         " at the longer correlation lengths only"),
     Check("uniform-position", "The onset may come anywhere: its position is uniformly distributed.",
-        "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", by_chance(),
+        "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", rules.by_chance(),
         lambda d: ([over_ratios("Kolmogorov-Smirnov p-value", "", lambda r:
                     Number(round(float(kstest(_positions(d, r), "uniform").pvalue), 3)))], []),
         note="true by construction: the field is stationary and periodic"),
     Check("position-independent", "Its distribution does not depend on the correlation length.",
-        "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", by_chance(),
+        "Sec. 4.2, par. 6, sentence 3 (Fig. 5d)", rules.by_chance(),
         lambda d: ([over_ratios("p-value against 0.25", "", lambda r: Number(round(float(
             ks_2samp(_positions(d, 0.25), _positions(d, r)).pvalue), 3)), RATIOS[1:])], []),
         note="true by construction; independent samples"),

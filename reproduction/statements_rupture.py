@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from reproduction import setting
+from reproduction import rules, setting
 from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import (
     Number,
@@ -15,18 +15,7 @@ from reproduction.numbers_with_errors import (
     relative_changes,
     share,
 )
-from reproduction.rules import (
-    above,
-    below,
-    corrected,
-    each,
-    falling,
-    graded,
-    main,
-    never,
-    rising,
-    within,
-)
+from reproduction.rules import above, below, corrected, each, falling, graded, rising, within
 from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
 from reproduction.studies import points
 
@@ -89,7 +78,7 @@ PATCHES = [
                         " over h_n", float(d["representative"]["patch_length"]) / H)], [])),
     Claim("residual-not-reached", "No point reaches its residual strength before the onset; the"
         " criterion of small-scale yielding does not apply.",
-        "Sec. 3.2, par. 2, sentence 1; par. 3, sentences 5 and 6", never(0.01),
+        "Sec. 3.2, par. 2, sentence 1; par. 3, sentences 5 and 6", rules.never(0.01),
         lambda d: ([over_ratios("share of samples that do, without an arrested event", "",
                     lambda r: share((d.at("exact", "residual_reached", r) > 0)
                                     & (d.at("exact", "arrested_events", r) == 0)))], [])),
@@ -183,7 +172,7 @@ ARREST = [
                    if d["arrest"].sizes["event"] > 2 else [], []),
         note="largest strength within h_n/2 of each end; 0.5 is chance"),
     Claim("simulations-run-away", "In every simulation the rupture, once unstable, runs along the"
-        " whole interface.", "Sec. 5.2, par. 5, sentences 1 and 2", never(0.1), _foreshocks),
+        " whole interface.", "Sec. 5.2, par. 5, sentences 1 and 2", rules.never(0.1), _foreshocks),
     Claim("precursors-unlikely",
         "Random strength alone makes precursory events extremely unlikely.",
         "Abstract, sentence 10; Sec. 5.2, par. 5, sentence 13; Sec. 6, par. 1, sentence 9", RARE,
@@ -203,7 +192,7 @@ ARREST = [
         " than at 2 h_n: strength that varies over shorter lengths stops more"),
     Claim("shear-crack", "After some growth the slipping area is a shear crack with a constant"
         " residual strength and a cohesive zone.", "Sec. 5.2, par. 5, sentence 5",
-        main(above(0.5), below(1.0, "slower than shear waves")),
+        rules.main(above(0.5), below(1.0, "slower than shear waves")),
         lambda d: ([one("share of the patch at its residual strength once it is 6 h_n long",
                         float(d["representative"]["weakened"])),
                     one("median speed of the fronts over c_s", mean(np.concatenate(
@@ -216,7 +205,7 @@ ARREST = [
     Claim("systematic-driving",
         "Arrested fronts of experiments come from non-uniform loading by the"
         " set-up.", "Abstract, sentence 11; Sec. 5.2, par. 7, sentence 2",
-        main(above(0.5), above(0.5)),
+        rules.main(above(0.5), above(0.5)),
         lambda d: ([_long_arrests(d, "edge"), _long_arrests(d, "gradient")],
                    [_long_arrests(d, "uniform"),
                     one("edge, with inertia, held", share(_edge_lengths(d) < 0.95 * L))]),

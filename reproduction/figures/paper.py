@@ -27,18 +27,7 @@ from reproduction.figures.style import (
     thin,
 )
 from reproduction.numbers_with_errors import mean, quantile
-from reproduction.setting import (
-    DEVIATION,
-    HIGH,
-    LOW,
-    MEAN,
-    PROBLEM,
-    RATIOS,
-    SIMULATED,
-    H,
-    L,
-    strength,
-)
+from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import dynamic_mean, offsets
 
 
@@ -255,7 +244,7 @@ def figure_5(d: Data):
     law = setting.MARGINAL.distribution.pdf(s) * MEAN
     upper[1].plot(law, s / MEAN, color=INK)
     for ratio in RATIOS:
-        field = strength(ratio)
+        field = setting.strength(ratio)
         draws = field.draws(PROBLEM.interface, 1, 0)  # one draw, as in the paper's (a) and (b)
         tau_p = field.profiles(PROBLEM.interface, draws)
         upper[0].plot(x, tau_p[0] / MEAN, **line(ratio), lw=0.9, label=f"{ratio:g}")
@@ -414,7 +403,7 @@ def figure_7(d: Data):
             if one <= high:
                 spread = d.at("moments", "powers", one)
                 sampled = spread[:, 1].mean() - spread[:, 0].mean() ** 2
-                panel.plot(one, sampled * (MEAN / DEVIATION) ** 2, "o", color=INK, ms=4)
+                panel.plot(one, sampled * (MEAN / setting.DEVIATION) ** 2, "o", color=INK, ms=4)
         panel.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
     axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")
