@@ -172,7 +172,7 @@ def test_onset_of_ones_own_profile(command, study):
     code, _, err = command(*ask)
     assert code == 2
     assert "problem: missing" in err
-    assert "unknown 'randon'; did you mean 'random'?" in err
+    assert "Study: unknown 'randon'; did you mean 'random'?" in err
 
 
 def test_messages_are_in_the_words_of_the_command_line(command):

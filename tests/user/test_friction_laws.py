@@ -310,7 +310,7 @@ def test_a_law_that_contradicts_itself_is_refused(with_law, law, words):
     refuses(words, lambda: st.PiecewiseWeakening.from_law(law(weakening_rate=0.5e12), 32))
 
 
-def test_schema_asks_for_the_type_of_a_law():
+def test_schema_asks_for_the_type_of_laws_and_marginals():
     from stiction.study.study import study_schema
 
     definitions = study_schema()["$defs"]
@@ -319,3 +319,5 @@ def test_schema_asks_for_the_type_of_a_law():
     assert len(others) == 2
     assert all(other["allOf"][1] == {"required": ["type"]} for other in others)
     assert "FrictionLaw" not in definitions
+    marginals = definitions["RandomField"]["properties"]["marginal"]["anyOf"]
+    assert all("type" in one["required"] for one in marginals)

@@ -363,6 +363,6 @@ def _of_scipy(name: str, parameters: Mapping[str, Any]) -> Marginal:
 
 
 _OF_SCIPY = {"type": "string", "description": "name of a continuous scipy.stats distribution"}
-_ALSO = {"type": "object", "properties": {"type": _OF_SCIPY}}
+_ALSO = {"type": "object", "properties": {"type": _OF_SCIPY}, "required": ["type"]}
 AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, [_ALSO])]
 """`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""

@@ -380,7 +380,7 @@ def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
     try:
         return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
-        raise InputError(dict.fromkeys(explain(error, cls))) from None
+        raise InputError(dict.fromkeys(explain(error, Study))) from None
 
 
 def open_run(path: Any) -> StoredRun:
