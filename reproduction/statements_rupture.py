@@ -5,16 +5,9 @@ import math
 
 import numpy as np
 
-from reproduction import rules, setting
+from reproduction import numbers_with_errors, rules, setting
 from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
-from reproduction.numbers_with_errors import (
-    Number,
-    deviation,
-    lower_spread,
-    mean,
-    relative_changes,
-    share,
-)
+from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
 from reproduction.rules import above, below, corrected, each, falling, graded, rising, within
 from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
 from reproduction.studies import points
@@ -364,7 +357,7 @@ def _exponents(d: Data, index: int) -> Series:
         usual = d.what_if("exponent", "critical_stress", 4 * k + 2)
         for j in (0, 1, 3):
             other = d.what_if("exponent", "critical_stress", 4 * k + j)
-            change = abs(relative_changes(other, usual)[index]) * PER_CENT
+            change = abs(numbers_with_errors.relative_changes(other, usual)[index]) * PER_CENT
             rows.append((f"exponent {labels[j]}, xi_0/h_n = {ratio:g}", change))
     return Series("mean" if index == 0 else "standard deviation", "%", rows)
 

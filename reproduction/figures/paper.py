@@ -24,7 +24,6 @@ from reproduction.figures.style import (
     new,
     numbers,
     ratio_axis,
-    thin,
 )
 from reproduction.numbers_with_errors import mean, quantile
 from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
@@ -263,8 +262,9 @@ def figure_5(d: Data):
     for axes, (low, high) in ((upper, (0.62, 1.72)), (lower, (0.62, 1.42))):
         for one in axes:
             one.set_ylim(low, high)
-        thin(axes[1])
-        thin(axes[2])
+        for one in axes[1:]:  # narrow panels of densities
+            one.set_xticks([])
+            one.tick_params(labelleft=False)
     upper[0].set(ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1))
     upper[0].legend(title=XI, loc="upper center", ncols=4, columnspacing=0.9)
     upper[0].set_ylim(0.62, 2.1)

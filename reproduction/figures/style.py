@@ -62,9 +62,3 @@ def ratio_axis(axes) -> None:
     plain_ticks(axes.xaxis, np.log2(RATIOS))
     axes.set_xticklabels([f"{ratio:g}" for ratio in RATIOS])
     axes.set_xlabel(XI)
-
-
-def thin(axes) -> None:
-    """Take away the frame and the ticks of a narrow panel of densities."""
-    axes.set_xticks([])
-    axes.tick_params(labelleft=False)
