@@ -1,4 +1,4 @@
-"""Griffith's criterion under any load: where the release of energy no longer pays for a crack."""
+"""Griffith's criterion under any load: energy release rate and critical crack length."""
 
 from typing import Any
 
@@ -31,9 +31,9 @@ def energy_release_rate(
     load : float
         tau_0, Pa.
     lengths : (m,) array or float
-        m, between 0 and the length of the interface.
+        Lengths of the crack, m, between 0 and that of the interface.
     centre : float
-        Of the crack, m.
+        Centre of the crack, m.
 
     Returns
     -------
@@ -94,15 +94,15 @@ def griffith_length(
     fracture_energy : float
         Gamma, J/m², positive; for random strength its mean.
     centre : float
-        m; both tips are as far from it.
+        Centre of the crack, m, at equal distances from both tips.
     arrest : bool
-        False: the shortest length from which the release rate at the tip that releases less
-        exceeds Gamma. True: the next length at which it falls below again.
+        False: the shortest length above which the smaller of the two release rates exceeds
+        Gamma. True: the next length at which it falls below Gamma again.
 
     Returns
     -------
     float or (k,) array
-        m; infinite where there is none.
+        Length, m; infinite where there is none.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def griffith_length(
 
     Notes
     -----
-    Crossings are looked for at lengths one node apart, and at ever shorter ones; then bisected.
+    Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
     """
     _check(problem, centre=centre)
     if not (is_finite(fracture_energy) and fracture_energy > 0.0):
@@ -159,7 +159,7 @@ def _check(problem: Any, **numbers: Any) -> None:
         if not is_finite(value)
     ]
     if problem.interface.is_plane:
-        problems.append("problem: must be a line; a plane has no crack of two tips")
+        problems.append("problem: must have a line interface")
     if problem.friction.residual_ratio is not None:
         problems.append(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"

@@ -20,7 +20,7 @@ SLIP = {1: 0.6614, 2: 1.3788}
 two dimensions: the slip of (K - W) slip = tau_0 - curvature r^2 on the unit ball, K scalar, without
 a singularity at the rim."""
 ENOUGH = 1000
-"""Samples that tell how many reach their residual strength."""
+"""Number of samples for the estimate of how many reach their residual strength."""
 
 OWN_VARIABLES = {
     "critical_aspect": Variable(
@@ -33,13 +33,14 @@ OWN_VARIABLES = {
 
 @model(kw_only=True)
 class LocalCriterion:
-    """Onset at the minimum of the nucleation stress: each patch by itself, in microseconds.
+    """Onset at the minimum of the nucleation stress, each patch taken in isolation.
 
-    An upper bound of the exact equilibrium onset, up to discretisation, as long as no node reaches
-    its residual strength (zero included) before: patches that interact only become unstable
-    earlier. A node that has reached it weakens no more, so that the onset comes later than the
-    criterion says. An `AccuracyWarning` estimates in how many samples, and by how much.
-    No event is assumed to be arrested, so `first_instability` and `critical_stress` are equal.
+    If no node reaches its residual strength (zero included) before the onset, this is an
+    upper bound of the exact equilibrium onset, up to discretisation: interaction only makes
+    patches unstable earlier. A node at its residual strength weakens no more, so that the
+    onset comes later than the criterion predicts. An `AccuracyWarning` estimates in how
+    many samples, and by how much. Events are assumed not to be arrested, so
+    `first_instability` and `critical_stress` are equal.
 
     Parameters
     ----------
@@ -48,11 +49,11 @@ class LocalCriterion:
 
     Notes
     -----
-    The weights of the average are never negative, so the result lies between the least and the
-    greatest strength also where the strength jumps. On a line the minimum is taken between the
-    nodes. Of a friction law that is not linear the weakening rate at zero slip counts, with an
-    `AccuracyWarning`: strength that falls ever less steeply becomes unstable later. A law that
-    steepens is refused.
+    The weights of the average are never negative, so the result lies between the least and
+    the greatest strength also where the strength jumps. On a line the minimum is taken
+    between the nodes. For a nonlinear friction law, the weakening rate at zero slip counts,
+    with an `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A
+    law that steepens raises an error.
 
     On a plane the average is over critical ellipses of five shapes, each the smallest on which the
     stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
@@ -63,7 +64,7 @@ class LocalCriterion:
     Examples
     --------
     >>> import stiction as st
-    >>> st.LocalCriterion().supports(st.paper.problem(nodes=512))  # nothing speaks against it
+    >>> st.LocalCriterion().supports(st.paper.problem(nodes=512))  # no reason against it
     []
     """
 
@@ -72,7 +73,7 @@ class LocalCriterion:
 
     @property
     def chunk_size(self) -> int:
-        """Samples of a batch in an ensemble."""
+        """Number of samples in a batch of an ensemble."""
         return 1024
 
     @property
@@ -81,7 +82,7 @@ class LocalCriterion:
         return "local criterion"
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return about how long a sample takes on one core, s."""
+        """Return the approximate time of a sample on one core, s."""
         return (3e-8 if not problem.interface.is_plane else 6e-8) * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
@@ -89,7 +90,7 @@ class LocalCriterion:
         reasons = _refused_laws(problem)
         if problem.interface.is_plane and self.weights != "exact":
             reasons.append(
-                f"weights = {self.weights!r} are those of a line; on a plane leave them 'exact'"
+                f"weights = {self.weights!r} apply to lines only; on a plane leave them 'exact'"
             )
         rate = problem.friction.weakening_rate
         if rate is not None and problem.uniform_rate is None:
@@ -100,7 +101,7 @@ class LocalCriterion:
         return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return what the solver computes for each sample."""
+        """Return the variables that the solver computes for each sample."""
         found = onset_variables(problem.interface)
         if problem.interface.is_plane:
             extent = position(problem.interface, OWN_VARIABLES["critical_patch_extent"])
@@ -239,10 +240,10 @@ def nucleation_stress(
 ) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
-    The load tau_0 at which a patch of length h_n centred at x becomes unstable, if it were alone:
-    the average of tau_p - tau_i over h_n with the weight of the critical slip-rate profile, over
-    the same average of the load profile (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020,
-    Eq. 9).
+    This is the load tau_0 at which a patch of length h_n centred at x, if isolated, becomes
+    unstable: the average of tau_p - tau_i over h_n with the weight of the critical
+    slip-rate profile, over the same average of the load profile (Uenishi and Rice, 2003,
+    Eq. 14; Albertini et al., 2020, Eq. 9).
 
     Parameters
     ----------
@@ -254,8 +255,8 @@ def nucleation_stress(
         The exact eigenfunction, or the paper's 0.751 (0.925 - 0.308 s^2) sqrt(1 - s^2), which is
         too high by 0.036 %; the latter on a line only.
     aspect : float, optional
-        On a plane the average over critical ellipses whose extent along x is so many times that
-        along y; the least over five shapes if left out.
+        On a plane, extent of the critical ellipse along x over that along y; by default the
+        least average over five shapes is taken.
 
     Returns
     -------
@@ -314,19 +315,21 @@ def check_window(problem: Problem, weights: Weights, aspect: Any) -> None:
         valid = "a positive number" if plane else "left out on a line"
         raise InputError(f"aspect: must be {valid}, got {describe(aspect)}")
     if plane and weights != "exact":
-        raise InputError("weights: 'rounded' is of a line; on a plane leave weights = 'exact'")
+        raise InputError(
+            "weights: 'rounded' applies to lines only; on a plane leave weights = 'exact'"
+        )
 
 
 def _refused_laws(problem: Problem) -> list[str]:
-    """Return why the weakening rate at zero slip does not tell the onset; nothing if it does."""
+    """Return why the weakening rate at zero slip does not determine the onset, if so."""
     friction = problem.friction
     times = friction.steepest_slope / friction.initial_slope
     if times <= 1.0:
         return []
     return [
-        f"friction: the local criterion takes the weakening rate at zero slip, and this law falls"
-        f" up to {times:.3g} times as steeply later, so that patches become unstable at lower"
-        " loads than it says; use st.Equilibrium() or st.Rupture()"
+        "friction: the local criterion takes the weakening rate at zero slip, and this"
+        f" law falls up to {times:.3g} times as steeply later, so that patches become"
+        " unstable at lower loads than it predicts; use st.Equilibrium() or st.Rupture()"
     ]
 
 
@@ -336,11 +339,11 @@ def check_law(problem: Problem) -> None:
         raise InputError(reasons)
     if not problem.friction.linear:
         warn_accuracy(
-            "friction: the local criterion takes the weakening rate at zero slip for that at any;"
-            " as strength falls ever less steeply, patches become unstable later than it says: for"
-            " an exponential law and strength from 0.66 to 1.66 MPa by 2 % (at most 7 %) at a"
-            " correlation length of a quarter of h_n, by 0.6 % (at most 3 %) at one of h_n;"
-            " st.Equilibrium() follows polygons exactly"
+            "friction: the local criterion takes the weakening rate at zero slip as constant;"
+            " as strength falls ever less steeply, patches become unstable later than it"
+            " predicts: for an exponential law and strength from 0.66 to 1.66 MPa by 2 % (at"
+            " most 7 %) at a correlation length of a quarter of h_n, by 0.6 % (at most 3 %) at"
+            " one of h_n; st.Equilibrium() is exact for piecewise linear laws"
         )
 
 

@@ -1,10 +1,10 @@
 """The store: a folder of self-describing chunks.
 
-``study.json`` says which study it is, and ``chunks/`` holds the samples. A chunk is a table of
-samples with a mark of their study; its name is a digest of its content. Chunks are written whole or
-not at all, and nothing lists them: so any number of processes may write to a folder at once, a run
-may be killed at any moment, and damage is found. Each writer joins its own small chunks as they
-become many.
+``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk is a table
+of samples with a mark of their study; its name is a digest of its content. Chunks are
+written whole or not at all, and nothing lists them: so any number of processes may write to
+a folder at once, a run may be killed at any moment, and damage is found. Each writer joins
+its own small chunks as they become many.
 """
 
 from __future__ import annotations

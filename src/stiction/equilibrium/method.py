@@ -41,7 +41,7 @@ ON_NODES = {
     "sensitivity": Variable("1", "sensitivity of the first instability to the strength there"),
 }
 DISCRETIZATION_ERROR = Variable(
-    "Pa", "estimated error of the first instability due to the distance of the nodes"
+    "Pa", "estimated error of the first instability due to the node spacing"
 )
 
 
@@ -51,12 +51,12 @@ class Equilibrium:
 
     A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes about 0.15 s.
 
-    The load is raised until no equilibrium is left. As long as strength falls linearly this is a
+    The load is raised until no equilibrium is left. While strength falls linearly, this is a
     linear programme, solved to round-off with a certificate; beyond the first instability, or
-    where the residual strength or another corner of a `PiecewiseWeakening` is reached before it,
-    events are followed one by one: exact too, at 5 times the cost for two pieces and 50 for 32.
-    On planes the path between such events is followed in steps of the load.
-    Weakening rate, residual strength, initial stress and load profile may vary along the interface.
+    where the residual strength or another corner of a `PiecewiseWeakening` is reached before
+    it, events are followed one by one: exact too, at 5 times the cost for two pieces and 50
+    for 32. On planes the path between such events is followed in steps of the load. Weakening
+    rate, residual strength, initial stress and load profile may vary along the interface.
 
     On planes the programme is solved with transforms, to bounds that are `gap` of the load apart;
     the loads returned are the lower one, at which there is an equilibrium.
@@ -72,28 +72,28 @@ class Equilibrium:
         Also return an estimate of the error of `first_instability` that is due to the grid, at
         about a third more time: see `docs/equilibrium.md`. Nodes must be a multiple of four.
     events : int
-        Also return the first so many arrested events of each sample over 'event', NaN where there
-        are fewer: a sequence, since stress and slip are carried on from one to the next. Their
-        variables are those of `equilibrium_path`.
+        Also return this number of arrested events of each sample over 'event', NaN where
+        there are fewer. They form a sequence: stress and slip continue from one to the
+        next. Their variables are those of `equilibrium_path`.
     gap : float
-        Of planes: distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are solved
-        to round-off; where thousands of nodes slip, to 1e-9.
+        On planes, distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are
+        solved to round-off; where thousands of nodes slip, to 1e-9.
 
     Notes
     -----
-    Besides the variables of every method: `certificate_gap` (Pa) between rigorous bounds of the
-    first instability, `slip_patches` at that moment, `critical_patch_length` (m),
-    `arrested_events`, `residual_reached` (whether a node had reached its residual strength before
-    the interface let go), and `sliding_position` (m), which differs from `critical_position` only
-    after an arrested event. Arrest is decided by equilibrium: inertia may carry a rupture through.
-    Where a law steepens and a corner is passed before the first instability, there is no bound
-    from above, and `certificate_gap` is nan.
+    Besides the variables of every method: `certificate_gap` (Pa) between rigorous bounds of
+    the first instability, `slip_patches` at that moment, `critical_patch_length` (m),
+    `arrested_events`, `residual_reached` (whether a node had reached its residual strength
+    before the interface slid), and `sliding_position` (m), which differs from
+    `critical_position` only after an arrested event. Arrest is decided by equilibrium:
+    inertia may carry a rupture through. Where a law steepens and a corner is passed before
+    the first instability, there is no bound from above, and `certificate_gap` is nan.
 
-    On planes positions have two components, along 'direction'; instead of a length there are
-    `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²), and `certified`
-    says whether the bounds are rigorous: they are not where a node reaches its residual strength
-    before the first instability. Slipping nodes belong to one patch where their cells share an
-    edge, also across the borders.
+    On planes positions have two components, along 'direction'; instead of a length there
+    are `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²), and
+    `certified` is true if the bounds are rigorous: they are not where a node reaches its
+    residual strength before the first instability. Slipping nodes belong to one patch where
+    their cells share an edge, also across the borders.
 
     Examples
     --------
@@ -115,16 +115,16 @@ class Equilibrium:
 
     @property
     def chunk_size(self) -> int:
-        """Samples that make a good piece of work in an ensemble."""
+        """Number of samples in a batch of an ensemble."""
         return 256
 
     @property
     def label(self) -> str:
-        """Its name in figures and tables."""
+        """Name in figures and tables."""
         return "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """About how long a sample takes on one core, s."""
+        """Return the approximate time of a sample on one core, s."""
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
@@ -136,11 +136,11 @@ class Equilibrium:
         return 3e-4 * corners * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
-        """Reasons why it cannot take a problem; none if it can."""
+        """Return the reasons why it cannot solve a problem; none if it can."""
         return refused(problem.friction)
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """What the solver returns for each sample."""
+        """Return the variables that the solver computes for each sample."""
         interface = problem.interface
         variables = onset_variables(interface) | VARIABLES
         variables |= OF_PLANES if interface.is_plane else OF_LINES
@@ -159,12 +159,12 @@ class Equilibrium:
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
-        """A solver for rows of this problem.
+        """Return a solver for samples of this problem.
 
         Raises
         ------
         InputError
-            If the number of nodes is no multiple of four for `discretization_error`.
+            If the number of nodes is not a multiple of four for `discretization_error`.
         """
         return Solver(
             problem, sensitivity=self.sensitivity, slip=self.slip,

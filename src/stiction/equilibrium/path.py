@@ -1,4 +1,4 @@
-"""The path of one sample: slip and stress at given loads, and what came to rest on the way."""
+"""The path of one sample: slip and stress at given loads, and arrested events on the way."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ VARIABLES = {
     "stress": Variable("Pa", "shear stress on the interface", ("load",)),
     "mean_stress": Variable("Pa", "mean shear stress on the interface", ("load",)),
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
-    "sliding": Variable("1", "whether the interface as a whole has let go", ("load",)),
+    "sliding": Variable("1", "whether the interface as a whole slides", ("load",)),
 }
 EVENT = Variable("1", "event number", ("event",))
 GAP = 1e-6

@@ -282,9 +282,9 @@ class Solver:
         percent = 100.0 * error / np.abs(onset)
         if np.any(percent > SHARE):
             warn_accuracy(
-                "the distance of the nodes changes the first instability by an estimated"
-                f" {np.sqrt(np.mean(percent**2)):.2g} % (root mean square of {onset.size} samples,"
-                f" at most {percent.max():.2g} %); take more nodes"
+                "the node spacing changes the first instability by an estimated"
+                f" {np.sqrt(np.mean(percent**2)):.2g} % (root mean square of {onset.size}"
+                f" samples, at most {percent.max():.2g} %); take more nodes"
             )
         return error
 
@@ -310,9 +310,9 @@ class Solver:
             )
         if lost.any():
             warn_accuracy(
-                f"a jump did not come to its end in {lost.sum()} of {gap.size} samples"
-                f" ({listed(np.flatnonzero(lost))}): their critical load is the last with a known"
-                " equilibrium, a lower bound"
+                f"a jump was not followed to its end in {lost.sum()} of {gap.size}"
+                f" samples ({listed(np.flatnonzero(lost))}): their critical load is the"
+                " last with a known equilibrium, a lower bound"
             )
 
 
@@ -362,5 +362,5 @@ def _warn_if_lost(sensitivity: Array) -> None:
     if lost:
         warn_accuracy(
             f"nodes begin to weaken more steeply in {lost} of {len(sensitivity)} samples:"
-            " their first instability has no derivative that is known, sensitivity is NaN"
+            " their first instability has no known derivative, so sensitivity is NaN"
         )

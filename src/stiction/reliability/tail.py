@@ -20,7 +20,7 @@ MARGIN = 1.1
 SUBSET, BRIDGE = (1_000, 5_000), (200, 1_000)
 """Samples a level, or exact samples, of the first repetition and of the largest."""
 DEEPER = 0.3
-"""Repetitions go on to this share of a probability, to know the lower end of the interval."""
+"""Repetitions go on to this share of a probability, to estimate the lower end of the interval."""
 PILOT = 500
 """Plain samples by which a less expensive method is judged as a guide."""
 ALIKE = 0.9

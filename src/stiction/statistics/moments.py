@@ -66,7 +66,7 @@ def nucleation_statistics(
     Notes
     -----
     On a plane tau_n is the average over the middle one of the ellipses of `LocalCriterion`;
-    the least over several shapes, which that takes, has no moments in closed form.
+    the least over several shapes, which the method takes, has no closed-form moments.
 
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the
     double integral of the correlation of tau_p (by Hermite expansion; Grigoriu, 1995)

@@ -48,15 +48,15 @@ class RiceDistribution:
     crossing_rate : (m,) array
         Down-crossings of x per metre of interface; on a plane dips below x per m².
     point_survival : (m,) array
-        P(a point holds more than x).
+        P(the stress at a point exceeds x).
     relative_error : (m,) array
-        Sampling error of the crossing rate, one over the root of the crossings seen.
+        Sampling error of the crossing rate, one over the root of their number.
     trusted : (m,) array of bool
-        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10
-        crossings or dips were seen, and on a line `1 - point_survival` is at most 4 % of
-        P, since P is too high by up to (1 - point_survival)/P where xi_0 is not short
-        against the interface. On a plane there are at most 1.1 dips for each sample that
-        has any. Above P = 0.1 P is too low, on a line by 4 to 9 % at the median.
+        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
+        or dips, and on a line `1 - point_survival` is at most 4 % of P, since P is too high
+        by up to (1 - point_survival)/P if xi_0 is not short compared with the interface. On
+        a plane there are at most 1.1 dips for each sample that has any. Above P = 0.1 P is
+        too low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
@@ -102,8 +102,8 @@ def rice_distribution(
     P(tau_cr > x) ~ S(x) exp(-L nu(x)/S(x)): the stress at one point survives, and from
     there crossings of the level x come as a Poisson process at the rate nu (Rice, 1945;
     Cramer and Leadbetter, 1967). S and nu are pooled from sampled profiles of the
-    nucleation stress, every position of which counts; so a few hundred profiles tell as
-    much of the lower tail as many more minima would. On a plane P(tau_cr > x) ~
+    nucleation stress, every position of which counts; so a few hundred profiles determine
+    the lower tail as well as many more minima would. On a plane P(tau_cr > x) ~
     exp(-chi(x)), with chi the expected number of dips below x in the nucleation stress.
 
     Parameters
@@ -113,10 +113,10 @@ def rice_distribution(
     strength : RandomField
         Peak strength, Pa; or friction coefficients under a uniform normal pressure.
     profiles : int
-        How many profiles to sample, at least 16: samples 0.. of `seed`.
+        Number of profiles to sample, at least 16: samples 0, 1, ... of `seed`.
     seed : int
     stress : (m,) array, optional
-        Levels of the critical stress, Pa, rising; by default 1024 over the range sampled.
+        Levels of the critical stress, Pa, rising; by default 1024 over the sampled range.
 
     Examples
     --------
