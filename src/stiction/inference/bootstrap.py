@@ -177,7 +177,7 @@ def bootstrapped(
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
     Returns the repetitions, as many as the family can be fitted to, and how many were
-    requested for. Repetition b depends on (seed, b) only.
+    requested. Repetition b depends on (seed, b) only.
     """
 
     def one(field: Estimate, number: int) -> Estimate | None:

@@ -50,7 +50,7 @@ class RiceDistribution:
     point_survival : (m,) array
         P(the stress at a point exceeds x).
     relative_error : (m,) array
-        Sampling error of the crossing rate, one over the root of their number.
+        Sampling error of the crossing rate, one over the root of the number of crossings.
     trusted : (m,) array of bool
         Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
         or dips, and on a line `1 - point_survival` is at most 4 % of P, since P is too high
