@@ -123,11 +123,11 @@ def run(
 ) -> None:
     """Run the study in a file, or the missing part of it.
 
-    The same command goes on where a run was interrupted, however it ended, and computes only the
-    new samples if `samples` was raised in the study. The numbers do not depend on workers,
-    machines or interruptions.
+    Rerunning the command resumes an interrupted run, and computes only the new samples if
+    `samples` was raised in the study. The results do not depend on workers, machines or
+    interruptions.
 
-    Exit code 0: complete; 1: samples failed or the run could not go on; 2: mistakes in the study
+    Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
     or the command; 3: the time limit was reached; 130: interrupted.
     """
     from stiction.study.study import Study, open_run
@@ -201,8 +201,8 @@ def export(
 ) -> None:
     """Write a run as one file over the sweep and the samples; missing samples are NaN.
 
-    A table (.csv) has a row a sample and columns named `name (unit)`; profiles along the interface
-    do not fit into it.
+    A table (.csv) has one row for each sample and columns named `name (unit)`; it leaves out
+    profiles along the interface.
     """
     from stiction.study.study import open_run
 
@@ -399,11 +399,10 @@ def onset(
 ) -> None:
     """Compute the load and position at which one interface of given strength begins to slide.
 
-    Takes the problem from a study file, which needs nothing else, and the strength from PROFILE:
-    .npy, text (.csv, .txt, ...) or NetCDF, with or without x, in Pa and m unless it states units,
-    as in 'x (mm); strength (MPa)'; on a plane .npy of shape (nx, ny). Every method that applies
-    is used: that of the study with its options, the others with their defaults, and `rupture` with
-    a loading rate of 2e7 Pa/s.
+    The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...) or NetCDF, with
+    or without x; on a plane it is .npy of shape (nx, ny). Values are in Pa and m unless the file
+    states units, as in 'x (mm); strength (MPa)'. Every applicable method is used: that of the
+    study with its options, the others with their defaults, and `rupture` at 2e7 Pa/s.
     """
     import pandas as pd
 
@@ -456,11 +455,10 @@ def rupture(
 ) -> None:
     """Simulate one interface from its first slip to global sliding, or as its study stops it.
 
-    Takes a sample of the study's strength (of a sweep, its first point) or a profile of your own.
-    Writes `rupture.nc` (slip, slip rate and stress over time and x), and as PNG and PDF `rupture`
-    (slip rate in space and time, load, strength) and `front` (where the rupture front is and how
-    fast), and with --film an animation. The loading rate is that of the study's method `rupture`,
-    else 2e7 Pa/s.
+    The strength is a sample of the study (of a sweep, at its first point) or a profile of your
+    own. The command writes `rupture.nc` (slip, slip rate and stress over time and x) and, as PNG
+    and PDF, `rupture` (slip rate in space and time) and `front` (speed of the rupture front). The
+    loading rate is that of the study's method `rupture`, else 2e7 Pa/s.
     """
     from stiction import plot
     from stiction.dynamics.method import Rupture
@@ -516,9 +514,9 @@ def reliability(
 ) -> None:
     """Compute the failure probability of a study's interface, decade by decade.
 
-    Problem, strength, method and seed come from the study file; its number of samples does not
-    matter here. Prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a figure
-    (PNG and PDF) into a folder. The stress is the mean shear stress on the interface, and failure
+    Problem, strength, method and seed come from the study file; its number of samples is not
+    used. The command prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a
+    figure (PNG and PDF) into a folder. The stress is the mean shear stress on the interface, and failure
     means that the interface as a whole slides below it.
     """
     from stiction import plot
@@ -607,9 +605,9 @@ def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
 
 
 def main() -> None:
-    """Entry point: mistakes and a full disk end with a message, not a traceback.
+    """Run the command line: invalid input and a full disk give a message, not a traceback.
 
-    Exit code 2 for the user's mistakes; 1 where something went wrong on the way.
+    The exit code is 2 for invalid input and 1 for failures of the run.
     """
     logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
     warnings.showwarning = _show_warning

@@ -483,8 +483,8 @@ def _check_values(name: str, array: Array, interface: Interface, infinite: bool)
     missing = np.isnan(array)
     if missing.any() and array.shape[-len(interface.shape) :] == interface.shape:
         raise InputError(
-            f"{name}: must be finite: there {describe_gaps(missing, interface)}; gaps='fill' of"
-            " st.onset and st.read_profile fills gaps with straight lines"
+            f"{name}: {describe_gaps(missing, interface)}; gaps='fill' of st.onset and"
+            " st.read_profile fills them with straight lines"
         )
     if bad.any():
         entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])

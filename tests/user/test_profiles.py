@@ -300,7 +300,7 @@ REFUSED_CALLS = {
         SYSTEM, load=st.Load(profile=labelled(1.0 + X, units="Pa"))
     ),
     "interpolate=True": lambda: st.read_profile(TENT, interface=LINE),
-    "no values ... at x = 0.0265625 to 0.0382813 m": lambda: st.read_profile(
+    "values are missing ... at x = 0.0265625 to 0.0382813 m": lambda: st.read_profile(
         TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True
     ),
     "gaps: must be 'refuse' or 'fill'": lambda: onset(STRENGTH, gaps="drop"),

@@ -220,8 +220,8 @@ def close_gaps(
     how = "smoothly from their rim" if interface.is_plane else "with straight lines"
     if gaps == "refuse":
         raise InputError(
-            f"must be finite: there {text}; give what was measured, make interface.length that of"
-            f" the record, or fill gaps {how}: gaps='fill'"
+            f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
+            f" to fill them {how}"
         )
     if gaps == "fill":
         filled = values.reshape(-1, *interface.shape).copy()
@@ -230,7 +230,7 @@ def close_gaps(
                 _fill(row, hole, interface.spacings)
         values = filled.reshape(values.shape)
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
-        warn_accuracy(f"there {text}; filled {how}{doubt}")
+        warn_accuracy(f"{text}; filled {how}{doubt}")
     return values, ~missing & measured
 
 
@@ -261,7 +261,7 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
 
 
 def describe_gaps(missing: Mask, interface: Interface) -> str:
-    """Return 'are no values (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
+    """Return 'values are missing (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
     maps = missing.reshape(-1, *interface.shape)
     row = int(np.argmax(maps.reshape(len(maps), -1).any(axis=1)))
     count = f"{maps[row].sum()} of {interface.size} nodes"
@@ -269,7 +269,7 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
         count += f" of sample {row}"
     if interface.is_plane:
         place = interface.describe_node(int(np.argmax(maps[row])))
-        return f"are no values (NaN) at {count}, the first at {place}"
+        return f"values are missing (NaN) at {count}, the first at {place}"
     first = np.flatnonzero(maps[row] & ~np.roll(maps[row], 1))
     last = np.flatnonzero(maps[row] & ~np.roll(maps[row], -1))
     if maps[row].all():
@@ -279,7 +279,7 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
     ends = zip(interface.x[first][:SHOWN], interface.x[last][:SHOWN], strict=True)
     at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in ends)
     more = f" and {first.size - SHOWN} more gaps" if first.size > SHOWN else ""
-    return f"are no values (NaN) at x = {at}{more} ({count})"
+    return f"values are missing (NaN) at x = {at}{more} ({count})"
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:

@@ -467,9 +467,7 @@ def on_nodes(name: str, given: Any, interface: Interface) -> Any:
             given = xr.DataArray.from_dict(dict(given))
             options = {key: given.attrs[key] for key in ("interpolate", "gaps")}
         except (ValueError, TypeError, KeyError, AttributeError):
-            raise InputError(
-                f"{name}: a profile as a table has a file, in a study file"
-            ) from None
+            raise InputError(f"{name}: a profile table belongs in a study file") from None
     return np.asarray(at_nodes(name, given, quantity_of(name), interface, **options)[0])
 
 

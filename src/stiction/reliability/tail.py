@@ -247,5 +247,7 @@ def sample_tail(
         spent += sum(one.evaluations for one in found)
         if not is_poor(found[0]):
             return Tail(found, "subset" if guide is None else "two_level", reason, spent)
-        reason += f"; of what fails by the {label} {found[0].share:.1%} fails: a poor guide"
+        reason += (
+            f"; {found[0].share:.1%} of failures by the {label} are confirmed: a poor guide"
+        )
         guide = None
