@@ -516,8 +516,8 @@ def reliability(
 
     Problem, strength, method and seed come from the study file; its number of samples is not
     used. The command prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a
-    figure (PNG and PDF) into a folder. The stress is the mean shear stress on the interface, and failure
-    means that the interface as a whole slides below it.
+    figure (PNG and PDF) into a folder. The stress is the mean shear stress on the interface;
+    failure means that the interface as a whole slides below it.
     """
     from stiction import plot
     from stiction.reliability.curve import failure_curve

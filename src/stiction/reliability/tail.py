@@ -247,7 +247,5 @@ def sample_tail(
         spent += sum(one.evaluations for one in found)
         if not is_poor(found[0]):
             return Tail(found, "subset" if guide is None else "two_level", reason, spent)
-        reason += (
-            f"; {found[0].share:.1%} of failures by the {label} are confirmed: a poor guide"
-        )
+        reason += f"; {found[0].share:.1%} of the failures by the {label} hold: a poor guide"
         guide = None
