@@ -164,7 +164,7 @@ MISTAKES = {
     "load.profile ... 256 ... (10,)": lambda: make_problem(load=st.Load(profile=np.ones(10))),
     "strength ... (100,) ... 256": lambda: onset(np.ones(100)),
     "strength ... numbers": lambda: onset("strong"),
-    "strength ... finite": lambda: onset(np.full(256, np.nan)),
+    "strength: values are missing": lambda: onset(np.full(256, np.nan)),
     "strength ... finite ... 1e+100": lambda: onset(np.full(256, 1e308)),
     "strength ... no samples": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),

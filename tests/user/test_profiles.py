@@ -283,7 +283,7 @@ REFUSED = {
     "interpolate=True ... 14 points ... gaps='fill'": labelled(
         without(slice(4, None, 9)), UNEVEN
     ),
-    "strength: must be finite ... (1 of 128": without(3),
+    "strength: values are missing ... (1 of 128": without(3),
 }
 
 
@@ -333,7 +333,7 @@ def test_gaps_are_named_filled_on_request_and_remembered():
     words = "(NaN) at x = 0.0546875 to 0.0664062 m, 0.0984375 to 0.0015625 m (21 of"
     expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)], period=0.1)
     for given in (holes, labelled(holes), labelled(holes[::-1], X[::-1])):
-        refuses(f"strength: must be finite ... {words}", lambda given=given: found(given))
+        refuses(f"strength: values are missing ... {words}", lambda given=given: found(given))
         result = onset(given, gaps="fill")
         assert not bool(result["in_gap"][0])
         np.testing.assert_allclose(
@@ -443,7 +443,7 @@ def test_profiles_in_a_study_file(study, tmp_path):
         ("did you mean 'interpolate'", {"file": "tau_r.csv", "interpol": True}),
         ("gaps: must be 'refuse' or 'fill'", {"file": "load.csv", "gaps": "skip"}),
         ("tau_r.csv: holds no variable", "tau_r.csv"),
-        ("a profile as a table has a file", {"values": [1.0, 2.0]}),
+        ("a profile table belongs in a study file", {"values": [1.0, 2.0]}),
     ],
 )
 def test_profiles_of_a_study_file_that_are_refused(study, tmp_path, words, profile):
