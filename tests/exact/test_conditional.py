@@ -1,12 +1,11 @@
 """Fields of which a part was measured, and factors between specimens, against closed forms."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
 from scipy.stats import kstest
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.random.conditioning import basis
@@ -16,17 +15,14 @@ from stiction.random.random_interface import _conditioned
 
 LINE = st.Interface(length=0.05, nodes=64)
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(16, 8))
-FIELD = st.RandomField(
-    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(6e-3)
-)
+FIELD = beta_strength(6e-3)
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 
 
 def coarse():
     """A problem that 64 nodes resolve: h_n is 15 mm of 100 mm."""
-    plain = st.paper.problem(nodes=256)
-    line = st.Interface(length=0.1, nodes=64)
-    return st.Problem(plain.solid, line, st.LinearWeakening(weakening_rate=0.1e12))
+    solid = st.paper.problem().solid
+    return make_problem(64, solid=solid, weakening_rate=0.1e12)
 
 
 def scan(interface, places, field=FIELD, seed=7):
@@ -34,6 +30,11 @@ def scan(interface, places, field=FIELD, seed=7):
     draws = field.draws(interface, 1, seed)
     phi = basis(field.modes(interface), field.mean_mode, interface.lengths, places)
     return from_normal(field.marginal, phi @ draws[0])
+
+
+def all_of(coordinates):
+    """Places (dimensions, points) of a grid."""
+    return np.array([row.ravel() for row in np.meshgrid(*coordinates.values(), indexing="ij")])
 
 
 def on_line(places, values):
@@ -56,21 +57,17 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, between_nodes,
     normal = scipy.stats.norm(1e6, 0.2e6)
     field = st.RandomField(normal, FIELD.spectrum, mean_mode=mean_mode)
     shift = 0.31 * between_nodes
-    x = (np.arange(5.0, 12.0) + shift) * interface.spacings[0]
-    if interface.is_plane:
-        y = (np.arange(2.0, 5.0) + shift) * interface.spacings[1]
-        places = np.array([row.ravel() for row in np.meshgrid(x, y, indexing="ij")])
-        values = scan(interface, places, field)
-        known = xr.DataArray(values.reshape(7, 3), {"x": x, "y": y}, ("x", "y"))
-    else:
-        places = x[None]
-        values = scan(interface, places, field)
-        known = on_line(x, values)
+    numbers = {"x": np.arange(5.0, 12.0), "y": np.arange(2.0, 5.0)}
+    at = {
+        dim: (numbers[dim] + shift) * spacing
+        for dim, spacing in zip(interface.dims, interface.spacings, strict=True)
+    }
+    places = all_of(at)
+    values = scan(interface, places, field)
+    known = xr.DataArray(values.reshape([one.size for one in at.values()]), at, tuple(at))
     given = field.given(known, noise=20e3)
     z, error = (values - 1e6) / 0.2e6, np.full(values.size, 0.1)
-    grid = np.array(
-        [row.ravel() for row in np.meshgrid(*interface.coordinates.values(), indexing="ij")]
-    )
+    grid = all_of(interface.coordinates)
     across = correlation(field, interface, grid, places)
     inner = correlation(field, interface, places, places) + np.diag(error**2)
     weights = np.linalg.solve(inner, across.T).T
@@ -107,7 +104,7 @@ def test_conditional_probabilities_average_to_the_unconditional_one():
     """Law of total probability: over scans of simulated specimens."""
     problem = coarse()
     line, method, noise = problem.interface, st.LocalCriterion(), 30e3
-    field = dataclasses.replace(FIELD, spectrum=st.PowerLawSpectrum(20e-3))
+    field = beta_strength(20e-3)
     all_of_it = st.monte_carlo(problem, field, method=method, samples=4000, seed=0, pilot=False)
     stress = float(all_of_it.critical_stress.quantile(0.2))
     shares = []
@@ -125,9 +122,8 @@ def test_conditional_probabilities_average_to_the_unconditional_one():
 
 
 def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
-    residual = st.RandomField(
-        st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6), FIELD.spectrum
-    )
+    marginal = st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6)
+    residual = st.RandomField(marginal, FIELD.spectrum)
     known = on_line(LINE.x[10:30], scan(LINE, LINE.x[None, 10:30]))
     random = st.RandomInterface(
         strength=FIELD.given(known, noise=2e3),
@@ -150,9 +146,7 @@ def test_variance_of_the_peak_is_that_within_and_between(within):
     field = st.RandomField(
         marginal, st.PowerLawSpectrum(100.0 if within else 0.02), mean_mode=True
     )
-    random = st.RandomInterface(
-        strength=field, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
-    )
+    random = st.RandomInterface(strength=field, between={"strength": FACTOR})
     found = st.monte_carlo(
         problem, random, method=st.LocalCriterion(), samples=20_000, seed=0, pilot=False
     ).critical_stress
@@ -163,13 +157,11 @@ def test_variance_of_the_peak_is_that_within_and_between(within):
 
 def test_a_factor_changes_no_other_draw_and_is_constant_along_each_specimen():
     plain = st.RandomInterface(strength=FIELD)
-    random = st.RandomInterface(
-        strength=FIELD, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
-    )
+    random = st.RandomInterface(strength=FIELD, between={"strength": FACTOR})
     one, other = (r.profiles(LINE, samples=300, seed=4)["strength"] for r in (plain, random))
     factors = other / one
     assert np.ptp(factors, axis=1).max() < 1e-14
-    assert kstest(factors[:, 0], random.between["strength"].distribution.cdf).pvalue > 1e-3
+    assert kstest(factors[:, 0], FACTOR.distribution.cdf).pvalue > 1e-3
     assert random.dimension(LINE) == plain.dimension(LINE) + 1
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_column
@@ -190,18 +191,14 @@ def test_patches_on_the_circle():
 
 
 @pytest.fixture
-def wide(problem, solid):
+def wide():
     """Ten profiles of so wide a range that nodes are at the residual before the instability."""
-    slow = st.Problem(solid, problem.interface, st.LinearWeakening(weakening_rate=0.2e12))
-    strength = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.1e6, high=3.1e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=3e-3),
-    )
+    slow, strength = make_problem(weakening_rate=0.2e12), beta_strength(3e-3, 0.1e6, 3.1e6)
     return slow, strength.sample(slow.interface, samples=10, seed=4)
 
 
 @pytest.mark.slow
-def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide, solid):
+def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide):
     """A uniform initial stress is a load that is there already."""
     problem, tau_p = wide
     count = 0
@@ -227,30 +224,25 @@ def test_sensitivity_where_nodes_are_at_the_residual(wide):
         gradient = found.sensitivity.values[sample]
         # The first instability only: where it comes before an event, a shift keeps the order.
         for node in (int(gradient.argmax()), int(tau_p[sample].argmin())):
-            step = 1.0  # Pa: small against the kinks, large against round-off of 1e5 Pa
-            moved = np.repeat(tau_p[sample][None], 2, axis=0)
-            moved[0, node] -= step
-            moved[1, node] += step
-            below, above = st.onset(
-                problem, moved, method=st.Equilibrium()
-            ).first_instability.values
-            slope = (above - below) / (2.0 * step)
+            step = np.eye(256)[
+                node
+            ]  # 1 Pa: small against kinks, large against round-off of 1e5 Pa
+            moved = np.array([tau_p[sample] - step, tau_p[sample] + step])
+            onset = st.onset(problem, moved, method=st.Equilibrium())
+            slope = np.diff(onset.first_instability).item() / 2.0
             assert slope == pytest.approx(gradient[node], abs=1e-5)
             checked += 1
     assert checked >= 4
 
 
 @pytest.fixture
-def humped(solid):
+def humped():
     """A line whose law falls more steeply beyond half of its slip, and smooth strengths."""
     friction = st.PiecewiseWeakening(
         slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=8.6e10
     )
-    problem = st.Problem(solid, st.Interface(0.1, 96), friction)
-    field = st.RandomField(
-        marginal=st.Lognormal(mean=1e6, cv=0.25),
-        spectrum=st.PowerLawSpectrum(correlation_length=0.015),
-    )
+    problem = make_problem(96, friction=friction)
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.25), st.PowerLawSpectrum(0.015))
     return problem, field.sample(problem.interface, samples=8, seed=0)
 
 

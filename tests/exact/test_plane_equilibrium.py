@@ -4,42 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from setups import make_problem
 
 import stiction as st
 from stiction.equilibrium.patches import labelled_patches, patch_of
 
-RATE = 0.5e12
-FRICTION = st.LinearWeakening(weakening_rate=RATE)
-
 
 @pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 @pytest.mark.parametrize("mode", ["II", "III"])
-def test_strength_along_one_axis_equals_the_line(solid, mode):
+def test_strength_along_one_axis_equals_the_line(mode):
     nodes, across, length = 128, 8, 0.04
     load = {
         "initial_stress": np.linspace(0.0, 2e5, nodes),
         "profile": np.linspace(1.0, 1.2, nodes),
     }
-    line = st.Problem(
-        solid, st.Interface(length, nodes), FRICTION, load=st.Load(**load), mode=mode
-    )
+    line = make_problem(nodes, length, load=st.Load(**load), mode=mode)
     short = length / nodes * across
 
     def spread(profile):
         wide = np.repeat(profile[..., None], across, axis=-1)
         return wide if mode == "II" else np.swapaxes(wide, -1, -2)
 
-    shape = (
-        ((length, short), (nodes, across))
-        if mode == "II"
-        else ((short, length), (across, nodes))
-    )
-    plane = st.Problem(
-        solid,
-        st.Interface(*shape),
-        FRICTION,
-        load=st.Load(**{name: spread(profile) for name, profile in load.items()}),
-    )
+    turn = 1 if mode == "II" else -1
+    wide = st.Load(**{name: spread(profile) for name, profile in load.items()})
+    plane = make_problem((nodes, across)[::turn], (length, short)[::turn], load=wide)
     tau_p = st.paper.strength(line, correlation_ratio=1.0).sample(
         line.interface, samples=3, seed=1
     )
@@ -64,8 +52,8 @@ def test_strength_along_one_axis_equals_the_line(solid, mode):
     assert reach.max() <= 4.0 * length / nodes
 
 
-def test_uniform_strength_slides_at_it(solid):
-    plane = st.Problem(solid, st.Interface((0.02, 0.03), (64, 128)), FRICTION)
+def test_uniform_strength_slides_at_it():
+    plane = make_problem((64, 128), (0.02, 0.03))
     found = st.onset(plane, np.full((64, 128), 0.9e6), method=st.Equilibrium())
     assert found["critical_load"].item() == 0.9e6
     assert found["certificate_gap"].item() == 0.0
@@ -73,20 +61,18 @@ def test_uniform_strength_slides_at_it(solid):
     assert found["critical_patch_extent"].values[0] == pytest.approx((0.02, 0.03))
 
 
-def test_a_single_dip_is_where_the_onset_is(solid):
-    lengths, nodes = (0.03, 0.02), (128, 96)
-    plane = st.Problem(solid, st.Interface(lengths, nodes), FRICTION)
-    x, y = (plane.interface.coordinates[dim] for dim in "xy")
+def test_a_single_dip_is_where_the_onset_is():
+    lengths = (0.03, 0.02)
+    plane = make_problem((128, 96), lengths)
     centre = 0.029, 0.004  # near a border, so that the patch lies on both sides of it
-    off = [
-        (place - c + 0.5 * length) % length - 0.5 * length
-        for place, c, length in zip((x, y), centre, lengths, strict=True)
-    ]
-    strength = 1e6 - 3e5 * np.exp(-((off[0][:, None]) ** 2 + (off[1][None, :]) ** 2) / 4e-3**2)
+    x, y = (
+        (plane.interface.coordinates[dim] - c + 0.5 * length) % length - 0.5 * length
+        for dim, c, length in zip("xy", centre, lengths, strict=True)
+    )
+    strength = 1e6 - 3e5 * np.exp(-(x[:, None] ** 2 + y[None, :] ** 2) / 4e-3**2)
     found = st.onset(plane, strength, method=st.Equilibrium(slip=True))
-    assert found["critical_position"].values[0] == pytest.approx(
-        centre, abs=2e-5
-    )  # a tenth of a spacing
+    # A tenth of a spacing.
+    assert found["critical_position"].values[0] == pytest.approx(centre, abs=2e-5)
     assert found["slip_patches"].item() == 1
     slips = found["slip"].values[0] > 0.0
     whole = patch_of(slips, found["slip"].values[0], plane.interface.spacings)

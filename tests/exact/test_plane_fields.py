@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from setups import beta_strength
 
 import stiction as st
 
-BETA = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
 LINE = st.Interface(length=4.0, nodes=128)
 PLANE = st.Interface(length=(4.0, 4.0), nodes=(128, 128))
 SPECTRA = [
@@ -19,17 +19,20 @@ SPECTRA = [
 ]
 
 
+EACH = pytest.mark.parametrize(
+    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
+)
+
+
 def field_of(spectrum, **options):
-    return st.RandomField(marginal=BETA, spectrum=spectrum, **options)
+    return dataclasses.replace(beta_strength(1.0), spectrum=spectrum, **options)
 
 
 @pytest.mark.parametrize("shape", [(16, 10), (32, 32), (8, 48)])
 @pytest.mark.parametrize("mean_mode", [False, True])
 def test_field_is_the_sum_of_its_modes_on_any_grid(shape, mean_mode):
     """Waves that a grid does not resolve, and those of Nyquist, included."""
-    field = field_of(
-        st.PowerLawSpectrum(correlation_length=0.05), mean_mode=mean_mode, anisotropy=1.7
-    )
+    field = beta_strength(0.05, mean_mode=mean_mode, anisotropy=1.7)
     plane = st.Interface(length=(0.4, 0.3), nodes=shape)
     modes, draws = field.modes(plane), field.draws(plane, 2, seed=3)
     assert modes.highest == (20, 8)
@@ -48,7 +51,7 @@ def test_field_is_the_sum_of_its_modes_on_any_grid(shape, mean_mode):
 
 
 def test_every_wave_vector_in_the_ellipse_is_a_mode_once():
-    field = field_of(st.PowerLawSpectrum(correlation_length=0.05), anisotropy=1.7)
+    field = beta_strength(0.05, anisotropy=1.7)
     plane = st.Interface(length=(0.4, 0.3), nodes=(32, 32))
     modes = field.modes(plane)
     found = {tuple(pair) for pair in modes.numbers[:, 1:].T.tolist()}
@@ -63,9 +66,7 @@ def test_every_wave_vector_in_the_ellipse_is_a_mode_once():
     assert found == wanted
 
 
-@pytest.mark.parametrize(
-    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
-)
+@EACH
 def test_a_cut_has_the_correlation_of_the_line(spectrum):
     """Of z and of the strength, on the periodic grid, but for what truncation leaves out."""
     field = field_of(spectrum, mean_mode=True)
@@ -78,9 +79,7 @@ def test_a_cut_has_the_correlation_of_the_line(spectrum):
         np.testing.assert_allclose(plane, plane.T, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
-)
+@EACH
 def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     """g(kx) of the line is the integral over ky of the plane's: inverse Abel transform, checked."""
     wave = 2.0 * np.pi / 0.3
@@ -98,10 +97,9 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     cutoff = spectrum.cutoff(2)
     inside = quad(lambda k: k * spectrum.density(k, 2), 0.0, cutoff, limit=200)[0]
     whole = inside + quad(lambda k: k * spectrum.density(k, 2), cutoff, np.inf, limit=200)[0]
+    kept = spectrum.power_kept or spectrum.default_power
     assert inside / whole == pytest.approx(spectrum.power_within(cutoff, 2), rel=1e-6)
-    assert inside / whole == pytest.approx(
-        spectrum.power_kept or spectrum.default_power, rel=1e-6
-    )
+    assert inside / whole == pytest.approx(kept, rel=1e-6)
 
 
 def test_own_spectrum_is_the_density_on_the_plane():
@@ -118,7 +116,7 @@ def test_own_spectrum_is_the_density_on_the_plane():
 def test_sampled_correlation_is_the_exact_one():
     """Mean, variance and correlation of the strength, anisotropy included, without a mean mode."""
     plane = st.Interface(length=(1.0, 1.5), nodes=(32, 24))
-    field = field_of(st.PowerLawSpectrum(correlation_length=0.25), anisotropy=2.0)
+    field = beta_strength(0.25, anisotropy=2.0)
     samples = 1500
     strength = field.sample(plane, samples=samples, seed=1)
     scaled = (strength - field.mean) / field.standard_deviation
@@ -137,7 +135,7 @@ def test_sampled_correlation_is_the_exact_one():
 
 def test_sample_i_is_the_same_in_every_batch_and_finer_grids_extend_the_field():
     plane = st.Interface(length=(1.0, 1.5), nodes=(64, 64))
-    field = field_of(st.PowerLawSpectrum(correlation_length=0.25))
+    field = beta_strength(0.25)
     many = field.sample(plane, samples=300, seed=5)
     assert np.array_equal(field.sample(plane, samples=2, seed=5, first=255), many[255:257])
     assert not np.array_equal(field.sample(plane, seed=5, stream=1), many[:1])
@@ -151,12 +149,10 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
     """More modes, or an ellipse of others, extend the same field."""
     plane = st.Interface(length=(1.0, 2.2), nodes=(32, 32))
     fields = [
-        field_of(st.PowerLawSpectrum(correlation_length=0.25)),
-        field_of(st.PowerLawSpectrum(correlation_length=0.25, truncation=1.5)),
-        field_of(st.PowerLawSpectrum(correlation_length=0.25), anisotropy=2.5),
-        field_of(
-            st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.8), mean_mode=True
-        ),
+        beta_strength(0.25),
+        beta_strength(0.25, truncation=1.5),
+        beta_strength(0.25, anisotropy=2.5),
+        field_of(st.ExponentialSpectrum(0.3, power_kept=0.8), mean_mode=True),
     ]
     known = {}
     for field in fields:
@@ -171,7 +167,7 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
 def test_properties_are_correlated_mode_by_mode():
     """Spectra of different lengths: each has the draws of its own modes."""
     plane = st.Interface(length=(1.0, 1.0), nodes=(32, 32))
-    strength = field_of(st.PowerLawSpectrum(correlation_length=0.2))
+    strength = beta_strength(0.2)
     residual = st.RandomField(
         st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6),
         st.PowerLawSpectrum(correlation_length=0.3),
@@ -180,22 +176,21 @@ def test_properties_are_correlated_mode_by_mode():
     alone = st.RandomInterface(strength=strength, residual_strength=residual)
     tied = dataclasses.replace(alone, correlation={("strength", "residual_strength"): 1.0})
     first, second = (r.profiles(plane, samples=2, seed=3) for r in (alone, tied))
+    own, other = (field.sample(plane, samples=2, seed=3) for field in (strength, residual))
     np.testing.assert_array_equal(first["strength"], second["strength"])
-    np.testing.assert_array_equal(first["strength"], strength.sample(plane, samples=2, seed=3))
-    np.testing.assert_array_equal(
-        second["residual_strength"], residual.sample(plane, samples=2, seed=3)
-    )
+    np.testing.assert_array_equal(first["strength"], own)
+    np.testing.assert_array_equal(second["residual_strength"], other)
     assert not np.array_equal(first["residual_strength"], second["residual_strength"])
 
 
 def test_line_with_anisotropy_is_refused():
-    field = field_of(st.PowerLawSpectrum(correlation_length=0.3), anisotropy=2.0)
+    field = beta_strength(0.3, anisotropy=2.0)
     with pytest.raises(st.InputError, match=r"anisotropy: .*a line has no y; got 2"):
         field.sample(LINE)
 
 
 def test_a_plane_that_is_short_across_against_its_anisotropy_is_warned_of():
     """z falls to 1/e within 14 mm along y, 0.9 mm along x: the plane is 2.1 such lengths across."""
-    field = field_of(st.PowerLawSpectrum(1.6e-3), anisotropy=16.0)
+    field = beta_strength(1.6e-3, anisotropy=16.0)
     with pytest.warns(st.AccuracyWarning, match="only 2.1 e-folding lengths long"):
         field.sample(st.Interface(length=(0.04, 0.03), nodes=(128, 32)))

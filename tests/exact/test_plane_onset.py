@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from planes import WAVENUMBERS, Lattice
+from setups import RATE, make_problem
 
 import stiction as st
 from stiction.criterion.windows import ellipse_window
@@ -12,27 +13,19 @@ from stiction.elasticity.operator import make_operator, product
 from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.transforms import Plane, doubled, halved, plane_onset
 
-RATE = 0.5e12
-
 
 @pytest.mark.parametrize("mode", ["II", "III"])
 @pytest.mark.parametrize("across", [8, 12])
-def test_strength_along_one_axis_equals_the_line(solid, mode, across):
-    nodes = 128
-    problem = st.Problem(
-        solid, st.Interface(0.04, nodes), st.LinearWeakening(weakening_rate=RATE), mode=mode
-    )
+def test_strength_along_one_axis_equals_the_line(mode, across):
+    problem = make_problem(128, 0.04, mode=mode)
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     tau_p = strength.sample(problem.interface, samples=3, seed=1)
     line = st.onset(problem, tau_p, method=Equilibrium())["first_instability"].values
-    length = 0.04 / nodes * across
+    lengths = (0.04, 0.04 / 128 * across)
+    plane = Plane(lengths if mode == "II" else lengths[::-1], 1e9, 0.33)
     for profile, exact in zip(tau_p, line, strict=True):
-        if mode == "II":
-            plane = Plane((0.04, length), solid.shear_modulus, solid.poisson_ratio)
-            field = np.repeat(profile[:, None], across, axis=1)
-        else:
-            plane = Plane((length, 0.04), solid.shear_modulus, solid.poisson_ratio)
-            field = np.repeat(profile[None, :], across, axis=0)
+        field = np.repeat(profile[:, None], across, axis=1)
+        field = field if mode == "II" else np.ascontiguousarray(field.T)
         one = np.ones(field.shape)
         found = plane_onset(plane, field, one, RATE * one, gap=1e-10)
         assert found.lower == pytest.approx(exact, rel=1e-9)
@@ -110,8 +103,7 @@ def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
     # So wide a weak strip that the first node to slip is nearly unstable.
     wave = 1e6 + 1e5 * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)[:, None] * one
     # Views of any layout are taken.
-    found = plane_onset(
-        plane, np.asfortranarray(wave), np.broadcast_to(1.0, one.shape), RATE * one
-    )
+    view = np.broadcast_to(1.0, one.shape)
+    found = plane_onset(plane, np.asfortranarray(wave), view, RATE * one)
     assert found.closed
     assert 0.9e6 < found.lower < 1e6
