@@ -3,18 +3,12 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as hs
+from setups import beta_strength, make_problem
 
 import stiction as st
 
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(length=0.1, nodes=128),
-    st.LinearWeakening(weakening_rate=0.5e12),
-)
-STRENGTH = st.RandomField(
-    marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-    spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
-)
+PROBLEM = make_problem(128)
+STRENGTH = beta_strength(2e-3)
 
 
 def onset(tau_p):

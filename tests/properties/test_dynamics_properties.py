@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from setups import make_problem
 
 import stiction as st
 from stiction.dynamics.energies import radiated_energy
@@ -15,10 +16,7 @@ from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import Reason
 
 NODES = 128
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
-PROBLEM = st.Problem(
-    SOLID, st.Interface(length=0.05, nodes=NODES), st.LinearWeakening(weakening_rate=0.5e12)
-)
+PROBLEM = make_problem(NODES, 0.05, solid=st.paper.problem().solid)
 METHOD = Rupture(loading_rate=1e7)
 
 
@@ -28,6 +26,19 @@ def strength(seed, low=0.7e6, high=1.5e6):
     spread = np.exp(-0.5 * (np.arange(NODES // 2 + 1) / 12.0) ** 2)
     noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(NODES)) * spread, NODES)
     return low + (high - low) * (noise - noise.min()) / np.ptp(noise)
+
+
+def weak_spot():
+    """Twenty nodes between strong ones, which arrest what begins there."""
+    profile = np.full(NODES, 3e6)
+    profile[40:60] = 0.8e6
+    return profile
+
+
+def through_file(path, run, state):
+    """The state as it is read from a checkpoint."""
+    write_checkpoint(path, run, state)
+    return read_checkpoint(path, run, run.start(0.0))
 
 
 def fresh_run(profile, method=METHOD):
@@ -61,10 +72,8 @@ def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
 @given(seed=some.integers(0, 10_000), shift=some.integers(1, NODES - 1))
 def test_onset_moves_with_the_profile_and_mirrors_with_it(seed, shift):
     profile = strength(seed)
-    rows = PROBLEM.sample(
-        np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)])
-    )
-    found = METHOD.prepare(PROBLEM)(rows)
+    three = np.stack([profile, np.roll(profile, shift), np.roll(profile[::-1], 1)])
+    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(three))
     loads = found["critical_stress"]
     # Step sizes are chosen by thresholds, which round-off may tip: the accuracy of the method.
     assert loads[1:] == pytest.approx([loads[0]] * 2, rel=2e-5)
@@ -103,8 +112,7 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
     for cut in (1, 7, implicit - 1, implicit, implicit + 1, total - 20):
         run, state = fresh_run(profile)
         run.advance(state, cut)
-        write_checkpoint(path, run, state)
-        state = read_checkpoint(path, run, run.start(0.0))
+        state = through_file(path, run, state)
         run.advance(state, 100_000)
         assert same(state, straight), cut
 
@@ -113,24 +121,15 @@ def test_the_pass_over_the_memory_meets_whole_cache_lines(tmp_path):
     """A third slower where it does not; what allocates memory begins 16 bytes later."""
     run, state = fresh_run(strength(5), Rupture(loading_rate=1e7, implicit=False))
     run.advance(state, 1)
-    path = tmp_path / "state.npz"
-    write_checkpoint(path, run, state)
-    again = read_checkpoint(path, run, run.start(0.0))
-    for array in (
-        state.memory,
-        again.memory,
-        again.memory_sum,
-        run.tables.table,
-        run.tables.packed,
-    ):
+    again, tables = through_file(tmp_path / "state.npz", run, state), run.tables
+    arrays = state.memory, again.memory, again.memory_sum, tables.table, tables.packed
+    for array in arrays:
         assert array.ctypes.data % 64 == 0
 
 
 def test_restart_across_a_return_to_implicit_steps(tmp_path):
     """A weak spot that is arrested by a strong surrounding: explicit and back."""
-    profile = np.full(NODES, 3e6)
-    profile[40:60] = 0.8e6
-    run, straight = fresh_run(profile)
+    run, straight = fresh_run(weak_spot())
     count = 0
     while straight.now["arrested"] == 0 or straight.explicit:
         run.advance(straight, 5)
@@ -138,20 +137,17 @@ def test_restart_across_a_return_to_implicit_steps(tmp_path):
         assert count < 20_000
     run.advance(straight, 3)
     path = tmp_path / "state.npz"
-    run, state = fresh_run(profile)
+    run, state = fresh_run(weak_spot())
     for cut in (count // 3, count - count // 3 - 25, 25):
         run.advance(state, cut)
-        write_checkpoint(path, run, state)
-        state = read_checkpoint(path, run, run.start(0.0))
+        state = through_file(path, run, state)
     run.advance(state, 3)
     assert not straight.explicit
     assert same(state, straight)
 
 
 def test_radiated_energy_is_steady_after_arrest():
-    profile = np.full(NODES, 3e6)
-    profile[40:60] = 0.8e6
-    run, state = fresh_run(profile)
+    run, state = fresh_run(weak_spot())
     while state.now["arrested"] == 0:
         run.advance(state, 20)
     # Hold the load: from here on nothing slips, and what was radiated stays radiated.
@@ -173,9 +169,7 @@ def test_radiated_energy_is_steady_after_arrest():
 
 
 def test_arrested_event_is_counted_and_first_instability_below_the_critical_stress():
-    profile = np.full(NODES, 3e6)
-    profile[40:60] = 0.8e6
-    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(profile))
+    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(weak_spot()))
     assert found["arrested_events"][0] >= 1
     assert found["first_instability"][0] < 0.9 * found["critical_stress"][0]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
@@ -17,11 +18,7 @@ SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple
 
 @pytest.fixture
 def arguments(problem, make_strength):
-    return {
-        "problem": problem,
-        "random": make_strength(),
-        "method": st.LocalCriterion(),
-    }
+    return {"problem": problem, "random": make_strength(), "method": st.LocalCriterion()}
 
 
 @pytest.fixture
@@ -60,16 +57,8 @@ def test_executors_do_not_change_a_bit(arguments, reference, make):
 @settings(max_examples=25, deadline=None)
 @given(first=some.integers(0, 900), samples=some.integers(1, 400))
 def test_any_batch_is_a_part_of_the_whole(first, samples):
-    problem = st.Problem(
-        st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-        st.Interface(length=0.1, nodes=128),
-        st.LinearWeakening(weakening_rate=0.25e12),
-    )
-    strength = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        st.PowerLawSpectrum(correlation_length=3e-3),
-    )
-    experiment = Experiment(problem, strength, st.LocalCriterion())
+    problem = make_problem(128, weakening_rate=0.25e12)
+    experiment = Experiment(problem, beta_strength(3e-3), st.LocalCriterion())
     whole = experiment.results(3, 0, 1300)
     part = experiment.results(3, first, samples)
     for name, values in part.items():
@@ -102,25 +91,16 @@ def test_seeds_differ(arguments, reference):
 
 
 def test_what_else_is_random_is_independent_of_the_strength(arguments, make_strength):
-    initial = st.RandomField(
-        st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5),
-        st.PowerLawSpectrum(correlation_length=2e-3),
-    )
-    result = st.monte_carlo(
-        **arguments
-        | {"random": st.RandomInterface(strength=arguments["random"], initial_stress=initial)},
-        samples=300,
-        seed=5,
-        keep=("strength", "initial_stress"),
-    )
-    strength, stress = result["strength"].values, result["initial_stress"].values
+    marginal = st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5)
+    initial = st.RandomField(marginal, st.PowerLawSpectrum(2e-3))
+    random = st.RandomInterface(strength=arguments["random"], initial_stress=initial)
+    keep = ("strength", "initial_stress")
+    result = st.monte_carlo(**arguments | {"random": random}, samples=300, seed=5, keep=keep)
+    profiles = {name: result[name].values for name in keep}
+    strength, stress = profiles.values()
     # 300 samples of about 20 independent lengths each: correlations scatter by 1/sqrt(6000).
     assert abs(np.corrcoef(strength.ravel(), stress.ravel())[0, 1]) < 0.05
-    direct = st.onset(
-        arguments["problem"],
-        {"strength": strength, "initial_stress": stress},
-        method=st.LocalCriterion(),
-    )
+    direct = st.onset(arguments["problem"], profiles, method=st.LocalCriterion())
     np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
 
 
@@ -136,10 +116,7 @@ def test_what_is_kept_does_not_depend_on_the_samples_around_it(arguments):
 def test_progress_counts_every_sample_once(arguments):
     seen = []
     st.monte_carlo(
-        **arguments,
-        samples=SAMPLES,
-        workers=2,
-        progress=lambda done, total: seen.append((done, total)),
+        **arguments, samples=SAMPLES, workers=2, progress=lambda *now: seen.append(now)
     )
     assert seen[-1] == (SAMPLES, SAMPLES)
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})

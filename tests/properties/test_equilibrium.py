@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as hs
+from setups import make_problem
 
 import stiction as st
 from stiction.equilibrium.dense import LineProgram
@@ -12,7 +13,6 @@ from stiction.equilibrium.method import Equilibrium
 from stiction.equilibrium.path import equilibrium_path
 
 NODES = 96
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
 METHOD = Equilibrium(sensitivity=True, slip=True)
 
 
@@ -30,9 +30,7 @@ def problem_of(length, wave, varying):
     x = 2.0 * np.pi * np.arange(NODES) / NODES
     rate = 0.5e12 * (1.0 + 0.5 * np.cos(2 * x)) if varying else 0.5e12
     load = st.Load(profile=1.0 + wave * np.sin(x)) if wave else st.Load()
-    return st.Problem(
-        SOLID, st.Interface(length, NODES), st.LinearWeakening(weakening_rate=rate), load
-    )
+    return make_problem(NODES, length, load=load, weakening_rate=rate)
 
 
 problems = hs.builds(
@@ -83,9 +81,8 @@ def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
     # The strength is far above the residual one here: floors would make it neither.
     high = 50e6
     three = np.array([tau_p, other, weight * tau_p + (1.0 - weight) * other]) + high
-    first = solve(problem, three).first_instability.values - high * np.mean(
-        problem.load.profile
-    )
+    first = solve(problem, three).first_instability.values
+    first -= high * np.mean(problem.load.profile)
     if not np.ptp(problem.load.profile):
         # 1e-12 of 50 MPa is round-off.
         assert first[2] >= weight * first[0] + (1.0 - weight) * first[1] - 5e-5
@@ -113,13 +110,11 @@ def test_translation_and_reflection(problem, tau_p, shift):
 @settings(max_examples=20, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
 def test_a_constant_shifts_the_load(problem, tau_p, constant):
-    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_strength=constant)
-    shifted = st.Problem(SOLID, problem.interface, friction)
+    length = problem.interface.length
+    shifted = make_problem(NODES, length, residual_strength=constant)
+    stressed = make_problem(NODES, length, load=st.Load(initial_stress=-constant))
     one, two = solve(problem, tau_p), solve(shifted, tau_p + constant)
     np.testing.assert_allclose(two.critical_load, one.critical_load + constant, rtol=1e-10)
-    stressed = st.Problem(
-        SOLID, problem.interface, problem.friction, st.Load(initial_stress=-constant)
-    )
     three = solve(stressed, tau_p)
     np.testing.assert_allclose(three.critical_load, one.critical_load + constant, rtol=1e-10)
     np.testing.assert_allclose(three.critical_stress, one.critical_stress, rtol=1e-10)
@@ -144,12 +139,9 @@ def test_results_do_not_depend_on_the_batch():
     problem = problem_of(0.03, 0.0, False)
     tau_p = np.array([profile(seed, 1.0) for seed in range(24)])
     rates = 0.5e12 * np.where(np.arange(24) % 3 == 0, 1.0, rng.uniform(0.8, 1.2, 24))[:, None]
-    together = st.onset(problem, {"strength": tau_p, "weakening_rate": rates}, method=METHOD)
+    together = solve(problem, {"strength": tau_p, "weakening_rate": rates})
     for row in (0, 1, 5, 23):
-        alone = st.onset(
-            problem,
-            {"strength": tau_p[row], "weakening_rate": rates[row : row + 1]},
-            method=METHOD,
-        )
+        one = {"strength": tau_p[row], "weakening_rate": rates[row : row + 1]}
+        alone = solve(problem, one)
         for name in together.data_vars:
             np.testing.assert_array_equal(alone[name].values[0], together[name].values[row])

@@ -6,26 +6,22 @@ import warnings
 import numpy as np
 import pytest
 from importance import by_importance
+from setups import RATE, beta_strength, make_problem
 
 import stiction as st
 from stiction.criterion.windows import STRETCHES, middle_aspect, windows_of
 
-RATE = 0.5e12
 NUCLEATION = 2.0 * 0.5788869418506 * 1e9 / 0.67 / RATE
-BETA = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
 METHOD = st.LocalCriterion()
 
 
 @pytest.fixture(scope="module")
 def plane():
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-    interface = st.Interface(length=(5.0 * NUCLEATION, 4.0 * NUCLEATION), nodes=(48, 48))
-    return st.Problem(solid, interface, st.LinearWeakening(weakening_rate=RATE))
+    return make_problem((48, 48), (5.0 * NUCLEATION, 4.0 * NUCLEATION))
 
 
 def field_of(ratio=0.7, **options):
-    spectrum = st.PowerLawSpectrum(correlation_length=ratio * NUCLEATION)
-    return st.RandomField(marginal=BETA, spectrum=spectrum, **options)
+    return beta_strength(ratio * NUCLEATION, **options)
 
 
 def test_what_is_returned(plane):
@@ -39,10 +35,8 @@ def test_what_is_returned(plane):
     np.testing.assert_allclose(found.critical_load, averages.min(axis=(1, 2)), rtol=1e-13)
     aspects = middle_aspect(plane) * np.array(STRETCHES)
     assert np.isin(found.critical_aspect.values, aspects).all()
-    ratio = found.critical_patch_extent.sel(direction="x") / found.critical_patch_extent.sel(
-        direction="y"
-    )
-    np.testing.assert_allclose(ratio, found.critical_aspect, rtol=1e-12)
+    extents = found.critical_patch_extent.values
+    np.testing.assert_allclose(extents[:, 0] / extents[:, 1], found.critical_aspect, rtol=1e-12)
     each = [st.theory.nucleation_stress(plane, strength[0], aspect=a).min() for a in aspects]
     assert aspects[int(np.argmin(each))] == found.critical_aspect.values[0]
     # Of an ellipse of these extents, as far as whole nodes make one.
@@ -81,9 +75,8 @@ def test_translations_and_reflections_change_nothing(plane, change):
 
 def test_between_least_and_greatest_strength(plane):
     interface = plane.interface
-    strength = np.where(
-        np.random.default_rng(0).random((2, *interface.shape)) < 0.5, 0.7e6, 1.6e6
-    )
+    weak = np.random.default_rng(0).random((2, *interface.shape)) < 0.5
+    strength = np.where(weak, 0.7e6, 1.6e6)
     averages = st.theory.nucleation_stress(plane, strength)
     assert averages.min() >= 0.7e6
     assert averages.max() <= 1.6e6
