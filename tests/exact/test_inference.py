@@ -37,6 +37,10 @@ def with_friction(**options):
     return dataclasses.replace(PROBLEM, friction=st.LinearWeakening(**options))
 
 
+def with_load(**options):
+    return dataclasses.replace(PROBLEM, load=st.Load(**options))
+
+
 def model_of(prior, method=LOCAL, error=0.0, samples=400, **options):
     return make_model(
         prior,
@@ -51,16 +55,19 @@ def model_of(prior, method=LOCAL, error=0.0, samples=400, **options):
     )
 
 
-def onsets(prior, theta, method, samples=60):
+def onsets(prior, theta, method, samples=60, seed=3):
     return simulate(
         experiments_at(prior, np.atleast_2d(theta), method),
-        samples=samples, first=0, seed=3, variable="critical_stress", meter=SILENT,
+        samples=samples, first=0, seed=seed, variable="critical_stress", meter=SILENT,
     )  # fmt: skip
 
 
-PRESSED = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6))
-WAVE = 1.0 + 0.7 * np.cos(2.0 * np.pi * np.arange(256) / 256)
-UNEVEN = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=3e6 * WAVE))
+LOW, SMALL = {"marginal.low": (0.4e6, 0.9e6)}, {"marginal.low": (0.1, 0.3)}
+WAVE = np.cos(2.0 * np.pi * np.arange(256) / 256)
+PRESSED = with_load(normal_pressure=3e6)
+UNEVEN = with_load(normal_pressure=3e6 * (1.0 + 0.7 * WAVE))
+WITH_RESIDUAL = with_friction(weakening_rate=0.5e12, residual_strength=0.3e6)
+WEIBULL = with_marginal(scipy.stats.weibull_min(4.0, scale=1e6))
 COEFFICIENTS = st.RandomField(
     st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6),
     STRENGTH.spectrum,
@@ -68,7 +75,7 @@ COEFFICIENTS = st.RandomField(
 )
 
 SCALING = {
-    "bounds": (PROBLEM, STRENGTH, LOCAL, {"marginal.low": (0.4e6, 0.9e6)}, 1),
+    "bounds": (PROBLEM, STRENGTH, LOCAL, LOW, 1),
     "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
     "loc and scale": (
         PROBLEM,
@@ -77,21 +84,11 @@ SCALING = {
         {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)},
         2,
     ),
-    "residual strength, local": (
-        with_friction(weakening_rate=0.5e12, residual_strength=0.3e6),
-        STRENGTH,
-        LOCAL,
-        THREE,
-        2,
-    ),
+    "residual strength, local": (WITH_RESIDUAL, STRENGTH, LOCAL, THREE, 2),
     "uniform initial stress, local": (
-        dataclasses.replace(PROBLEM, load=st.Load(initial_stress=0.1e6)),
-        STRENGTH,
-        LOCAL,
-        THREE,
-        2,
+        with_load(initial_stress=0.1e6), STRENGTH, LOCAL, THREE, 2,
     ),
-    "coefficients": (PRESSED, COEFFICIENTS, LOCAL, {"marginal.low": (0.1, 0.3)}, 1),
+    "coefficients": (PRESSED, COEFFICIENTS, LOCAL, SMALL, 1),
     "coefficients under a pressure that varies": (
         UNEVEN,
         dataclasses.replace(COEFFICIENTS, marginal=scipy.stats.weibull_min(4.0, scale=0.5)),
@@ -101,12 +98,12 @@ SCALING = {
     ),
     "stretch by equilibrium": (
         with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
-        with_marginal(scipy.stats.weibull_min(4.0, scale=1e6)),
+        WEIBULL,
         EXACT,
         {"marginal.scale": (0.5e6, 2e6)},
         1,
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCALING)
@@ -128,43 +125,21 @@ def test_parameters_scale_every_onset(name):
 NOT_SCALING = {
     "critical slip": (with_friction(critical_slip=2e-6), STRENGTH, EXACT, THREE),
     "fracture energy": (with_friction(fracture_energy=1.0), STRENGTH, EXACT, THREE),
-    "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, {"marginal.low": (0.4e6, 0.9e6)}),
+    "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, LOW),
     "residual strength by equilibrium": (
-        with_friction(weakening_rate=0.5e12, residual_strength=0.3e6),
-        with_marginal(scipy.stats.weibull_min(4.0, scale=1e6)),
-        EXACT,
-        {"marginal.scale": (0.8e6, 2e6)},
+        WITH_RESIDUAL, WEIBULL, EXACT, {"marginal.scale": (0.8e6, 2e6)},
     ),
-    "load profile": (
-        dataclasses.replace(
-            PROBLEM,
-            load=st.Load(profile=1.0 + 0.3 * np.cos(2.0 * np.pi * np.arange(256) / 256)),
-        ),
-        STRENGTH,
-        LOCAL,
-        {"marginal.low": (0.4e6, 0.9e6)},
-    ),
-    "shift of coefficients under a pressure that varies": (
-        UNEVEN,
-        COEFFICIENTS,
-        LOCAL,
-        {"marginal.low": (0.1, 0.3)},
-    ),
+    "load profile": (with_load(profile=1.0 + 0.3 * WAVE), STRENGTH, LOCAL, LOW),
+    "shift of coefficients under a pressure that varies": (UNEVEN, COEFFICIENTS, LOCAL, SMALL),
     "gradient load": (
-        dataclasses.replace(PROBLEM, load=st.Load(profile=st.GradientLoad(amplitude=0.4))),
-        STRENGTH,
-        LOCAL,
-        {"marginal.low": (0.4e6, 0.9e6)},
+        with_load(profile=st.GradientLoad(amplitude=0.4)), STRENGTH, LOCAL, LOW,
     ),
     "normal pressure": (
-        PRESSED,
-        COEFFICIENTS,
-        LOCAL,
-        {"marginal.low": (0.1, 0.3), "problem.load.normal_pressure": (1e6, 2e6)},
+        PRESSED, COEFFICIENTS, LOCAL, SMALL | {"problem.load.normal_pressure": (1e6, 2e6)},
     ),
     "shape": (PROBLEM, STRENGTH, LOCAL, {"marginal.alpha": (1.0, 3.0)}),
     "rounded weights": (PROBLEM, STRENGTH, st.LocalCriterion(weights="rounded"), THREE),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NOT_SCALING)
@@ -187,18 +162,9 @@ def test_a_load_profile_really_breaks_the_scaling():
 def log_densities_at(samples, points, error=0.0, bound=-np.inf):
     found = tabulate(samples[None, :], np.array([bound]))
     out = np.empty((1, points.size))
-    one = np.ones(1)
-    log_likelihoods(
-        np.zeros((1, 1), dtype=np.int64),
-        one[:, None],
-        0.0 * one,
-        one,
-        error,
-        found,
-        points,
-        -np.inf,
-        out,
-    )
+    nodes, weights = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
+    shift, stretch = np.zeros(1), np.ones(1)
+    log_likelihoods(nodes, weights, shift, stretch, error, found, points, -np.inf, out)
     return out[0]
 
 
@@ -249,10 +215,7 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
     peaks = 1e6 * np.linspace(0.66, 0.78, 7)
     for place in u:
         theta = prior.theta(place[None, :])
-        direct = simulate(
-            experiments_at(prior, theta, LOCAL),
-            samples=2000, first=0, seed=0, variable="critical_stress", meter=SILENT,
-        )  # fmt: skip
+        direct = onsets(prior, theta, LOCAL, 2000, seed=0)
         exact = log_densities_at(direct[0], peaks, bound=theta[0, 1])
         found = model.log_densities(0, theta, peaks)[0]
         likely = exact > exact.max() - 3.0

@@ -18,6 +18,8 @@ from stiction.reliability.uncertainty import (
     lognormal_interval,
 )
 
+LOCAL = st.LocalCriterion()
+
 
 @pytest.fixture(scope="module")
 def system():
@@ -27,7 +29,7 @@ def system():
 
 @pytest.mark.parametrize(("stress", "expected"), [(0.66e6, 0.0), (0.1e6, 0.0), (1.66e6, 1.0)])
 def test_beyond_the_bounds_nothing_is_sampled(system, stress, expected):
-    result = st.failure_probability(*system, stress, method=st.LocalCriterion())
+    result = st.failure_probability(*system, stress, method=LOCAL)
     assert result.probability == expected
     assert result.interval == (expected, expected)
     assert result.cv == 0.0
@@ -52,12 +54,10 @@ def test_bounds_follow_load_and_initial_stress():
     problem = st.Problem(base.solid, base.interface, base.friction, load)
     field = st.paper.strength(base)
     # At x = 0: (0.66e6 - 0.12e6)/1.8 = 0.3e6, times 1.5, plus the mean initial stress 0.1e6.
-    below = st.failure_probability(problem, field, 0.5499e6, method=st.LocalCriterion())
+    below = st.failure_probability(problem, field, 0.5499e6, method=LOCAL)
     assert below.lower_bound == pytest.approx(0.55e6, rel=1e-12)
     assert below.probability == 0.0
-    onset = st.onset(
-        problem, field.sample(base.interface, samples=500), method=st.LocalCriterion()
-    )
+    onset = st.onset(problem, field.sample(base.interface, samples=500), method=LOCAL)
     assert float(onset["critical_stress"].min()) > below.lower_bound
 
 
@@ -67,10 +67,10 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     marginal = st.Beta(alpha=0.2, beta=0.2, low=0.66e6, high=1.66e6)
     field = st.RandomField(marginal, st.paper.strength(problem, 0.5).spectrum)
     profiles = field.sample(problem.interface, samples=200)
-    found = st.onset(problem, profiles, method=st.LocalCriterion())
+    found = st.onset(problem, profiles, method=LOCAL)
     # A mean over the interface of equal values is rounded; on some machines to below them.
     assert float(found["critical_stress"].min()) >= 0.66e6 * (1.0 - 1e-15)
-    state = st.external.limit_state(problem, field, st.LocalCriterion())
+    state = st.external.limit_state(problem, field, LOCAL)
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
 
@@ -134,12 +134,8 @@ class Uniform:
 )
 def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     repeats = 2000
-    counts = [
-        count_failures(
-            Uniform(i), 0, chance, target_cv=target_cv, least=least, max_evaluations=most
-        )
-        for i in range(repeats)
-    ]
+    options = {"target_cv": target_cv, "least": least, "max_evaluations": most}
+    counts = [count_failures(Uniform(i), 0, chance, **options) for i in range(repeats)]
     found = np.array([count.probability for count, _ in counts]) / chance
     # Three standard errors of two thousand runs: 2 %. Counting until the estimate looks precise
     # enough is 9 % high in the first case.
@@ -148,9 +144,8 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
     if most == 10**6:
         assert reported.max() <= target_cv
-    inside = [
-        low <= chance <= high for low, high in (count.interval(0.95) for count, _ in counts)
-    ]
+    ends = [count.interval(0.95) for count, _ in counts]
+    inside = [low <= chance <= high for low, high in ends]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
     assert all(count.samples <= values.size <= most for count, values in counts)
@@ -171,23 +166,13 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
     """Near P = 1e-2, where 'auto' takes now one algorithm and now another."""
     problem = st.paper.problem(nodes=136)
     field = st.paper.strength(problem, 0.5)
-    method = st.LocalCriterion()
-    onset = st.monte_carlo(problem, field, method=method, samples=1_000_000, seed=10**6)
+    onset = st.monte_carlo(problem, field, method=LOCAL, samples=1_000_000, seed=10**6)
     stress = float(np.quantile(onset["critical_stress"], 0.01))
-    found = np.array(
-        [
-            st.failure_probability(
-                problem,
-                field,
-                stress,
-                method=method,
-                algorithm=algorithm,
-                target_cv=0.3,
-                seed=i,
-            ).probability
-            for i in range(150)
-        ]
-    )
+    options = {"method": LOCAL, "algorithm": algorithm, "target_cv": 0.3}
+    runs = [
+        st.failure_probability(problem, field, stress, seed=i, **options) for i in range(150)
+    ]
+    found = np.array([run.probability for run in runs])
     # Two standard errors: about 5 % for the mean of 150 runs, 2 % for the reference.
     error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.02)
     assert abs(found.mean() / 0.01 - 1.0) < error

@@ -22,6 +22,15 @@ def linear(draws):
     return draws.sum(axis=1) / math.sqrt(DIMENSION)
 
 
+def unbiased(found, errors):
+    """Whether the mean of found/true is one, within so many standard errors."""
+    return abs(found.mean() - 1.0) < errors * found.std(ddof=1) / math.sqrt(found.size)
+
+
+def first(draws):
+    return draws[:, 0]
+
+
 across = []
 """Difference of two draws in the last level of each run, which failure does not depend on."""
 
@@ -40,9 +49,8 @@ def descents():
 @pytest.mark.parametrize("beta", [3.0, 4.0, 5.0])
 def test_subset_simulation_is_unbiased_and_knows_its_error(beta):
     found = np.array([run.probability(-beta) for run in descents()]) / norm.cdf(-beta)
-    error = found.std(ddof=1) / math.sqrt(RUNS)
     # Three standard errors of the mean of a hundred runs, 0.13 at beta = 5.
-    assert abs(found.mean() - 1.0) < 3.0 * error
+    assert unbiased(found, 3.0)
     observed = found.std(ddof=1) / found.mean()
     reported = math.sqrt(np.mean([run.relative_variance(-beta) for run in descents()]))
     # A hundred runs know their own spread to about 10 %; 30 % is three standard errors.
@@ -64,18 +72,16 @@ def test_levels_are_tenths_and_chains_move():
 
 def test_levels_chosen_from_the_samples_do_not_bias_the_estimate():
     """Four hundred small runs: ten seeds a level, where a biased rule adds a tenth each."""
-    found = [
-        descend(
-            lambda draws: draws[:, 0], 20, rng=generator(seed, 6), samples=100, threshold=-3.5
-        ).probability(-3.5)
+    runs = [
+        descend(first, 20, rng=generator(seed, 6), samples=100, threshold=-3.5)
         for seed in range(400)
     ]
-    found = np.array(found) / norm.cdf(-3.5)
+    found = np.array([run.probability(-3.5) for run in runs]) / norm.cdf(-3.5)
     error = found.std(ddof=1) / math.sqrt(found.size)
     # Four standard errors, about 0.23; with the threshold at the highest value that goes on, not
     # the lowest that does not, the mean is 1.34.
     assert error < 0.07
-    assert abs(found.mean() - 1.0) < 4.0 * error
+    assert unbiased(found, 4.0)
 
 
 def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
@@ -136,7 +142,7 @@ def test_runs_until_precise_are_unbiased(beta):
     found, reported = np.array([one(seed) for seed in range(REPEATS)]).T
     found /= norm.cdf(-beta)
     assert np.all(reported <= 0.2)
-    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(REPEATS)
+    assert unbiased(found, 3.0)
     observed = found.std(ddof=1) / found.mean()
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(observed, rel=0.3)
 
@@ -149,25 +155,15 @@ def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
     def cheap(draws):
         return likeness * draws[:, 0] + other * draws[:, 1]
 
-    def exact(draws):
-        return draws[:, 0]
-
+    options = {"samples": 300, "max_evaluations": 10**6, "threshold": -4.0}
     runs = [
-        bridge(
-            cheap,
-            exact,
-            50,
-            samples=300,
-            rng=generator(seed, 2),
-            max_evaluations=10**6,
-            threshold=-4.0,
-        )
+        bridge(cheap, first, 50, rng=generator(seed, 2), **options)
         for seed in range(4 * REPEATS)
     ]
     found = np.array([run.probability(-4.0) for run in runs]) / norm.cdf(-4.0)
     # Three standard errors of two hundred runs, some 0.06 and 0.14. Walks that start from what the
     # cheap limit state sees, and forget too little of it, are 0.25 low at a likeness of 0.9.
-    assert abs(found.mean() - 1.0) < 3.0 * found.std(ddof=1) / math.sqrt(4 * REPEATS)
+    assert unbiased(found, 3.0)
     # The median: a few runs with two or three failures report an error of several hundred per cent.
     reported = math.sqrt(np.median([run.relative_variance(-4.0) for run in runs]))
     assert reported == pytest.approx(found.std(ddof=1) / found.mean(), rel=0.35)
@@ -195,24 +191,11 @@ def test_a_poor_first_stage_is_told_by_its_ranks():
 def test_runs_over_two_levels_that_find_no_failure_count_as_well():
     """The exact limit state lets go of one in a thousand of what the cheap one does."""
 
-    def cheap(draws):
-        return draws[:, 0]
-
     def exact(draws):
         return np.where(draws[:, 1] < -3.0, draws[:, 0], draws[:, 0] + 10.0)
 
-    runs = [
-        bridge(
-            cheap,
-            exact,
-            10,
-            samples=100,
-            rng=generator(seed, 4),
-            max_evaluations=10**5,
-            threshold=-2.0,
-        )
-        for seed in range(600)
-    ]
+    options = {"samples": 100, "max_evaluations": 10**5, "threshold": -2.0}
+    runs = [bridge(first, exact, 10, rng=generator(seed, 4), **options) for seed in range(600)]
     found = np.array([run.probability(-2.0) for run in runs])
     truth = norm.cdf(-2.0) * norm.cdf(-3.0)
     assert all(run.complete for run in runs)
