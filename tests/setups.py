@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+import mpmath
 import numpy as np
 from scipy.optimize import linprog
 
@@ -75,3 +77,16 @@ def by_linear_programme(
     )
     assert found.status == 0
     return found.x[-1] * 1e6, found.x[:-1] * 1e6 / unit, -found.ineqlin.marginals
+
+
+def mode_two_stiffness(s: Any, eta: float) -> Any:
+    """D(s) of mode II over wavenumber and impedance; for mpmath, s in units of k c_s."""
+    shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
+    fast = mpmath.sqrt(s - 1j * eta) * mpmath.sqrt(s + 1j * eta) / eta
+    return ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
+
+
+def from_laplace(transform: Callable[[Any], Any], t: float, degree: int = 90) -> float:
+    """The inverse transform, to double precision."""
+    with mpmath.workdps(40):
+        return float(mpmath.invertlaplace(transform, t, method="talbot", degree=degree))

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+from setups import from_laplace, mode_two_stiffness
 
 from stiction import InputError
 from stiction.elasticity.exponential_sum import fit_exponentials, kernel_sum
@@ -63,13 +64,9 @@ def test_kernel_equals_high_precision_laplace_inversion(t):
     eta = ETAS["stress, nu = 0.33"]
 
     def transform(s):
-        shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
-        fast = mpmath.sqrt(s - 1j * eta) * mpmath.sqrt(s + 1j * eta) / eta
-        stiffness = ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
-        return (static_stiffness("II", eta) + s - stiffness) / s
+        return (static_stiffness("II", eta) + s - mode_two_stiffness(s, eta)) / s
 
-    with mpmath.workdps(40):
-        expected = float(mpmath.invertlaplace(transform, t, method="talbot", degree=80))
+    expected = from_laplace(transform, t, degree=80)
     assert abs(memory_kernel(t, "II", eta) - expected) < 1e-12
 
 

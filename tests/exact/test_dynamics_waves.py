@@ -4,12 +4,14 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.special import j0, j1
+from setups import from_laplace, mode_two_stiffness
 
 import stiction as st
 from stiction.dynamics.method import Rupture, make_run
 from stiction.elasticity.exponential_sum import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
 
+SOLID = st.paper.problem().solid
 ETA = np.sqrt(2.0 / 0.67)
 
 
@@ -51,13 +53,12 @@ def test_stress_inside_a_growing_crack_is_minus_the_drop(mode, speed, short):
 
 def released(steps, end, mode="II"):
     """Amplitude of a slip cos(kx) on an interface without friction law, at c_s k t = end."""
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
     interface = st.Interface(length=0.1, nodes=32)
     # Everything has slipped beyond d_c and slides on at the residual strength.
     friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
-    problem = st.Problem(solid, interface, friction, mode=mode)
+    problem = st.Problem(SOLID, interface, friction, mode=mode)
     k = interface.wavenumbers[2]
-    unit = 1.0 / (k * solid.shear_wave_speed)
+    unit = 1.0 / (k * SOLID.shear_wave_speed)
     method = Rupture(
         load=([0.0, 1.0], [2e6, 2e6]), stop="time", end_time=1.0, implicit=False,
         time_step=end * unit / steps,
@@ -73,15 +74,11 @@ def release_by_laplace(t, mode="II"):
     """a/a_0 = inverse transform of (1 - D0/D)/s."""
 
     def transform(s):
-        shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
         if mode == "III":
-            return (1 - 1 / shear) / s
-        fast = mpmath.sqrt(s - 1j * ETA) * mpmath.sqrt(s + 1j * ETA) / ETA
-        stiffness = ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
-        return (1 - static_stiffness("II", ETA) / stiffness) / s
+            return (1 - 1 / (mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j))) / s
+        return (1 - static_stiffness("II", ETA) / mode_two_stiffness(s, ETA)) / s
 
-    with mpmath.workdps(40):
-        return float(mpmath.invertlaplace(transform, t, method="talbot", degree=90))
+    return from_laplace(transform, t)
 
 
 @pytest.mark.parametrize("mode", ["II", "III"])
@@ -96,8 +93,7 @@ def test_released_wave_converges_to_the_laplace_solution_with_second_order(mode)
 
 def test_a_free_interface_rings_on_as_the_rayleigh_wave_alone():
     """Late, only the pole at s = i c_R/c_s is left: a = 2 Re(residue exp(s t)), undamped."""
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
-    pole = 1j * solid.rayleigh_wave_speed / solid.shear_wave_speed
+    pole = 1j * SOLID.rayleigh_wave_speed / SOLID.shear_wave_speed
     h = 1e-5
     slope = (symbol(pole + h, "II", ETA) - symbol(pole - h, "II", ETA)) / (2.0 * h)
     residue = -static_stiffness("II", ETA) / (pole * slope)

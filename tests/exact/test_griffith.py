@@ -8,6 +8,10 @@ import pytest
 import stiction as st
 
 PROBLEM = st.paper.problem(nodes=1024)
+EDGE = {
+    "friction": st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
+    "load": st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+}
 LENGTH = PROBLEM.interface.length
 
 
@@ -36,11 +40,7 @@ def test_a_short_crack_under_a_sloping_drop():
 
 
 def test_lengths_of_start_and_arrest():
-    problem = dataclasses.replace(
-        PROBLEM,
-        friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
-        load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
-    )
+    problem = dataclasses.replace(PROBLEM, **EDGE)
     options = {"centre": 0.5 * LENGTH}
     start = st.theory.griffith_length(problem, 0.35e6, 0.3, **options)
     stop = st.theory.griffith_length(problem, 0.35e6, 0.3, arrest=True, **options)
@@ -110,11 +110,7 @@ def test_mistakes(call, key):
 
 def test_arrested_patches_are_as_long_as_griffith_says():
     """Events by equilibrium under an edge load, against G = <Gamma>: to a third in the median."""
-    problem = dataclasses.replace(
-        st.paper.problem(nodes=512),
-        friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
-        load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
-    )
+    problem = dataclasses.replace(st.paper.problem(nodes=512), **EDGE)
     tau_p = st.paper.strength(problem, 0.5).sample(problem.interface, samples=6, seed=0)
     found = st.onset(problem, tau_p, method=st.Equilibrium(events=6), progress=False)
     energy = float(np.mean((tau_p - 0.4e6) ** 2)) / 1e12

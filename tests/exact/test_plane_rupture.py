@@ -6,6 +6,7 @@ import functools
 import mpmath
 import numpy as np
 import pytest
+from setups import from_laplace, mode_two_stiffness
 
 import stiction as st
 from stiction.dynamics.medium import amplification
@@ -27,9 +28,8 @@ LENGTH, NODES = 0.024, 64
 @pytest.mark.parametrize("mode", ["II", "III"])
 def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
     line = st.Problem(SOLID, st.Interface(length=LENGTH, nodes=NODES), FRICTION, mode=mode)
-    shape, lengths = (NODES, 8), (LENGTH, LENGTH / 8)
-    if mode == "III":
-        shape, lengths = shape[::-1], lengths[::-1]
+    turn = 1 if mode == "II" else -1
+    shape, lengths = (NODES, 8)[::turn], (LENGTH, LENGTH / 8)[::turn]
     plane = st.Problem(SOLID, st.Interface(length=lengths, nodes=shape), FRICTION)
     x = line.interface.x
     tau_p = 1e6 - 2e5 * np.exp(-(((x - 0.008) / 0.0025) ** 2)) + 3e4 * np.cos(2900.0 * x)
@@ -69,7 +69,8 @@ def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
     kx, ky = np.broadcast_arrays(*plane.wave_vectors)
     times = np.concatenate([[0.0], np.geomspace(1e-3, 1e5, 200)])
     for q in (1, 7, 20, 33, 50):
-        share = kx.ravel()[q] ** 2 / (kx.ravel()[q] ** 2 + ky.ravel()[q] ** 2)
+        k = float(np.hypot(kx.ravel()[q], ky.ravel()[q]))
+        share = kx.ravel()[q] ** 2 / k**2
         slot = grid.entry[q]
         assert grid.mode_two[slot] == pytest.approx(share, abs=1e-14)
         parts = np.where(np.arange(grid.poles.size) < grid.split, share, 1.0 - share)
@@ -78,7 +79,6 @@ def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
         exact = share * memory_kernel(times, "II", eta)
         exact += (1.0 - share) * memory_kernel(times, "III", eta)
         assert np.abs(found - exact).max() < 1.5e-6  # 1e-6 is asked for of each
-        k = float(np.hypot(kx.ravel()[q], ky.ravel()[q]))
         static = share * static_stiffness("II", eta) + 1.0 - share
         assert grid.stiffness[0, q] == pytest.approx(0.5e9 * k * static, rel=1e-12)
         assert grid.frequency[slot] == pytest.approx(k * solid.shear_wave_speed, rel=1e-12)
@@ -109,13 +109,10 @@ def step_response(share, time):
     eta = SOLID.wave_speed_ratio
 
     def transform(s):
-        shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
-        fast = mpmath.sqrt(s - 1j * eta) * mpmath.sqrt(s + 1j * eta) / eta
-        in_plane = ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
-        return 1 / (s * (share * in_plane + (1 - share) * shear))
+        across = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
+        return 1 / (s * (share * mode_two_stiffness(s, eta) + (1 - share) * across))
 
-    with mpmath.workdps(40):
-        return float(mpmath.invertlaplace(transform, time, method="talbot", degree=90))
+    return from_laplace(transform, time)
 
 
 def point_load(steps, end, plane, load):

@@ -25,10 +25,9 @@ def test_a_property_keeps_its_draws_whatever_else_is_random(problem, make_streng
         correlation={("residual_strength", "initial_stress"): 0.5},
     )  # fmt: skip
     where = problem.interface
-    first = alone.profiles(where, samples=5, seed=3)["strength"]
+    one, two, three = (r.profiles(where, samples=5, seed=3) for r in (alone, both, third))
+    first = one["strength"]
     assert np.array_equal(first, strength.sample(where, samples=5, seed=3))
-    two = both.profiles(where, samples=5, seed=3)
-    three = third.profiles(where, samples=5, seed=3)
     assert np.array_equal(first, two["strength"])
     assert np.array_equal(first, three["strength"])
     assert np.array_equal(two["residual_strength"], three["residual_strength"])
@@ -92,12 +91,11 @@ def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
     """W follows from tau_p - tau_r and Gamma or d_c, node by node."""
     problem = st.paper.problem(nodes=512)
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
-    drop = tau_p
     energy, slip = 0.8, 1.9e-6
     by_energy = problem.sample({"strength": tau_p, "fracture_energy": energy})
-    assert np.allclose(by_energy.weakening_rate, drop**2 / (2.0 * energy), rtol=1e-15)
+    assert np.allclose(by_energy.weakening_rate, tau_p**2 / (2.0 * energy), rtol=1e-15)
     by_slip = problem.sample({"strength": tau_p, "critical_slip": slip})
-    assert np.allclose(by_slip.weakening_rate, drop / slip, rtol=1e-15)
+    assert np.allclose(by_slip.weakening_rate, tau_p / slip, rtol=1e-15)
 
 
 def test_contradicting_correlations_are_refused(make_strength, residual):

@@ -28,9 +28,8 @@ def test_periodic_variance_is_that_of_the_grid(problem, make_strength):
     """The covariance matrix of the nodes, averaged by the weights of nucleation_stress itself."""
     strength = make_strength(0.5)
     c = strength.correlation(problem.interface)
-    weights = (
-        st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - 1e6
-    )  # of every node
+    # Of every node.
+    weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - 1e6
     matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
     found = nucleation_statistics(problem, strength)
     # 1e6 + 1 keeps ten digits of the one.
@@ -60,9 +59,8 @@ def test_a_uniform_field_is_averaged_to_itself(problem, make_strength):
         spectrum=st.PowerLawSpectrum(correlation_length=xi, truncation=1e4),
         mean_mode=True,
     )
-    assert nucleation_statistics(problem, uniform).variance_ratio == pytest.approx(
-        1.0, abs=1e-6
-    )
+    found = nucleation_statistics(problem, uniform)
+    assert found.variance_ratio == pytest.approx(1.0, abs=1e-6)
 
 
 def test_friction_coefficients_are_taken_times_the_pressure(problem, make_strength):

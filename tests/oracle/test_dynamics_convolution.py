@@ -1,6 +1,7 @@
 """Memory by exponentials against the full history: the same steps by direct convolution."""
 
 import numpy as np
+from setups import make_problem
 
 import stiction as st
 from stiction.dynamics.method import Rupture, make_run
@@ -45,10 +46,8 @@ def direct_convolution(run, start, steps):
 
 
 def test_slip_through_a_rupture_equals_that_of_the_full_history():
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
-    interface = st.Interface(length=0.05, nodes=128)
-    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=0.5e12))
-    x = interface.x
+    problem = make_problem(128, 0.05, solid=st.paper.problem().solid)
+    x = problem.interface.x
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
     method = Rupture(loading_rate=3e9, implicit=False, stop="time", end_time=1.0)
     medium, rows = method.medium(problem), problem.sample(strength)

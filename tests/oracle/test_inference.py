@@ -61,19 +61,19 @@ CASES = {
 }  # fmt: skip
 
 
+def simulate(base, field, method, samples, seed):
+    """Critical stresses."""
+    found = st.monte_carlo(
+        base, field, method=method, samples=samples, seed=seed, progress=False, pilot=False
+    )
+    return found.critical_stress.values
+
+
 def by_counting(base, field, method, values, peaks, samples):
     """Mean and deviation of the posterior at some values of a flat prior, peaks by simulation."""
     found = np.empty(values.size)
     for i, value in enumerate(values):
-        simulated = st.monte_carlo(
-            base,
-            field(value),
-            method=method,
-            samples=samples,
-            seed=99,
-            progress=False,
-            pilot=False,
-        ).critical_stress.values
+        simulated = simulate(base, field(value), method, samples, 99)
         kernels = scipy.stats.gaussian_kde(simulated, "silverman")
         found[i] = kernels.logpdf(peaks).sum()
     fine = np.linspace(values[0], values[-1], 2001)
@@ -95,9 +95,7 @@ def by_counting(base, field, method, values, peaks, samples):
 )
 def test_posterior_of_one_parameter(name):
     base, field, method, key, prior, truth, count = CASES[name]
-    peaks = st.monte_carlo(
-        base, field(truth), method=method, samples=count, seed=4, progress=False, pilot=False
-    ).critical_stress.values
+    peaks = simulate(base, field(truth), method, count, 4)
     samples = 1500 if method is LOCAL else 150
     found = st.infer(
         base, field(prior[0]), peaks, prior={key: prior}, method=method, samples=samples,
@@ -124,15 +122,13 @@ def test_designs_of_one_parameter():
     prior = {"marginal.loc": (0.5e6, 0.7e6)}
     marginal = scipy.stats.lognorm(0.3, loc=0.6e6, scale=0.5e6)
     field = dataclasses.replace(beta(0.6e6, 1.6e6), marginal=marginal)
-    onsets = st.monte_carlo(
-        base, field, method=LOCAL, samples=1000, seed=5, progress=False, pilot=False
-    )
-    kernels = scipy.stats.gaussian_kde(onsets.critical_stress.values - 0.6e6, "silverman")
+    onsets = simulate(base, field, LOCAL, 1000, 5)
+    kernels = scipy.stats.gaussian_kde(onsets - 0.6e6, "silverman")
     steps = 0.5e6 + 0.2e6 * (np.arange(200) + 0.5) / 200
     rng = np.random.default_rng(0)
     gains, spreads = [], []
     for _ in range(100):
-        peaks = rng.choice(onsets.critical_stress.values, 5) + rng.uniform(-1e5, 1e5)
+        peaks = rng.choice(onsets, 5) + rng.uniform(-1e5, 1e5)
         log = kernels.logpdf((peaks[:, None] - steps).ravel()).reshape(5, -1).sum(axis=0)
         mass = np.exp(log - log.max())
         mass /= mass.sum()
@@ -150,11 +146,10 @@ def test_designs_of_one_parameter():
 def test_a_posterior_by_a_criterion_that_does_not_hold_says_so():
     """Lognormal strength of cv 0.9 reaches its residual strength long before the onset."""
     base, random = problem(64, 0.25), lognormal(0.9)
-    given = {"method": LOCAL, "progress": False}
-    peaks = st.monte_carlo(base, random, samples=40, seed=3, pilot=False, **given)
+    peaks = simulate(base, random, LOCAL, 40, 3)
     prior = {"marginal.cv": (0.3, 1.5)}
     with pytest.warns(st.AccuracyWarning, match="differs from the exact onset"):
         found = st.infer(
-            base, random, peaks.critical_stress.values, prior=prior, samples=300, **given
+            base, random, peaks, prior=prior, method=LOCAL, samples=300, progress=False
         )
     assert any("Equilibrium" in note for note in found.notes)

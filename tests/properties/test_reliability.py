@@ -33,9 +33,8 @@ def test_the_same_seed_gives_the_same_numbers_for_any_workers(system, algorithm,
     assert one.probability == three.probability
     assert one.cv == three.cv
     assert one.evaluations == three.evaluations
-    np.testing.assert_array_equal(
-        one.failing_profiles["strength"], three.failing_profiles["strength"]
-    )
+    failing, again = (run.failing_profiles["strength"] for run in (one, three))
+    np.testing.assert_array_equal(failing, again)
     assert one.probability != other.probability
 
 
@@ -106,12 +105,10 @@ def test_curve_and_design_stress_agree_and_are_monotone(system):
     options = {"smallest": 1e-5, "points_per_decade": 2, "target_cv": 0.3}
     curve = st.failure_curve(*system, method=LOCAL, **options)
     stress, chance = curve["stress"].values, curve["probability"].values
-    assert np.all(np.diff(stress) < 0.0)
-    assert np.all(np.diff(chance) < 0.0)
-    assert np.all(curve["probability_low"] <= chance)
-    assert np.all(curve["probability_high"] >= chance)
-    assert np.all(curve["stress_low"] <= stress)
-    assert np.all(curve["stress_high"] >= stress)
+    for name, values in (("stress", stress), ("probability", chance)):
+        assert np.all(np.diff(values) < 0.0)
+        assert np.all(curve[f"{name}_low"] <= values)
+        assert np.all(curve[f"{name}_high"] >= values)
     assert chance[-1] == pytest.approx(1e-5, rel=0.05)
     np.testing.assert_allclose(curve["stress_above_bound"], stress - 0.66e6)
     design = st.design_stress(

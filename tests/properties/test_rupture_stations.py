@@ -51,12 +51,8 @@ def test_stations_show_the_fields_at_their_nodes(case):
             assert np.array_equal(run[own].sel(station=name), at_node), own
         assert run[own].attrs["units"] == run[field].attrs["units"]
     far = [float(run[f"station_{dim}"][1]) for dim in problem.interface.dims]
-    expected = [
-        at[i]
-        for at, i in zip(
-            problem.interface.coordinates.values(), np.atleast_1d(nodes[1]), strict=True
-        )
-    ]
+    axes = problem.interface.coordinates.values()
+    expected = [at[i] for at, i in zip(axes, np.atleast_1d(nodes[1]), strict=True)]
     assert far == pytest.approx(expected)
 
 
