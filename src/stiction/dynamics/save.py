@@ -54,7 +54,7 @@ SCALARS = _over(
     work=("J/m", "work of the load on the slip"),
     strain_energy=("J/m", "static strain energy of the slip"),
     fracture_energy=("J/m", "energy dissipated above the residual"),
-    radiated_energy=("J/m", "work less friction less strain energy"),
+    radiated_energy=("J/m", "work minus dissipated and strain energy"),
 )
 STEPS = _over(  # in the order of RECORD
     "step",

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ()),
-    "arrival_time": Variable("s", "when the front arrived, see `Rupture.arrival`", ()),
+    "arrival_time": Variable("s", "arrival time of the front, see `Rupture.arrival`", ()),
     "front_speed": Variable("m/s", "apparent speed of the rupture front", ()),
 }
 

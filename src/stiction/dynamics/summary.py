@@ -15,10 +15,10 @@ from stiction.problem import Problem
 from stiction.results import Variable, position
 
 _SCALARS: dict[str, Variable] = {
-    "applied_load": Variable("Pa", "load factor applied when the mean stress was largest"),
-    "onset_time": Variable("s", "time from zero load when the mean stress was largest"),
-    "kinetic_stress": Variable("Pa", "mean stress when all that can break had broken"),
-    "stress_drop": Variable("Pa", "critical stress less kinetic stress"),
+    "applied_load": Variable("Pa", "load factor applied at the largest mean stress"),
+    "onset_time": Variable("s", "time from zero load to the largest mean stress"),
+    "kinetic_stress": Variable("Pa", "mean stress when every node that can break has broken"),
+    "stress_drop": Variable("Pa", "critical stress minus kinetic stress"),
     "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
     "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),

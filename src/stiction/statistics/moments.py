@@ -118,7 +118,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     varying = {
         "load.profile: varies along the interface": np.ptp(load) > 0.0,
         "load.initial_stress: varies along the interface": np.ptp(initial) > 0.0,
-        "load.normal_pressure: varies and strength is in coefficients": (
+        "load.normal_pressure: varies, and strength is in coefficients": (
             pressure is not None and np.ptp(pressure) > 0.0
         ),
         "strength: is conditioned on measured values": strength.conditions is not None,
