@@ -143,6 +143,20 @@ class LimitState:
         slack = 1e-3 * (high - float(np.min(least))) if rounded else 0.0
         return initial + lowest_load * mean, high + slack
 
+    def slip_chance(self, stress: float) -> float:
+        """Return an upper bound of the probability that anything slips at a stress, Pa.
+
+        The number of nodes times the probability that the strength of a node is lower, where the
+        load and the law of the strength are the same at all nodes; else one.
+        """
+        problem, random = self.experiment.problem, self.experiment.random
+        field, load = random.strength, problem.load
+        alike = np.ptp(problem.load_profile) == 0.0 and not np.any(load.initial_stress)
+        known = field.of is None and field.conditions is None and not random.between
+        if not (alike and known) or self.per_pressure or "initial_stress" in random.names:
+            return 1.0
+        return problem.interface.size * float(field.marginal.distribution.cdf(stress))
+
 
 def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
     """Return why the local criterion does not hold, or None if it does."""

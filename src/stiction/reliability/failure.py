@@ -35,6 +35,8 @@ PILOT = 1_000
 """Plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """From here on plain sampling needs no more evaluations than subset simulation."""
+NEGLIGIBLE = 1e-15
+"""Probability that anything slips below which no sample is drawn."""
 DOUBTFUL = 1e-2
 """Share of the mean strength below which a stress is probably in another unit."""
 SHOWN = 20
@@ -143,23 +145,26 @@ def failure_probability(
             UnitWarning,
         )
     with state.meter:
-        if low < stress < high:
+        if low < stress < high and state.slip_chance(stress) > NEGLIGIBLE:
             slow = too_slow(experiment, max_evaluations)
             found = _sampled(state, stress, algorithm, slow, target_cv, budget, confidence)
         else:
-            found = _certain(stress, low, high)
+            found = _certain(state, stress)
     return FailureProbability.of(state, stress=stress, confidence=confidence, **found)
 
 
-def _certain(stress: float, low: float, high: float) -> dict[str, Any]:
+def _certain(state: LimitState, stress: float) -> dict[str, Any]:
     """Return the attributes of an answer where no sample is needed."""
-    chance, reason = 0.0, f"no interface slides at or below {low:g} Pa"
+    (low, high), chance, most = state.bounds, 0.0, 0.0
     if stress >= high:
-        chance, reason = (
-            1.0,
-            f"no interface carries more than the greatest strength, {high:g} Pa",
-        )
-    found = {"probability": chance, "interval": (chance, chance), "cv": 0.0, "evaluations": 0}
+        chance = most = 1.0
+        reason = f"no interface carries more than the greatest strength, {high:g} Pa"
+    elif stress <= low:
+        reason = f"no interface slides at or below {low:g} Pa"
+    else:
+        most = state.slip_chance(stress)
+        reason = f"a node is weaker than that with a probability below {most:.1g}"
+    found = {"probability": chance, "interval": (chance, most), "cv": 0.0, "evaluations": 0}
     return found | {"algorithm": "exact", "reason": reason}
 
 
