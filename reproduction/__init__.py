@@ -1,4 +1,1 @@
-"""Albertini, Karrer, Grigoriu and Kammer (2020), recomputed: studies, claims, figures and a page.
-
-Plain scripts on public names of `stiction`; copy a study from here for a problem of your own.
-"""
+"""The study of Albertini et al. (2020), recomputed with public names of `stiction` only."""

@@ -24,7 +24,6 @@ class Reading:
     text: str
     length: float
     excess: tuple[Number, ...]
-    error: tuple[Number, ...]
     misplaced: tuple[Number, ...]
     patches: Number
     counts: float
@@ -57,10 +56,6 @@ def compare(data: Data) -> list[Reading]:
                 text=text,
                 length=float(study["length"]),
                 excess=tuple(mean(row["excess"].values) * 100.0 for row in rows),
-                error=tuple(
-                    Number(100.0 * float(np.sqrt(np.mean(row["excess"].values ** 2))))
-                    for row in rows
-                ),
                 misplaced=tuple(wrong),
                 patches=mean(count),
                 counts=float(binom.pmf(6, 20, short) * binom.pmf(2, 40, long)),

@@ -18,13 +18,6 @@ from reproduction.modulus import compare
 from reproduction.rules import Verdict
 
 TEXTS = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
-_SYMBOLS = {
-    "xi": "ξ",
-    "tau": "τ",
-    "nu": "\N{GREEK SMALL LETTER NU}",
-    "delta": "δ",
-    "lambda": "λ",
-}
 _NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
 
 
@@ -36,10 +29,11 @@ def physics(text: str) -> Markup:
 
     def symbol(match: re.Match) -> str:
         name, index = match.groups()
-        return f"<i>{_SYMBOLS.get(name, name)}</i><sub>{index}</sub>"
+        letter = f"&{name};" if len(name) > 1 else name  # Greek letters have HTML's names
+        return f"<i>{letter}</i><sub>{index}</sub>"
 
     plain = _NAME.sub(symbol, plain)
-    plain = re.sub(r"\b(nu|lambda)\b", lambda m: f"<i>{_SYMBOLS[m.group()]}</i>", plain)
+    plain = re.sub(r"\b(nu|lambda)\b", r"<i>&\1;</i>", plain)
     return Markup(plain.replace(" +- ", " ± "))
 
 

@@ -39,16 +39,7 @@ FULL = Size(samples=10_000, ruptures=20, readings=2000, trend=10_000, what_if=40
 
 
 class Runner:
-    """Runs studies into a folder.
-
-    Parameters
-    ----------
-    out : Path
-    size : Size
-    seed : int
-    workers : int
-        Threads.
-    """
+    """Runs studies of a size into a folder, on so many threads."""
 
     def __init__(self, out: Path, size: Size, seed: int, workers: int) -> None:
         self.folder = out / "studies"
@@ -119,10 +110,7 @@ class Runner:
 def kept(**inputs):
     """Make a function of a runner a study: its result is kept with a digest of inputs and source.
 
-    Parameters
-    ----------
-    **inputs : function of a Size
-        Further arguments of the function.
+    `inputs` are functions of a `Size` for its further arguments.
     """
 
     def decorate(function):

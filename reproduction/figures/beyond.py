@@ -7,22 +7,8 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.claims import Data
-from reproduction.figures.style import (
-    COLOURS,
-    GREY,
-    INK,
-    OVER_MEAN,
-    RED,
-    TAU_CR,
-    XI,
-    dots,
-    letters,
-    line,
-    new,
-    numbers,
-    plain_ticks,
-    ratio_axis,
-)
+from reproduction.figures import common
+from reproduction.figures.common import COLOURS, GREY, INK, OVER_MEAN, RED, TAU_CR, XI
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import trend
@@ -32,7 +18,7 @@ from reproduction.studies import DRIVING, LEVELS, RATES
 
 def figure_8(d: Data):
     """Draw the local criterion and the bound that is strict on the grid against the exact onset."""
-    figure = new(5.6)
+    figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1)
     for ratio in RATIOS:
         exact = d.at("exact", "first_instability", ratio)
@@ -41,7 +27,7 @@ def figure_8(d: Data):
         for axes, values in ((top, bound), (bottom, local)):
             ordered = np.sort(values)
             above = 1.0 - np.arange(ordered.size) / ordered.size
-            axes.plot(ordered, above, **line(ratio), label=f"{ratio:g}")
+            axes.plot(ordered, above, **common.line(ratio), label=f"{ratio:g}")
     for axes, text in (
         (top, "the bound, by the grid's eigenvector, above the exact onset (%)"),
         (bottom, "the local criterion above the exact onset (%)"),
@@ -50,13 +36,13 @@ def figure_8(d: Data):
         axes.set(xlim=(-0.1, 2.0), yscale="log", ylim=(1e-3, 1.3), xlabel=text,
                  ylabel="share of samples above")  # fmt: skip
     top.legend(title=XI, loc="upper right")
-    letters((top, bottom))
+    common.letters((top, bottom))
     return figure
 
 
 def figure_9(d: Data):
     """Draw mean and spread of tau_cr over the whole range of correlation lengths."""
-    figure = new(5.6)
+    figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, sharex=True)
     cases = ((0, COLOURS[0], "-", "o", "fixed mean of $z$, as in the paper"),
              (1, COLOURS[2], "--", "^", "random mean of $z$"))  # fmt: skip
@@ -64,7 +50,7 @@ def figure_9(d: Data):
         for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
             rows = trend(d, function, factor, mode)
             style = {"color": colour, "ls": dashes, "marker": marker, "label": label}
-            numbers(axes, [r for r, _ in rows], [n for _, n in rows], **style)
+            common.numbers(axes, [r for r, _ in rows], [n for _, n in rows], **style)
     rows = trend(d, deviation, 1e-3)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=GREY,
                 label="standard deviation, fixed mean")  # fmt: skip
@@ -73,16 +59,16 @@ def figure_9(d: Data):
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.92))
     top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
     bottom.set(yscale="log", xlabel=XI, ylabel="median less lower quartile (kPa)")
-    plain_ticks(bottom.xaxis, (0.0625, 0.25, 1, 4, 16))
-    plain_ticks(bottom.yaxis, (10, 20, 50, 100))
+    common.plain_ticks(bottom.xaxis, (0.0625, 0.25, 1, 4, 16))
+    common.plain_ticks(bottom.yaxis, (10, 20, 50, 100))
     bottom.legend(loc="upper left")
-    letters((top, bottom))
+    common.letters((top, bottom))
     return figure
 
 
 def figure_10(d: Data):
     """Draw how far ruptures lie above exact equilibrium against the loading rate."""
-    figure = new(3.2)
+    figure = common.new(3.2)
     axes = figure.subplots()
     offset = d["convergence"]["offset"]
     rates = np.array(RATES) * setting.LOADING_RATE * 1e-6
@@ -103,13 +89,13 @@ def figure_10(d: Data):
 
 def figure_11(d: Data):
     """Draw how patches grow in number and merge, and how they act on each other."""
-    figure = new(7.6)
+    figure = common.new(7.6)
     grid = figure.add_gridspec(4, 1, height_ratios=(1.0, 0.85, 1.0, 0.9))
     number, one, pair, lowering = (figure.add_subplot(grid[i]) for i in range(4))
     for ratio in RATIOS:
         rows = d.at("growth", "patches", ratio)
         number.errorbar(LEVELS, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
-                        **line(ratio), lw=1, label=f"{ratio:g}")  # fmt: skip
+                        **common.line(ratio), lw=1, label=f"{ratio:g}")  # fmt: skip
     number.set(xlabel=r"$\tau_0/\tau_\mathrm{cr}$", ylabel="slipping patches", ylim=(0, None))
     number.legend(title=XI, loc="upper left", ncols=2)
     study = d["mechanism"]
@@ -134,9 +120,9 @@ def figure_11(d: Data):
     pair.legend(loc="upper center", ncols=2)
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
-    plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
-    plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3))
-    letters((number, one, pair, lowering))
+    common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
+    common.plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3))
+    common.letters((number, one, pair, lowering))
     return figure
 
 
@@ -145,14 +131,14 @@ XI_UNIT = r"$h_\mathrm{n}$"
 
 def figure_12(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
-    figure = new(5.6)
+    figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
     length = np.linspace(0, 4.5, 100)
     most = HIGH**2 / (2 * setting.W)
     for ratio in RATIOS:
         stress = d.stress(ratio).mean()
         rate = math.pi * 0.5 * length * H * stress**2 / (2 * setting.G_STAR)
-        top.plot(length, rate / most, **line(ratio), label=f"{ratio:g}")
+        top.plot(length, rate / most, **common.line(ratio), label=f"{ratio:g}")
     top.axhline(1, color=RED, lw=1)
     top.text(0.1, 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED)
     top.axvspan(0, 1, color="#eeeeee", lw=0, zorder=0)
@@ -174,17 +160,17 @@ def figure_12(d: Data):
     for name, shift, colour, marker, text in studies:
         found = [arrested(d, ratio, name) * 100 for ratio in RATIOS]
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
-        numbers(bottom, np.log2(RATIOS) + shift, found, **style)
-    ratio_axis(bottom)
+        common.numbers(bottom, np.log2(RATIOS) + shift, found, **style)
+    common.ratio_axis(bottom)
     bottom.set(ylabel="samples with an\narrested event (%)", ylim=(0, None))
     bottom.legend()
-    letters((top, bottom))
+    common.letters((top, bottom))
     return figure
 
 
 def figure_13(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
-    figure = new(5.2)
+    figure = common.new(5.2)
     top, bottom = figure.subplots(2, 1, height_ratios=(0.8, 1.2))
     problem = setting.PROBLEM
     x = problem.interface.x / L
@@ -208,7 +194,7 @@ def figure_13(d: Data):
     bottom.set(xlim=(0, limit), ylim=(0, limit), xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
     bottom.legend(loc="upper left")
-    letters((top, bottom))
+    common.letters((top, bottom))
     return figure
 
 
@@ -230,7 +216,7 @@ def _shares(axes, d: Data, name: str, title: str) -> None:
 
 def figure_14(d: Data):
     """Draw the share of arrested samples where more is random, with and without inertia."""
-    figure = new(8.6)
+    figure = common.new(8.6)
     axes = figure.subplots(4, 1, height_ratios=(4, 6, 6, 12), sharex=True)
     for panel, (name, title) in zip(axes, (
         ("wide_strength", "range of the strength"),
@@ -241,22 +227,22 @@ def figure_14(d: Data):
         _shares(panel, d, name, title)
     axes[1].legend(loc="upper right")
     axes[-1].set_xlabel("samples with an arrested event (%)")
-    letters(axes, x=-0.25)
+    common.letters(axes, x=-0.25)
     return figure
 
 
 def figure_15(d: Data):
     """Draw the effect of length, pressure and ends, and the failure probability."""
-    figure = new(8.0)
+    figure = common.new(8.0)
     length, pressure, end, tail = figure.subplots(4, 1)
     extents = np.array((12.5, 25, 50, 100, 200, 400, 800))
     rows = d["length"]["critical_stress"].values
     found = [deviation(row / row.mean()) * 100 for row in rows]
-    numbers(length, extents, found, color=COLOURS[0], marker="o")
+    common.numbers(length, extents, found, color=COLOURS[0], marker="o")
     length.set(xscale="log", yscale="log", xlabel="length of the interface (mm)",
                ylabel=f"variation of {TAU_CR} (%)")  # fmt: skip
-    plain_ticks(length.xaxis, extents)
-    plain_ticks(length.yaxis, (2, 3, 5))
+    common.plain_ticks(length.xaxis, extents)
+    common.plain_ticks(length.yaxis, (2, 3, 5))
     for chosen, colour, marker, text in (
         ((0, 1, 2), COLOURS[0], "o", r"$\xi_0$ fixed"),
         ((3, 1, 4), COLOURS[2], "^", r"$\xi_0/h_\mathrm{n}$ fixed"),
@@ -268,11 +254,13 @@ def figure_15(d: Data):
     pressure.legend(title="mean, and its deviation")
     change = d["free_end"]["change"].values * 100
     found = [mean(row) for row in change[:4]]
-    numbers(end, np.log2(RATIOS), found, color=COLOURS[0], marker="o", label="$L$")
+    common.numbers(end, np.log2(RATIOS), found, color=COLOURS[0], marker="o", label="$L$")
     for i, text, marker in ((5, "$L/2$", "s"), (4, "$L/4$", "^")):
-        numbers(end, [-2], [mean(change[i])], color=COLOURS[2], marker=marker, label=text)
+        common.numbers(
+            end, [-2], [mean(change[i])], color=COLOURS[2], marker=marker, label=text
+        )
     end.axhline(0, color=GREY, lw=0.8)
-    ratio_axis(end)
+    common.ratio_axis(end)
     end.set(ylabel=f"{TAU_CR} by free ends (%)")
     end.legend(loc="lower right", ncols=3)
     study = d["failure"]
@@ -284,13 +272,13 @@ def figure_15(d: Data):
                   label="counting", zorder=0)  # fmt: skip
     tail.set(xlabel="stress (MPa)", ylabel="probability of failure", ylim=(5e-7, 1))
     tail.legend(loc="lower right")
-    letters((length, pressure, end, tail))
+    common.letters((length, pressure, end, tail))
     return figure
 
 
 def figure_16(d: Data):
     """Draw what other strengths, spectra and laws do to the onset."""
-    figure = new(6.4)
+    figure = common.new(6.4)
     skew, spectrum, law = figure.subplots(3, 1)
     x = np.log2(RATIOS)
     for start, colour, marker, text in (
@@ -308,11 +296,11 @@ def figure_16(d: Data):
         rows = [
             d.what_if("exponent", "critical_stress", 4 * k + j) / usual - 1 for j in range(4)
         ]
-        spectrum.plot((1.5, 2, 4, 8), [100 * row.mean() for row in rows],
-                      **{**dots(ratio), "linestyle": "-"}, ms=4, label=f"{ratio:g}")  # fmt: skip
+        look = common.dots(ratio) | {"linestyle": "-", "ms": 4, "label": f"{ratio:g}"}
+        spectrum.plot((1.5, 2, 4, 8), [100 * row.mean() for row in rows], **look)
     spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",
                  ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
-    plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))
+    common.plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))
     spectrum.legend(title=XI, loc="upper right")
     for start, colour, marker, text in (
         (0, COLOURS[0], "o", "uniform $W$"),
@@ -321,10 +309,10 @@ def figure_16(d: Data):
         rows = [
             mean(d.what_if("uniform_dc", "critical_stress", start + i) / MEAN) for i in range(4)
         ]
-        numbers(law, x, rows, color=colour, marker=marker, label=text)
+        common.numbers(law, x, rows, color=colour, marker=marker, label=text)
     law.set(ylabel=r"$\langle\tau_\mathrm{cr}\rangle/\langle\tau_\mathrm{p}\rangle$")
     law.legend()
     for panel in (skew, law):
-        ratio_axis(panel)
-    letters((skew, spectrum, law))
+        common.ratio_axis(panel)
+    common.letters((skew, spectrum, law))
     return figure

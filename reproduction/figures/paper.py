@@ -7,7 +7,8 @@ from scipy.stats import norm
 import stiction as st
 from reproduction import setting
 from reproduction.claims import Data
-from reproduction.figures.style import (
+from reproduction.figures import common
+from reproduction.figures.common import (
     COLOURS,
     GREY,
     INK,
@@ -17,13 +18,6 @@ from reproduction.figures.style import (
     RED,
     TAU_CR,
     XI,
-    dots,
-    letter,
-    letters,
-    line,
-    new,
-    numbers,
-    ratio_axis,
 )
 from reproduction.numbers_with_errors import mean, quantile
 from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
@@ -32,7 +26,7 @@ from reproduction.statements_onset import dynamic_mean, offsets
 
 def figure_1(d: Data):
     """Draw the system, the load, the friction law, and one field with its statistics."""
-    figure = new(6.2)
+    figure = common.new(6.2)
     grid = figure.add_gridspec(3, 4, height_ratios=(1.0, 1.0, 1.15))
     _system(figure.add_subplot(grid[0, :]))
     _load(figure.add_subplot(grid[1, :2]))
@@ -43,7 +37,7 @@ def figure_1(d: Data):
     field.plot(x, tau_p, color=COLOURS[0], lw=0.9)
     field.set(xlabel=r"$x/L$", ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1),
               ylim=(0.6, 2.9))  # fmt: skip
-    letter(field, "d", x=-0.1)
+    common.letter(field, "d", x=-0.1)
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
     lag = PROBLEM.interface.x / H
     for name, style in (("correlation", "-"), ("gaussian_correlation", ":")):
@@ -73,7 +67,7 @@ def _system(axes) -> None:
     axes.text(0.93, 0.72, r"$\tau_0(t)$", va="center")
     axes.set(xlim=(0, 1), ylim=(-0.9, 0.9))
     axes.axis("off")
-    letter(axes, "a")
+    common.letter(axes, "a")
 
 
 def _load(axes) -> None:
@@ -81,7 +75,7 @@ def _load(axes) -> None:
     axes.plot(1, 1, "o", color=INK, ms=4)
     axes.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
     axes.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
-    letter(axes, "b", x=-0.2)
+    common.letter(axes, "b", x=-0.2)
 
 
 def _law(axes) -> None:
@@ -93,12 +87,12 @@ def _law(axes) -> None:
     axes.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
     axes.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
     axes.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
-    letter(axes, "c", x=-0.2)
+    common.letter(axes, "c", x=-0.2)
 
 
 def figure_2(d: Data):
     """Draw the mapping from z to the strength, and the spectrum."""
-    figure = new(4.9)
+    figure = common.new(4.9)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
     left, right = (figure.add_subplot(grid[0, i]) for i in (0, 1))
     z = np.linspace(-3.5, 3.5, 300)
@@ -119,7 +113,7 @@ def figure_2(d: Data):
     right.tick_params(labelleft=False)
     left.legend(loc="upper left")
     right.legend(loc="center right")
-    letter(left, "a", x=-0.2)
+    common.letter(left, "a", x=-0.2)
     axes = figure.add_subplot(grid[1, :])
     k = np.geomspace(0.03, 10, 300)
     axes.loglog(k, (1.0 + k**2) ** -4.0, color=COLOURS[0], label=r"$g(k)/g(0)$")
@@ -129,7 +123,7 @@ def figure_2(d: Data):
         axes.text(place * 0.94, 3e-8, text, rotation=90, ha="right", va="bottom")
     axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(1e-8, 3))
     axes.legend(loc="lower left")
-    letter(axes, "b", x=-0.09)
+    common.letter(axes, "b", x=-0.09)
     return figure
 
 
@@ -141,7 +135,7 @@ SLOW_TO_FAST = LinearSegmentedColormap.from_list(
 def figure_3(d: Data):
     """Draw one rupture: slip rate in space and time, load, strength."""
     study, solid = d["representative"], PROBLEM.solid
-    figure = new(7.4)
+    figure = common.new(7.4)
     grid = figure.add_gridspec(3, 4, height_ratios=(1.25, 1.25, 0.8))
     time, x = study["time"].values, study["x"].values / L
     mean_stress = study["mean_stress"].values
@@ -163,7 +157,7 @@ def figure_3(d: Data):
         away = np.array([0.12, 0.12 + 0.6 * late * 1e-4 * onset * speed / L])
         zoom.plot(centre - away, (0.0, 0.6 * late), color=INK, lw=1.2, ls="--")
         zoom.text(centre - away[1], 0.62 * late, text, ha="center", va="bottom")
-    letter(zoom, "a", x=-0.1)
+    common.letter(zoom, "a", x=-0.1)
     figure.colorbar(picture, ax=zoom, label=r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle"
                     r" c_\mathrm{s})$", ticks=(1e-4, 1e-2, 1))  # fmt: skip
     load, wide = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1:])
@@ -177,7 +171,7 @@ def figure_3(d: Data):
     for axes, place in ((load, 1), (wide, centre)):
         axes.plot(place, 1, "o", color=INK, ms=4, clip_on=False)
         axes.set_ylim(first - 0.01, 1.005)
-    letter(load, "b", x=-0.5)
+    common.letter(load, "b", x=-0.5)
     strength = figure.add_subplot(grid[2, :])
     tau_p = np.roll(study["strength"].values, shift) / MEAN
     strength.plot(x, tau_p, color=COLOURS[0], lw=0.9)
@@ -186,13 +180,13 @@ def figure_3(d: Data):
     strength.text(centre + 0.7 * H / L, top, r"$h_\mathrm{n}$", va="center", color=RED)
     strength.set(xlabel="$x/L$", ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1),
                  ylim=(None, top + 0.08))  # fmt: skip
-    letter(strength, "c", x=-0.1)
+    common.letter(strength, "c", x=-0.1)
     return figure
 
 
 def figure_4(d: Data):
     """Draw the nucleation stress of one field, and theory against 60 ruptures."""
-    figure = new(7.6)
+    figure = common.new(7.6)
     grid = figure.add_gridspec(3, 1, height_ratios=(0.9, 1.0, 1.3))
     top, middle, bottom = (figure.add_subplot(grid[i]) for i in range(3))
     study = d["representative"]
@@ -203,10 +197,10 @@ def figure_4(d: Data):
     top.plot(x[least], study["tau_n"].values[least] / MEAN, "o", color=INK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1), ylim=(0.6, 1.75))
     top.legend(loc="upper right", ncols=2)
-    letter(top, "a", x=-0.1)
+    common.letter(top, "a", x=-0.1)
     for ratio in SIMULATED:
         stress = d.stress(ratio, "ruptures") / MEAN
-        style = dots(ratio)
+        style = common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
         middle.plot(stress, 100 * offsets(d, ratio, "printed"), **{**style, "color": PALE},
                     ms=3, mfc="none", zorder=1)  # fmt: skip
@@ -214,12 +208,12 @@ def figure_4(d: Data):
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
     middle.legend(title=XI, loc="upper left", ncols=3)
-    letter(middle, "b", x=-0.1)
+    common.letter(middle, "b", x=-0.1)
     bottom.plot([0, 1], [0, 1], color=GREY, lw=0.8)
     for ratio in SIMULATED:
         place = d.at("ruptures", "critical_position", ratio)
         predicted = d.at("local", "critical_position", ratio)[: place.size]
-        bottom.plot(predicted / L, place / L, **dots(ratio), ms=4)
+        bottom.plot(predicted / L, place / L, **common.dots(ratio), ms=4)
         off = setting.distance(place, predicted) > 0.5 * H
         bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=RED, ms=9)
         other = d.at("printed", "critical_position", ratio)[: place.size]
@@ -227,13 +221,13 @@ def figure_4(d: Data):
         bottom.plot(other[off] / L, place[off] / L, "x", color=RED, ms=6)
     bottom.set(xlabel=r"predicted $x_\mathrm{cr}/L$", ylabel=r"simulated $x_\mathrm{cr}/L$",
                xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")  # fmt: skip
-    letter(bottom, "c", x=-0.15)
+    common.letter(bottom, "c", x=-0.15)
     return figure
 
 
 def figure_5(d: Data):
     """Draw strength, nucleation stress and onset at four correlation lengths."""
-    figure = new(8.4)
+    figure = common.new(8.4)
     grid = figure.add_gridspec(4, 1, height_ratios=(1.1, 1.0, 1.0, 0.7))
     rows = [grid[i].subgridspec(1, 3, width_ratios=(4, 1, 1.2), wspace=0.04) for i in (0, 1)]
     upper = [figure.add_subplot(rows[0][i]) for i in range(3)]
@@ -246,19 +240,22 @@ def figure_5(d: Data):
         field = setting.strength(ratio)
         draws = field.draws(PROBLEM.interface, 1, 0)  # one draw, as in the paper's (a) and (b)
         tau_p = field.profiles(PROBLEM.interface, draws)
-        upper[0].plot(x, tau_p[0] / MEAN, **line(ratio), lw=0.9, label=f"{ratio:g}")
+        upper[0].plot(x, tau_p[0] / MEAN, **common.line(ratio), lw=0.9, label=f"{ratio:g}")
         lower[0].plot(
-            x, st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN, **line(ratio), lw=0.9
+            x,
+            st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN,
+            **common.line(ratio),
+            lw=0.9,
         )
         least = st.statistics.density(
             d.at("moments", "weakest_strength", ratio), bounds=(LOW, HIGH)
         )
-        upper[2].plot(least.value / least.value.max(), least.x / MEAN, **line(ratio))
+        upper[2].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
         counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
         edges = np.linspace(LOW, HIGH, counts.size + 1)
         centre = 0.5 * (edges[1:] + edges[:-1])
         density = counts / counts.sum() / (edges[1] - edges[0]) * MEAN
-        lower[1].plot(density, centre / MEAN, **line(ratio))
+        lower[1].plot(density, centre / MEAN, **common.line(ratio))
     for axes, (low, high) in ((upper, (0.62, 1.72)), (lower, (0.62, 1.42))):
         for one in axes:
             one.set_ylim(low, high)
@@ -278,15 +275,15 @@ def figure_5(d: Data):
     lower[0].set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}", xlabel="$x/L$", xlim=(0, 1))
     lower[1].set_title(r"$f(\tau_\mathrm{n})$")
     lower[2].axis("off")
-    letter(upper[0], "a", x=-0.12)
-    letter(lower[0], "b", x=-0.12)
+    common.letter(upper[0], "a", x=-0.12)
+    common.letter(lower[0], "b", x=-0.12)
     stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
     for ratio in RATIOS:
         found = st.statistics.density(d.stress(ratio), bounds=(LOW, HIGH))
-        stress.plot(found.x / MEAN, found.value * MEAN, **line(ratio))
+        stress.plot(found.x / MEAN, found.value * MEAN, **common.line(ratio))
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
         share = share / d.size.samples * 20
-        place.stairs(share, edges, baseline=None, color=line(ratio)["color"],
+        place.stairs(share, edges, baseline=None, color=common.line(ratio)["color"],
                      lw=0.9)  # fmt: skip
     error = np.sqrt(20.0 / d.size.samples)
     place.axhspan(1 - 2 * error, 1 + 2 * error, color="#eeeeee", lw=0, zorder=0)
@@ -295,8 +292,8 @@ def figure_5(d: Data):
                ylabel=rf"$f(\tau_\mathrm{{cr}})\,${MEAN_P}")  # fmt: skip
     place.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=r"$x_\mathrm{cr}/L$",
               ylabel=r"$f(x_\mathrm{cr})\,L$")  # fmt: skip
-    letter(stress, "c", x=-0.12)
-    letter(place, "d", x=-0.12)
+    common.letter(stress, "c", x=-0.12)
+    common.letter(place, "d", x=-0.12)
     return figure
 
 
@@ -312,7 +309,7 @@ def _statistics(axes, found, ends) -> None:
     for i, (name, dashes, marker, colour) in enumerate(styles):
         row = [each[i].value for each in found]
         style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
-        numbers(axes, x, [each[i] for each in found], **style)
+        common.numbers(axes, x, [each[i] for each in found], **style)
         axes.plot(_PLACES[:2], [ends[0][i], row[0]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[-2:], [row[-1], ends[1][i]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[[0, -1]], [ends[0][i], ends[1][i]], marker, color=colour, ms=4,
@@ -327,7 +324,7 @@ def _statistics(axes, found, ends) -> None:
 
 def figure_6(d: Data):
     """Draw mean, median and lower quartile of tau_n and of tau_cr."""
-    figure = new(6.4)
+    figure = common.new(6.4)
     grid = figure.add_gridspec(2, 1, height_ratios=(0.85, 1.3))
     top, bottom = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
     law = setting.MARGINAL.distribution
@@ -344,7 +341,7 @@ def figure_6(d: Data):
     _statistics(top, found, ([1.0, 1.0, 1.0], own))
     top.set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}")
     top.legend(loc="lower left")
-    letter(top, "a", x=-0.12)
+    common.letter(top, "a", x=-0.12)
     found = [
         tuple(number * (1 / MEAN) for number in (mean(v), quantile(v, 0.5), quantile(v, 0.25)))
         for v in (d.stress(ratio) for ratio in RATIOS)
@@ -364,10 +361,10 @@ def figure_6(d: Data):
     best = [dynamic_mean(d, ratio) * (1 / MEAN) for ratio in SIMULATED]
     inset.plot(np.log2(RATIOS), [n[0].value for n in found], "-o", color=COLOURS[0], ms=4)
     inset.plot(places, [n.value for n in best], "x", color=RED, ms=7)
-    ratio_axis(inset)
+    common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(-2.4, 1.4))
     bottom.legend(*_chosen(bottom, 1), loc="lower left")
-    letter(bottom, "b", x=-0.12)
+    common.letter(bottom, "b", x=-0.12)
     return figure
 
 
@@ -378,13 +375,13 @@ def _chosen(axes, count: int):
 
 def figure_7(d: Data):
     """Draw correlation, eigenfunction and the variance of tau_n."""
-    figure = new(5.4)
+    figure = common.new(5.4)
     axes = figure.subplots(2, 2)
     theory = d["theory"]
     lag = theory["x"].values / L
     for ratio in RATIOS:
-        axes[0, 0].plot(lag, theory["correlation"].sel(correlation_ratio=ratio), **line(ratio),
-                        label=f"{ratio:g}")  # fmt: skip
+        values = theory["correlation"].sel(correlation_ratio=ratio)
+        axes[0, 0].plot(lag, values, **common.line(ratio), label=f"{ratio:g}")
     axes[0, 0].set(xlim=(0, 0.12), xlabel=r"$\xi/L$", ylabel=r"$C(\xi)$")
     axes[0, 0].legend(title=XI)
     s = np.linspace(-1, 1, 200)
@@ -408,5 +405,5 @@ def figure_7(d: Data):
     axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")
     axes[1, 0].legend(loc="lower right")
-    letters(axes.flat, x=-0.25)
+    common.letters(axes.flat, x=-0.25)
     return figure

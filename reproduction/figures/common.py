@@ -1,4 +1,4 @@
-"""What all figures share: width, colours, letters of panels."""
+"""What all figures share: width, colours, letters of panels, ticks and error bars."""
 
 import numpy as np
 from matplotlib.figure import Figure
