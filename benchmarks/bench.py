@@ -177,7 +177,9 @@ def equilibrium():
     problem = line()
     matrix = stiffness(problem)
     for ratio in RATIOS:
-        tau_p = field(ratio * problem.nucleation_length).sample(problem.interface, 256, seed=0)
+        tau_p = field(ratio * problem.nucleation_length).sample(
+            problem.interface, samples=256, seed=0
+        )
         ours, found = solver_time(problem, st.Equilibrium(), tau_p)
         gap = np.max(found["certificate_gap"] / found["critical_load"])
         exact = found["first_instability"][0] / 1e6
@@ -258,7 +260,9 @@ def rupture_step():
     method = st.Rupture(loading_rate=1e9, implicit=False, start="rest")
     for nodes in (512, 1024, 2048, 4096):
         problem = line(nodes)
-        tau_p = field(0.5 * problem.nucleation_length).sample(problem.interface, 1, seed=1)
+        tau_p = field(0.5 * problem.nucleation_length).sample(
+            problem.interface, samples=1, seed=1
+        )
         total, found = solver_time(problem, method, tau_p, 1)
         step = total / found["explicit_steps"][0]
         past = np.zeros((1000, nodes // 2 + 1), dtype=complex)
