@@ -1,5 +1,7 @@
 """Maps of a plane, with gaps and as text: the rules of lines."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -117,7 +119,7 @@ def test_other_maps_are_refused(tmp_path):
         ("interpolate: are options of profiles of a line", MAP, {"interpolate": True}),
         ("value: 'q' is not the name of the only variable, 'strength'", MAP, {"value": "q"}),
     ):
-        refuses(words, lambda: st.read_profile(source, interface=PLANE, **options))  # noqa: B023
+        refuses(words, partial(st.read_profile, source, interface=PLANE, **options))
 
 
 @pytest.mark.parametrize("order", ["descending", "shuffled"])
