@@ -163,7 +163,7 @@ def _certain(state: LimitState, stress: float) -> dict[str, Any]:
         reason = f"no interface slides at or below {low:g} Pa"
     else:
         most = state.slip_chance(stress)
-        reason = f"a node is weaker than that with a probability below {most:.1g}"
+        reason = f"a node is weaker than that with a probability below {most or 1e-300:.1g}"
     found = {"probability": chance, "interval": (chance, most), "cv": 0.0, "evaluations": 0}
     return found | {"algorithm": "exact", "reason": reason}
 
