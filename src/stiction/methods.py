@@ -273,7 +273,7 @@ def onset(
     attributes = study_attributes(problem=problem, method=method)
     measured: Any = True
     if not isinstance(profiles, Sample):
-        profiles, measured = gather(problem, named_profiles(profiles), gaps)
+        profiles, measured = gather(named_profiles(profiles), problem.interface, gaps)
     sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     values = _in_portions(problem, method, sample, progress)

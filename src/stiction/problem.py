@@ -17,8 +17,8 @@ from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, describe, is_unplaced, model, real_array
 from stiction.profiles.placing import describe_gaps, turned
-from stiction.profiles.reading import at_nodes, on_nodes
-from stiction.results import Variable
+from stiction.profiles.reading import at_nodes
+from stiction.results import PROFILES
 from stiction.solid import Solid
 
 ACCEPTED = ("barriers", "overstress", "constant")
@@ -114,19 +114,6 @@ class Sample(NamedTuple):
         return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
 
 
-PROFILES: dict[str, Variable] = {
-    "strength": Variable("Pa", "peak strength"),
-    "residual_strength": Variable("Pa", "residual strength"),
-    "initial_stress": Variable("Pa", "initial stress"),
-    "weakening_rate": Variable("Pa m-1", "weakening rate"),
-    "critical_slip": Variable("m", "critical slip"),
-    "fracture_energy": Variable("J m-2", "fracture energy"),
-    "normal_pressure": Variable("Pa", "normal pressure"),
-}
-"""What may be given or sampled along an interface, with its unit; the order is that of the streams
-of random draws and never changes."""
-
-
 @model
 class Problem:
     """The deterministic part of a model: solid, interface, friction law and load.
@@ -204,7 +191,8 @@ class Problem:
                     )
                 if is_unplaced(value):
                     try:
-                        placed[name] = on_nodes(f"{part}.{name}", value, self.interface)
+                        at = at_nodes(f"{part}.{name}", value, self.interface)[0]
+                        placed[name] = np.asarray(at)
                     except InputError as error:
                         problems += error.problems
             if placed and not problems:  # frozen for others; validation is not over yet
@@ -457,7 +445,7 @@ def profiles_of(
     if samples is not None:
         valid += f", ({samples}, 1) or a number"
     try:
-        array = real_array(at_nodes(name, value, name, interface)[0])
+        array = real_array(at_nodes(name, value, interface)[0])
     except TypeError as error:
         raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
     if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table

@@ -41,6 +41,27 @@ class Variable:
         return not set(self.dims[1:]) <= {DIRECTION}
 
 
+PROFILES: dict[str, Variable] = {
+    "strength": Variable("Pa", "peak strength"),
+    "residual_strength": Variable("Pa", "residual strength"),
+    "initial_stress": Variable("Pa", "initial stress"),
+    "weakening_rate": Variable("Pa m-1", "weakening rate"),
+    "critical_slip": Variable("m", "critical slip"),
+    "fracture_energy": Variable("J m-2", "fracture energy"),
+    "normal_pressure": Variable("Pa", "normal pressure"),
+}
+"""What may be given or sampled along an interface, with its unit; the order is that of the streams
+of random draws and never changes."""
+FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
+QUANTITIES = PROFILES | {
+    "residual_ratio": Variable("1", "residual ratio"),
+    "load_profile": Variable("1", "load profile"),
+    "slip": Variable("m", "slip"),
+    "friction_coefficient": FRICTION_COEFFICIENT,
+    "height": Variable("m", "height"),
+}
+"""What may be read as a profile."""
+
 DIRECTION = "direction"
 """Dimension of the components along x and y."""
 
@@ -77,9 +98,6 @@ def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
         return np.array(interface.dims), Variable("", "direction of a component", (DIRECTION,))
     what = f"position along {dim}" if interface.is_plane else "position along the interface"
     return interface.coordinates[dim], Variable("m", what, (dim,))
-
-
-FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 
 
 def to_dataset(

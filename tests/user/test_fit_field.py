@@ -117,7 +117,7 @@ REFUSED = {
     "must not be empty": [],
     "400 of 400 values ... do not lie between the bounds": labelled(-VALUES),
     "unknown unit 'banana'": labelled(x_unit="banana"),
-    "not a unit of stress": labelled(unit="um"),
+    "cannot be converted to Pa": labelled(unit="um"),
 }
 WRONG_OPTIONS = {
     "detrend ... noise ... bootstrap ... confidence ... seed ... progress": {

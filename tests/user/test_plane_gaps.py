@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
+from small_study import small_study
 
 import stiction as st
 from stiction.profiles.reading import at_nodes
@@ -34,7 +35,7 @@ def test_gaps_are_refused_filled_or_left_and_stay_where_they_are(tmp_path):
     assert int((~filled["measured"]).sum()) == 3
     # The map varies along x as a sine and is odd about x = 0: Laplace keeps it between its rim.
     assert np.abs(filled.values[0, :3] - 1e6).max() < 1e3
-    values, measured = at_nodes("strength", filled[::-1, ::-1], "strength", PLANE)
+    values, measured = at_nodes("strength", filled[::-1, ::-1], PLANE)
     np.testing.assert_array_equal(values, filled)
     np.testing.assert_array_equal(measured, filled["measured"])
 
@@ -86,23 +87,47 @@ def heights(request, tmp_path):
 
 def test_heights_of_a_map_are_no_strength(heights):
     path, options = heights
-    with pytest.raises(st.InputError, match="clearly the strength|not a unit of stress"):
+    with pytest.raises(st.InputError, match="clearly the strength|cannot be converted to Pa"):
         st.read_profile(path, interface=PLANE, **options)
     found = st.read_profile(path, interface=PLANE, quantity="height", **options)
     np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
     assert found.attrs["units"] == "m"
 
 
-@pytest.mark.parametrize("interface", [None, st.Interface(length=0.02, nodes=32)])
-@pytest.mark.filterwarnings("error")
-def test_a_map_is_not_read_as_a_line(tmp_path, heights, interface):
+def test_a_map_is_not_read_as_a_line(tmp_path, heights):
     np.savetxt(tmp_path / "matrix.csv", VALUES, delimiter=",")
+    line = st.Interface(length=0.02, nodes=32)
     for source in (heights[0], tmp_path / "matrix.csv", MAP):
         for options in ({}, {"quantity": "height", "unit": "um"}):
-            with pytest.raises(
-                st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly\)"
-            ):
-                st.read_profile(source, interface=interface, **options)
+            with pytest.raises(st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly"):
+                st.read_profile(source, interface=line, **options)
+
+
+def test_a_map_without_an_interface_keeps_its_coordinates(heights):
+    path, options = heights
+    found = st.read_profile(path, quantity="height", **options)
+    np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
+    assert found.dims == ("x", "y")
+    if path.suffix != ".npy":
+        np.testing.assert_allclose(found.x, PLANE.x, rtol=1e-8)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".nc", ".npy"])
+def test_a_study_file_reads_maps(tmp_path, ending):
+    path = tmp_path / f"map{ending}"
+    if ending == ".npy":
+        np.save(path, VALUES)
+    elif ending == ".nc":
+        MAP.transpose("y", "x").to_netcdf(path)
+    else:
+        text(path)
+    study = small_study(nodes=[32, 16], length=[0.02, 0.01])
+    pressure = (
+        {"file": path.name} if ending == ".npy" else {"file": path.name, "value": "strength"}
+    )
+    study["problem"]["load"] = {"normal_pressure": pressure}
+    study = st.Study.from_dict(study, folder=tmp_path)
+    np.testing.assert_allclose(study.problem.load.normal_pressure, VALUES, rtol=1e-8)
 
 
 def test_other_maps_are_refused(tmp_path):
@@ -112,11 +137,11 @@ def test_other_maps_are_refused(tmp_path):
     unknown = MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x))
     for words, source, options in (
         ("x reaches from 0 to 19.375 m ... check the unit of x", metres, {}),
-        ("16 columns without names, as of a matrix ... np.save", tmp_path / "matrix.csv", {}),
+        ("16 columns without names, as of a matrix ... .npy", tmp_path / "matrix.csv", {}),
         ("x and y are swapped", tmp_path / "turned.npy", {}),
         ("y reaches from 0 to 0.019375 m", MAP.rename(x="y", y="x"), {}),
         ("x must be finite", unknown, {}),
-        ("interpolate: are options of profiles of a line", MAP, {"interpolate": True}),
+        ("interpolate: is an option of profiles of a line", MAP, {"interpolate": True}),
         ("value: 'q' is not the name of the only variable, 'strength'", MAP, {"value": "q"}),
     ):
         refuses(words, partial(st.read_profile, source, interface=PLANE, **options))

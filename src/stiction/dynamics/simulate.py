@@ -96,7 +96,7 @@ def simulate_rupture(
     save = Save() if save is None else save
     if refused := refusals(problem, method):
         raise InputError(refused)
-    given, measured = gather(problem, named_profiles(profiles))
+    given, measured = gather(named_profiles(profiles), problem.interface)
     rows = problem.sample(given, accept=method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")

@@ -16,7 +16,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.methods import Solver, Values, prepared, variables_of
 from stiction.model import Count, Names, Number, model
-from stiction.problem import PROFILES, Problem, refusals
+from stiction.problem import Problem, refusals
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.random.stresses import (
@@ -27,7 +27,7 @@ from stiction.random.stresses import (
     support_in_stress,
 )
 from stiction.random.synthesis import block_of
-from stiction.results import Variable, along
+from stiction.results import PROFILES, Variable, along
 
 AnyRandom: TypeAlias = RandomInterface | RandomField
 

@@ -26,8 +26,8 @@ from stiction.inference.whittle import RANGES, SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
-from stiction.profiles.reading import UNITS
 from stiction.random.random_field import RandomField
+from stiction.results import QUANTITIES
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
@@ -149,8 +149,8 @@ class FieldFit:
             last = name.rpartition(".")[2]
             if last.endswith("length"):
                 line += " m"
-            elif last in STRESSES and UNITS[self.quantity] != "1":
-                line += f" {UNITS[self.quantity]}"
+            elif last in STRESSES and QUANTITIES[self.quantity].units != "1":
+                line += f" {QUANTITIES[self.quantity].units}"
             least, most = RANGES.get(last, (-math.inf, math.inf))
             if low <= least or high >= most:
                 line += f" (searched from {least:g} to {most:g})"
@@ -269,8 +269,8 @@ def fit_field(
     >>> bool(low < 1e-3 < high)
     True
     """
-    if quantity not in UNITS:
-        raise InputError(unknown_name("quantity", quantity, UNITS))
+    if quantity not in QUANTITIES:
+        raise InputError(unknown_name("quantity", quantity, QUANTITIES))
     records = records_of(profiles, interface, quantity)
     if anisotropy != 1.0 and records[0].values.ndim == 1:
         raise InputError(

@@ -8,7 +8,8 @@ from stiction.arrays import Array
 from stiction.errors import InputError, prefixed, warn_accuracy
 from stiction.interface import Interface
 from stiction.model import real_array
-from stiction.profiles.reading import is_labelled, points_of, simplified
+from stiction.profiles.placing import points_of
+from stiction.profiles.reading import is_labelled, labelled, simplified
 
 FEWEST = 64
 """Fewest measured points from which a spectrum can be estimated."""
@@ -53,8 +54,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     values = simplified(source, quantity)
     places: dict[str, Array] = {}
     if is_labelled(values):
-        dims = ("x", "y") if "y" in values.dims else ("x",)
-        values, places, measured = points_of(values, quantity, dims)
+        values, places, measured = points_of(labelled(values, quantity))
         values = np.where(measured, values, np.nan)  # what was filled in is no measurement
     if not places:
         return _of_array(values, interface)

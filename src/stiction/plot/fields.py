@@ -12,8 +12,9 @@ from stiction.model import check
 from stiction.plot import maps
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, color, series
-from stiction.problem import PROFILES, Problem
+from stiction.problem import Problem
 from stiction.random.random_field import RandomField
+from stiction.results import PROFILES
 
 MOST_LINES = 6
 _SYMBOLS = {

@@ -26,7 +26,7 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
-from stiction.profiles.reading import UNITS
+from stiction.results import QUANTITIES
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def fit(found: FieldFit) -> Figure:
 
 def _histogram(axes: Axes, found: FieldFit) -> None:
     values = np.concatenate(found._rows)
-    factor, unit = unit_for(UNITS[found.quantity], values)
+    factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
     counts, _, _ = axes.hist(
         values * factor, bins=40, density=True, color=PALE, label="measured"
     )
@@ -96,7 +96,7 @@ def _histogram(axes: Axes, found: FieldFit) -> None:
 def _quantiles(axes: Axes, found: FieldFit) -> None:
     estimate = found._estimate
     values = estimate.setting.marginal.quiet(np.concatenate(found._rows), estimate.model.noise)
-    factor, unit = unit_for(UNITS[found.quantity], values)
+    factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
     share = (np.arange(200) + 0.5) / 200
     expected = found.field.marginal.distribution.ppf(share) * factor
     spread = [
@@ -129,7 +129,7 @@ def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Arr
 
 
 def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
-    scale, unit = unit_for(UNITS[found.quantity], np.concatenate(found._rows))
+    scale, unit = unit_for(QUANTITIES[found.quantity].units, np.concatenate(found._rows))
     model = found._estimate.model
     factor = float(np.prod(one.window.spacings)) * scale**2
     k, measured, fitted = bands(one, model.expectation(one.window), 4).T

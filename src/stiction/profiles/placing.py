@@ -7,7 +7,7 @@ anywhere. What is missing stays NaN unless it is filled on request.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,74 +26,74 @@ TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
-SHOWN = 3
 IN_GAP, MEASURED = "in_gap", "measured"
 """Variable of a result; coordinate of results and profiles with gaps, False where none was."""
 OF_A_PLANE = (
-    "; a map over x and y is read with the plane it belongs to,"
-    " interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
+    "; a map of a plane has columns or coordinates x and y, or is an .npy of shape (nx, ny), and"
+    " needs interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
 )
 """What to do with two dimensions where a line was expected."""
 
 
-class Points(NamedTuple):
-    """Values (..., points) of one quantity in SI, NaN where there is none, and where they belong.
+def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
+    """Return values (..., points), their places (m) by direction, and where they were measured.
 
-    `places` (m) has an array (points,) for each direction. It is empty if the values come in the
-    order of the nodes, (..., *shape). `measured` is False where a gap was filled earlier.
+    The mask is True if nothing was filled in. Values without coordinates keep their shape, and the
+    dictionary is empty.
     """
-
-    values: Array
-    places: dict[str, Array]
+    dims = [dim for dim in ("x", "y") if dim in array.coords]
+    if len(dims) == 2 and "row" not in array.dims:
+        array = array.stack(row=dims, create_index=False)
     measured: Any = True
+    if MEASURED in array.coords:
+        mask = array[MEASURED].broadcast_like(array).transpose(*array.dims)
+        measured = mask.values.astype(bool)
+    return array.values, {dim: array[dim].values for dim in dims}, measured
 
 
 def place(
-    points: Points, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
+    array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
 ) -> tuple[Array, Any]:
     """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
 
     The mask is False where there was no value, be it filled in or left out; it is True if nothing
     is missing.
     """
-    values, places, measured = points
+    values, places, measured = points_of(array)
     if not places:
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
-            hint = (
-                "; give a value for each node, or the column of x (x=...), with"
-                " interpolate=True if points do not lie on the nodes"
-            )
-            hint = turned(shape, interface.shape) if interface.is_plane else hint
+            hint = turned(shape, interface.shape)
+            if not interface.is_plane:
+                hint = (
+                    "; give one value per node, or name the column of x (x=...), with"
+                    " interpolate=True if points do not lie on the nodes"
+                )
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
-    offsets = {dim: _offset(dim, places[dim], interface) for dim in interface.dims}
-    between = None in offsets.values()
-    if between and not interpolate:
-        raise InputError(_elsewhere(points, offsets, interface, gaps))
+    offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
     # Between the nodes, places differ if they are a millionth of the spacing apart.
-    finer = 10**6 if between else 1
-    index = []
-    for dim, n, length in zip(interface.dims, interface.shape, interface.lengths, strict=True):
-        offset = 0.0 if between else offsets[dim] or 0.0
-        step = np.round(places[dim] / (length / (finer * n)) - offset)
-        index.append(np.mod(step, finer * n).astype(np.int64))
+    finer = 10**6 if None in offsets else 1
     shape = tuple(finer * n for n in interface.shape)
+    steps = [
+        np.round(finer * (places[dim] / h - (offset or 0.0))).astype(np.int64)
+        for dim, h, offset in zip(interface.dims, interface.spacings, offsets, strict=True)
+    ]
     node, first, twins = np.unique(
-        np.ravel_multi_index(index, shape), return_index=True, return_inverse=True
+        np.ravel_multi_index(steps, shape, mode="wrap"), return_index=True, return_inverse=True
     )
-    _check_repeats(points, first[twins], interface)
+    _check_repeats(values, places, first[twins], interface)
 
     def put(rows: Array) -> Array:
-        if between:
+        if finer > 1:
             return _interpolated(places["x"][first], rows[..., first], interface)
         full = np.full((*rows.shape[:-1], interface.size), np.nan)
         full[..., node] = rows[..., first]
         return full.reshape(*rows.shape[:-1], *interface.shape)
 
-    if between:
+    if finer > 1:
         warn_accuracy(
             f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
             f" {interface.spacing:.3g} m apart"
@@ -109,28 +109,33 @@ def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
     return ""
 
 
-def _offset(dim: str, x: Array, interface: Interface) -> float | None:
-    """By how many spacings, in (-0.5, 0.5], all points lie beside nodes; None if by no one number.
+def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
+    """Return by how many spacings, in (-0.5, 0.5], all points lie beside nodes.
 
-    A line that is coarser than the nodes is to be interpolated, even if its points are nodes.
+    It is None if points are to be interpolated, as those of a line that is coarser than the nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
-    if not np.all(np.isfinite(x)):
-        raise InputError(f"{dim} must be finite; entry {int(np.argmin(np.isfinite(x)))} is not")
     at = np.unique(x) / spacing
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
-        period = np.ptp(x) + np.median(np.diff(np.unique(x)))  # both ends are not one place
+        period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
             f"{dim} reaches from {x.min():g} to {x.max():g} m, the interface is {length:g} m long:"
             f" check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
-    if not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5):
-        return None
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
     deviation = at - first - np.round(at - first)
-    if np.abs(deviation).max() > TOLERANCE:
-        return None
+    coarse = not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5)
+    if coarse or np.abs(deviation).max() > TOLERANCE:
+        if interpolate:
+            return None
+        advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
+        raise InputError(
+            f"{dim} does not coincide with the {interface.shape[axis]} nodes {dim}_i = i L/n, which"
+            f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m;"
+            f" check the unit of {dim}, give values at the nodes, as np.linspace(0, L, n,"
+            f" endpoint=False) does{advice}"
+        )
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
         warn_accuracy(
@@ -141,41 +146,19 @@ def _offset(dim: str, x: Array, interface: Interface) -> float | None:
     return offset
 
 
-def _elsewhere(
-    points: Points, offsets: dict[str, float | None], interface: Interface, gaps: Gaps
-) -> list[str]:
-    """Return the reason why points do not lie on the nodes, with the options of the user."""
-    problems = []
-    advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
-    for dim, n, h in zip(interface.dims, interface.shape, interface.spacings, strict=True):
-        if offsets[dim] is None:
-            x = np.unique(points.places[dim])
-            problems.append(
-                f"{dim} does not coincide with the {n} nodes {dim}_i = i L/n, which are"
-                f" {h:.6g} m apart: {x.size} points from {x[0]:.6g} to {x[-1]:.6g} m;"
-                f" check the unit of {dim}, give values at the nodes, as np.linspace(0,"
-                f" L, n, endpoint=False) does{advice}"
-            )
-    missing = int(np.isnan(points.values).sum())
-    if missing and gaps == "refuse":
-        problems.append(
-            f"{missing} points have no value (NaN); fill such gaps with gaps='fill'"
-        )
-    return problems
-
-
-def _check_repeats(points: Points, twins: NDArray[np.int64], interface: Interface) -> None:
+def _check_repeats(
+    values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
+) -> None:
     """Refuse two points at one place, unless they have the same value a period apart."""
-    periods = dict(zip(points.places, interface.lengths, strict=True))
+    rows = values.reshape(-1, twins.size)
     for i in np.flatnonzero(twins != np.arange(twins.size)):
         pair = [twins[i], i]
-        one, other = np.moveaxis(points.values[..., pair], -1, 0)
-        same = np.array_equal(one, other, equal_nan=True)
-        apart = max(np.ptp(x[pair]) / periods[dim] for dim, x in points.places.items())
-        if apart < 0.5 or not same:
+        sides = zip(places.values(), interface.lengths, strict=True)
+        apart = max(np.ptp(x[pair]) / length for x, length in sides)
+        one, other = rows.T[pair]
+        if apart < 0.5 or not np.array_equal(one, other, equal_nan=True):
             where = ", ".join(
-                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m"
-                for dim, x in points.places.items()
+                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
             )
             raise InputError(
                 f"{where} are the same position on an interface of period {interface.length}"
@@ -212,7 +195,7 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
 def close_gaps(
     values: Array, measured: Any, interface: Interface, gaps: Gaps
 ) -> tuple[Array, Any]:
-    """Values (..., *shape) with NaN where nothing was measured, refused, left or filled."""
+    """Return values (..., *shape) with NaN refused, left or filled, and what was measured."""
     missing = np.isnan(values)
     if not missing.any():
         return values, measured
@@ -261,25 +244,14 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
 
 
 def describe_gaps(missing: Mask, interface: Interface) -> str:
-    """Return 'values are missing (NaN) at x = 0.0112 to 0.0141 m (29 of 1024 nodes)'."""
-    maps = missing.reshape(-1, *interface.shape)
-    row = int(np.argmax(maps.reshape(len(maps), -1).any(axis=1)))
-    count = f"{maps[row].sum()} of {interface.size} nodes"
-    if len(maps) > 1:
-        count += f" of sample {row}"
-    if interface.is_plane:
-        place = interface.describe_node(int(np.argmax(maps[row])))
-        return f"values are missing (NaN) at {count}, the first at {place}"
-    first = np.flatnonzero(maps[row] & ~np.roll(maps[row], 1))
-    last = np.flatnonzero(maps[row] & ~np.roll(maps[row], -1))
-    if maps[row].all():
-        first, last = np.array([0]), np.array([-1])
-    elif last[0] < first[0]:  # a gap begins before x = 0 and ends behind it
-        last = np.roll(last, -1)
-    ends = zip(interface.x[first][:SHOWN], interface.x[last][:SHOWN], strict=True)
-    at = ", ".join(f"{a:.6g} m" if a == b else f"{a:.6g} to {b:.6g} m" for a, b in ends)
-    more = f" and {first.size - SHOWN} more gaps" if first.size > SHOWN else ""
-    return f"values are missing (NaN) at x = {at}{more} ({count})"
+    """Return 'values are missing (NaN) at 29 of 1024 nodes, the first at x = 0.0112 m'."""
+    maps = missing.reshape(-1, interface.size)
+    row = int(np.argmax(maps.any(axis=1)))
+    of = f" of sample {row}" if len(maps) > 1 else ""
+    return (
+        f"values are missing (NaN) at {maps[row].sum()} of {interface.size} nodes{of}, the first"
+        f" at {interface.describe_node(int(np.argmax(maps[row])))}"
+    )
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
@@ -289,39 +261,41 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     interface = problem.interface
     position = result["critical_position"]
     places = np.reshape(position.values, (-1, len(interface.shape)))
-    inside = _missing_near(interface, places, measured, interface.spacings)
     rate = problem.uniform_rate
     patch = interface.spacings if rate is None else problem.nucleation_lengths(rate)
-    near = _missing_near(interface, places, measured, [0.5 * h for h in patch]) & ~inside
-    for where, what in ((inside, "the onset"), (near, "the critical patch")):
+    inside = _missing_near(places, measured, interface, interface.spacings)
+    near = _missing_near(places, measured, interface, [0.5 * h for h in patch]) & ~inside
+    for where, what, verb in (
+        (inside, "the onset", "lies in"),
+        (near, "the critical patch", "reaches into"),
+    ):
         if where.any():
             first = zip(interface.dims, places[int(np.argmax(where))], strict=True)
             at = ", ".join(f"{dim} = {place:.6g} m" for dim, place in first)
-            verb = "lies in" if where is inside else "reaches into"
             warn_accuracy(
                 f"{what} at {at} {verb} a gap of the profile ({where.sum()} of {where.size}"
                 " samples): the strength there was filled in, not measured"
             )
-    dims = tuple(dim for dim in position.dims if dim != "direction")
-    attributes = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
-    result[IN_GAP] = (dims, inside.reshape([position.sizes[dim] for dim in dims]), attributes)
-    one = measured.shape[0] == 1
-    along = interface.dims if one else ("sample", *interface.dims)
+    found = position.isel(direction=0, drop=True) if interface.is_plane else position
+    about = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
+    result[IN_GAP] = (found.dims, inside.reshape(found.shape), about)
+    one = len(measured) == 1
     nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
-    mask = {MEASURED: (along, measured[0] if one else measured)}
-    return result.assign_coords(nodes | mask)
+    mask = (interface.dims, measured[0]) if one else (("sample", *interface.dims), measured)
+    return result.assign_coords(nodes | {MEASURED: mask})
 
 
-def _missing_near(interface: Any, places: Any, measured: Mask, reach: Sequence[float]) -> Mask:
-    """Whether nodes nearer than `reach` (m, in each direction) to places (k, D) are missing."""
-    found = np.zeros(len(places), dtype=np.bool_)
-    maps = np.broadcast_to(measured, (len(places), *interface.shape))
-    for i in np.flatnonzero(np.isfinite(places).all(axis=1)):
-        near = []
-        for place, length, nodes, most in zip(
-            places[i], interface.lengths, interface.coordinates.values(), reach, strict=True
-        ):
-            apart = np.abs(np.mod(nodes - place + 0.5 * length, length) - 0.5 * length)
-            near.append(apart < (1.0 - 1e-9) * most)
-        found[i] = not maps[i][np.ix_(*near)].all()
-    return found
+def _missing_near(
+    places: Array, measured: Mask, interface: Interface, reach: Sequence[float]
+) -> Mask:
+    """Return whether nodes nearer than `reach` (m, by direction) to places (k, D) are missing."""
+    missing = ~measured
+    for axis, (nodes, length) in enumerate(
+        zip(interface.coordinates.values(), interface.lengths, strict=True)
+    ):
+        apart = nodes - places[:, axis, np.newaxis]
+        apart = np.abs(np.mod(apart + 0.5 * length, length) - 0.5 * length)
+        near = apart < (1.0 - 1e-9) * reach[axis]
+        along = (nodes.size if i == axis else 1 for i in range(len(interface.shape)))
+        missing = missing & near.reshape(len(places), *along)
+    return np.asarray(missing.any(axis=interface.axes))

@@ -1,20 +1,18 @@
-"""Files of measured data: text tables, .npy and NetCDF, with nothing trusted."""
+"""Files of measured data: text tables, .npy and NetCDF. Nothing in them is trusted."""
 
 from __future__ import annotations
 
 import csv
 import io
-import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.model import describe
-from stiction.profiles.placing import OF_A_PLANE
 from stiction.profiles.units import parse
 
 if TYPE_CHECKING:
@@ -27,50 +25,37 @@ LARGEST = 2**30
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
 _WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*$")
-_WHOLE = re.compile(r"[+-]?\d+$")
 
 
-def load(path: Path, dims: tuple[str, ...]) -> xr.Dataset | xr.DataArray:
+def load(path: Path) -> xr.Dataset | xr.DataArray:
     """Read a file: its variables, those of a table along 'row', or the one array of an .npy."""
     import xarray as xr
 
     ending = path.suffix.lower()
     if ending in TEXT:
         return read_table(path)
-    if ending in NETCDF:
-        _content(path, read=False)
-        try:
-            # Times are not decoded: a variable in seconds is refused by its unit, like any other.
-            with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
-                flat = opened.squeeze(drop=True)
-                some = [name for name, one in flat.items() if one.ndim == len(dims)]
-                return flat[[name for name in some if flat[name].dtype.kind in "fiu"]].load()
-        except (
-            OSError,
-            ValueError,
-            RuntimeError,
-            LookupError,
-            AttributeError,
-            TypeError,
-        ) as error:
-            raise InputError(f"is not a NetCDF file of numbers: {error}") from None
-    if ending != ".npy":
+    if ending == ".npy":
+        array = _read_npy(path)
+        return xr.DataArray(array, dims=("x", "y")[: array.ndim])
+    if ending not in NETCDF:
         raise InputError(
             f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r};"
             " export text from the instrument's software, or give a DataArray"
         )
-    array = read_npy(path)
-    if array.ndim != len(dims) or array.size == 0:
-        hint = f"; save columns as text{OF_A_PLANE}" * (array.ndim == 2)
-        valid = "(nodes,)" if len(dims) == 1 else "(nx, ny)"
-        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    return xr.DataArray(array, dims=dims)
+    _content(path, read=False)
+    try:
+        # Times are not decoded: a variable in seconds is refused by its unit, like any other.
+        with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
+            data = opened.squeeze(drop=True)
+            return data[[name for name, one in data.items() if one.dtype.kind in "fiu"]].load()
+    except Exception as error:  # the library lets through whatever a broken file leads to
+        raise InputError(f"is not a NetCDF file of numbers: {error}") from None
 
 
 def _content(path: Path, *, read: bool = True) -> bytes:
-    """All of a regular file of reasonable size."""
+    """Return the bytes of a regular file of reasonable size."""
     try:
-        size = os.stat(path).st_size
+        size = path.stat().st_size
         if not path.is_file():
             raise InputError("is not a regular file")
         if size > LARGEST:
@@ -80,7 +65,7 @@ def _content(path: Path, *, read: bool = True) -> bytes:
         raise InputError(f"cannot be read: {error.strerror or error}") from None
 
 
-def read_npy(path: Path) -> Array:
+def _read_npy(path: Path) -> Array:
     data = _content(path)
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
@@ -89,7 +74,10 @@ def read_npy(path: Path) -> Array:
         raise InputError(f"is not a .npy file of numbers: {text}") from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise InputError(f"must hold numbers, got {getattr(array, 'dtype', 'an archive')}")
-    return np.squeeze(array.astype(np.float64))
+    array = np.squeeze(array.astype(np.float64))
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise InputError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
+    return array
 
 
 def read_table(path: Path) -> xr.Dataset:
@@ -100,8 +88,8 @@ def read_table(path: Path) -> xr.Dataset:
     the last one before the numbers names the columns if no other line does. Names may have a line
     of units below them, and lines of another number of cells above them.
 
-    The columns are variables along 'row', NaN where a cell is empty, with `units`, `heading` and
-    `number` (from 0) as attributes; those without names are called by their numbers.
+    The columns are variables along 'row', NaN where a cell is empty, with `units` and `heading` as
+    attributes; those without names are called by their numbers, from 0.
     """
     import xarray as xr
 
@@ -115,22 +103,25 @@ def read_table(path: Path) -> xr.Dataset:
     separator = _separator([line for _, line in lines])
     rows = [(number, _split(line, separator)) for number, line in lines]
     header = []
-    while rows and not any(_number(cell, separator) is not None for cell in rows[0][1]):
+    while rows and all(_number(cell, separator) is None for cell in rows[0][1]):
         header.append(rows.pop(0))
     if not rows:
         raise InputError("holds no numbers")
-    width = len(rows[0][1])
-    pairs = separator == "," and not header and width == 2
-    if pairs and all(_WHOLE.match(cell) for _, cells in rows for cell in cells):
+    start, first = rows[0]
+    if not header and comment:
+        cells = [comment] if len(first) == 1 else _split(comment, separator)
+        header = [(0, cells)] if len(cells) == len(first) else []
+    integers = all(re.fullmatch(r"[+-]?\d+", cell) for _, cells in rows for cell in cells)
+    if separator == "," and not header and len(first) == 2 and integers:
         raise InputError(
-            f"line {rows[0][0]}: {','.join(rows[0][1])!r} may be one number or two; separate"
-            " columns with ';', or write decimal points"
+            f"line {start}: {','.join(first)!r} may be one number or two; separate columns"
+            " with ';', or write decimal points"
         )
-    columns = np.full((width, len(rows)), np.nan)
+    columns = np.full((len(first), len(rows)), np.nan)
     for place, (number, cells) in enumerate(rows):
-        if len(cells) != width:
+        if len(cells) != len(first):
             raise InputError(
-                f"line {number} has {len(cells)} columns, line {rows[0][0]} has {width}"
+                f"line {number} has {len(cells)} columns, line {start} has {len(first)}"
             )
         for column, cell in enumerate(cells):
             value = _number(cell, separator)
@@ -138,20 +129,16 @@ def read_table(path: Path) -> xr.Dataset:
                 columns[column, place] = value
             elif cell.lower() not in _EMPTY:
                 raise InputError(f"line {number}: {describe(cell)} is not a number")
-    if not header and comment:
-        cells = [comment] if width == 1 else _split(comment, separator)
-        header = [(0, cells)] if len(cells) == width else []
-    variables: dict[str, Any] = {}
-    for number, (name, attributes) in enumerate(_headings(header, width)):
-        if name in variables:
-            heading = attributes["heading"]
-            name = heading if heading not in variables else f"{name} {number}"
-        variables[name] = ("row", columns[number], {"number": number} | attributes)
-    return xr.Dataset(variables)
+    data = xr.Dataset()
+    for number, (name, about) in enumerate(_headings(header, len(first))):
+        if name in data:
+            name = about["heading"] if about["heading"] not in data else f"{name} {number}"
+        data[name] = ("row", columns[number], about)
+    return data
 
 
 def _text(path: Path) -> str:
-    """The text of a file: UTF-8, UTF-16 with a mark, or else Windows' western code page."""
+    """Return the text of a file in UTF-8, UTF-16 with a mark, or else Windows' western code."""
     data = _content(path)
     try:
         wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
@@ -195,7 +182,7 @@ def _number(cell: str, separator: str) -> float | None:
 def _headings(
     header: list[tuple[int, list[str]]], width: int
 ) -> list[tuple[str, dict[str, str]]]:
-    """Name and attributes of each column."""
+    """Return the name and the attributes of each column."""
     if not header:
         return [(str(number), {}) for number in range(width)]
     rows = [(number, cells) for number, cells in header if len(cells) == width]
@@ -219,17 +206,15 @@ def _headings(
     return found
 
 
-def name_and_unit(text: str) -> tuple[str, str | None]:
+def name_and_unit(text: str) -> tuple[str, str]:
     """Take a heading apart: 'strength (MPa)', 'tau / MPa', 'x_mm', 'x in mm', 'tau MPa'."""
-    match = _BRACKETS.match(text)
-    if match:
-        return match["name"].strip(), match["unit"] or None
+    if match := _BRACKETS.match(text):
+        return match["name"].strip(), match["unit"]
     if " / " in text:
         name, unit = text.split(" / ", 1)
         return name.strip(), unit.strip()
-    parts = re.split(r"[\s,_:]+(?:in\s+)?", text.strip())
-    if len(parts) > 1 and len(parts[-1]) > 1 and parse(parts[-1]) is not None:
-        return text[: text.rindex(parts[-1])].rstrip(" ,_:").removesuffix(" in"), parts[-1]
-    if parse(text) is not None and len(text) > 1:
-        return "", text
-    return text.strip(), None
+    *before, last = re.split(r"[\s,_:]+(?:in\s+)?", text.strip())
+    if len(last) > 1 and parse(last) is not None:  # one letter may be the name
+        name = text[: text.rindex(last)].rstrip(" ,_:") if before else ""
+        return name.removesuffix(" in"), last
+    return text.strip(), ""

@@ -15,12 +15,12 @@ from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.model import Number, check_memory, checked, describe, is_finite, model
-from stiction.problem import PROFILES
 from stiction.random.conditioning import Conditioning
 from stiction.random.mapping import from_normal
 from stiction.random.marginals import AnyMarginal
 from stiction.random.random_field import RandomField
 from stiction.random.synthesis import BLOCK, block_of, standard_normal
+from stiction.results import PROFILES
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
@@ -201,7 +201,7 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """The random properties by name, in the order of `stiction.problem.PROFILES`."""
+        """The random properties by name, in the order of `stiction.results.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property

@@ -11,7 +11,7 @@ from stiction.ensemble.limit_state import Event, LimitState
 from stiction.errors import InputError, UnitWarning, warn_user
 from stiction.methods import MethodObject, label, study_attributes
 from stiction.model import Count, Number, Positive, Progress, Real, checked
-from stiction.problem import PROFILES, Problem
+from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
@@ -29,7 +29,7 @@ from stiction.reliability.answer import (
 from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
-from stiction.results import ONSET_VARIABLES, along
+from stiction.results import ONSET_VARIABLES, PROFILES, along
 
 PILOT = 1_000
 """Plain samples by which the algorithm is chosen."""

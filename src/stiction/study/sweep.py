@@ -23,7 +23,7 @@ from stiction.model import (
     to_plain,
 )
 from stiction.profiles.reading import is_profile, profile_in_file
-from stiction.results import Variable
+from stiction.results import PROFILES, Variable
 
 MOST_POINTS = 100_000
 _FIXED = (
@@ -35,16 +35,11 @@ _FIXED = (
     "sweep",
 )
 _TABLES = ("problem", "random", "method", "ensemble", "save")
-_UNITS = {
+_UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "length": "m",
     "correlation_length": "m",
-    "critical_slip": "m",
     "shear_modulus": "Pa",
     "density": "kg m-3",
-    "weakening_rate": "Pa m-1",
-    "residual_strength": "Pa",
-    "initial_stress": "Pa",
-    "normal_pressure": "Pa",
     "low": "Pa",
     "high": "Pa",
     "loc": "Pa",
