@@ -19,7 +19,7 @@ def machined(k):
     return np.exp(-(((k - groove) / (0.1 * groove)) ** 2)) + 0.3 * np.exp(-((k / groove) ** 2))
 
 
-own = st.CustomSpectrum(function=machined)
+own = st.CustomSpectrum(function=machined, max_wavenumber=3.0 * groove)
 power_law = st.PowerLawSpectrum(correlation_length=1e-3)
 alike = power_law.with_efolding_length(own.efolding_length)
 onsets = {}

@@ -8,7 +8,6 @@ from scipy.stats import kstest
 from setups import beta_strength, make_problem
 
 import stiction as st
-from stiction.random.conditioning import basis
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import conditioning
 from stiction.random.random_interface import _conditioned
@@ -28,7 +27,7 @@ def coarse():
 def scan(interface, places, field=FIELD, seed=7):
     """Values of one sample at places (dimensions, points), between the nodes by its own waves."""
     draws = field.draws(interface, 1, seed)
-    phi = basis(field.modes(interface), field.mean_mode, interface.lengths, places)
+    phi = field.modes(interface).basis(places)
     return from_normal(field.marginal, phi @ draws[0])
 
 
@@ -71,7 +70,7 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, between_nodes,
     across = correlation(field, interface, grid, places)
     inner = correlation(field, interface, places, places) + np.diag(error**2)
     weights = np.linalg.solve(inner, across.T).T
-    phi = basis(field.modes(interface), mean_mode, interface.lengths, grid)
+    phi = field.modes(interface).basis(grid)
     mean, deviation = conditioning(given, interface).moments(phi)
     covariance = correlation(field, interface, grid, grid) - weights @ across.T
     np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
@@ -176,7 +175,8 @@ def test_a_scan_tells_of_the_factor_of_its_specimen():
         given = FIELD.given(on_line(LINE.x[:20], measured), noise=noise)
         random = st.RandomInterface(strength=given, between={"strength": factor})
         ((_, known),) = _conditioned(random, LINE)
-        u = known.specimen(np.random.default_rng(i).standard_normal(400))
+        u = np.random.default_rng(i).standard_normal(400)
+        u = np.interp(u, known.score, known.quantile)
         factors = from_normal(factor, u)
         ranks.append(np.mean(factors < truth))
         spreads.append(factors.std())

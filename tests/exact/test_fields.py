@@ -36,7 +36,6 @@ def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
         st.PowerLawSpectrum(correlation_length=0.3, exponent=1.2, power_kept=0.9),
         st.SquaredExponentialSpectrum(correlation_length=0.3, power_kept=0.9),
         st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.9),
-        st.CustomSpectrum(function=lambda k: np.exp(-0.5 * k * k), power_kept=0.9),
     ],
 )
 def test_truncation_by_power_keeps_that_power(spectrum):
@@ -173,12 +172,6 @@ def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength)
     np.testing.assert_array_equal(with_mean[:, 1:], a)
 
 
-def test_streams_are_different(make_strength):
-    a, b = (make_strength(1.0).draws(LINE, 256, seed=1, stream=i) for i in (0, 1))
-    # 256 x 144 products of independent normals: standard deviation of the mean 0.0052.
-    assert abs(np.mean(a * b)) < 5 * 0.0052
-
-
 def test_field_stays_between_the_bounds(make_strength):
     profiles = make_strength(1.0).sample(LINE, samples=256)
     assert profiles.min() >= 0.66e6
@@ -194,11 +187,11 @@ def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
     assert np.ptp(profiles[:, 0]) > 0.5e6
 
 
-def test_draws_are_defined_by_seed_stream_block_and_mode():
+def test_draws_are_defined_by_seed_block_and_mode():
     """The promise of reproducibility, spelled out with numpy alone."""
     field = field_of(scipy.stats.norm(), 0.05)
-    found = field.draws(LINE, 1, seed=7, first=300, stream=2)[0]
-    key = np.random.SeedSequence(entropy=7, spawn_key=(2, 1))  # sample 300 lies in block 1
+    found = field.draws(LINE, 1, seed=7, first=300)[0]
+    key = np.random.SeedSequence(entropy=7, spawn_key=(0, 1))  # sample 300 lies in block 1
     block = np.random.Generator(np.random.PCG64DXSM(key)).standard_normal((12, 256))
     np.testing.assert_array_equal(found, block[2:, 300 - 256])
 
@@ -221,7 +214,9 @@ def test_custom_spectrum_agrees_with_the_named_one():
 
 def test_efolding_length_is_the_first_crossing():
     """A narrow band: the correlation oscillates as cos(k_0 x) under a slow envelope."""
-    spectrum = st.CustomSpectrum(function=lambda k: np.exp(-(((k - 3e3) / 30.0) ** 2)))
+    spectrum = st.CustomSpectrum(
+        function=lambda k: np.exp(-(((k - 3e3) / 30.0) ** 2)), max_wavenumber=4e3
+    )
     # cos(k_0 x) = 1/e; the envelope exp(-(30 x)^2/4) takes off 4e-5.
     assert spectrum.efolding_length == pytest.approx(np.arccos(np.exp(-1.0)) / 3e3, rel=1e-4)
 
@@ -362,39 +357,8 @@ def test_truncated_correlation_is_the_sum_of_cosines():
         assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(expected, abs=error)
 
 
-def _top_hat(k):
-    return 1.0 * (k < 3000.0)
-
-
-@pytest.mark.filterwarnings("error")
-def test_custom_spectra_with_steps_and_lines():
-    whole = st.CustomSpectrum(function=_top_hat)
-    assert whole.cutoff() == pytest.approx(0.9997 * 3000.0, rel=1e-9)
+def test_correlation_of_a_custom_spectrum_with_a_step():
+    spectrum = st.CustomSpectrum(function=lambda k: 1.0 * (k < 3000.0), max_wavenumber=1e4)
     lag = np.array([0.0, 1e-3, 1e-2, 10.0])
-    found = st.CustomSpectrum(function=_top_hat, max_wavenumber=1e4).correlation(lag)
+    found = spectrum.correlation(lag)
     np.testing.assert_allclose(found, np.sinc(3000.0 / np.pi * lag), atol=1e-10)
-
-    def line(k):
-        return np.exp(-((k / 500.0) ** 2)) + 50.0 * ((k > 20000.0) & (k < 20010.0))
-
-    spectrum = st.CustomSpectrum(function=line, break_points=(20000.0, 20010.0))
-    wide = 250.0 * np.sqrt(np.pi)
-    share = wide / (wide + 500.0)  # the line itself has 10 x 50
-    assert spectrum.power_within(15000.0) == pytest.approx(share, rel=1e-9)
-    assert 20000.0 < spectrum.cutoff() < 20010.0
-    assert spectrum.power_within(spectrum.cutoff()) == pytest.approx(0.9997, rel=1e-9)
-
-    def narrow(k):
-        return np.exp(-((k / 500.0) ** 2)) + 5e4 * ((k > 20000.0) & (k < 20000.01))
-
-    ends = st.CustomSpectrum(function=narrow, break_points=(20000.0, 20000.01))
-    assert ends.power_within(15000.0) == pytest.approx(share, rel=1e-9)
-
-
-def test_a_density_whose_integral_does_not_converge_is_refused():
-    def density(k):
-        return 1.0 / (1.0 + k)
-
-    with pytest.raises(st.InputError, match=r"does not converge; give max_wavenumber"):
-        st.CustomSpectrum(function=density)
-    assert st.CustomSpectrum(function=density, max_wavenumber=1e3).cutoff() == 1e3

@@ -121,7 +121,7 @@ def test_factor_of_a_singular_matrix():
     [
         ({("strength", "residual"): 0.5}, "did you mean 'residual_strength'"),
         ({("strength", "residual_strength"): 1.5}, r"must be a number in \[-1, 1\], got 1.5"),
-        ({("strength", "critical_slip"): 0.5}, "'critical_slip' is correlated but not random"),
+        ({("strength", "critical_slip"): 0.5}, "'critical_slip' is not random here"),
         ({("strength", "strength"): 0.5}, "two different properties"),
         (0.5, "must map pairs of names to numbers"),
         (

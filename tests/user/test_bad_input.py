@@ -153,8 +153,11 @@ MISTAKES = {
     ),
     # Fields that cannot be
     "lognorm ... finite": lambda: make_strength(marginal=scipy.stats.lognorm(-0.3)),
-    "function ... >= 0": lambda: st.CustomSpectrum(function=lambda k: np.cos(k)),
-    "integral ... positive": lambda: st.CustomSpectrum(function=lambda k: 0.0 * k),
+    "function ... >= 0": lambda: st.CustomSpectrum(np.cos, max_wavenumber=9.0),
+    "modes ... must be positive": lambda: make_strength(
+        spectrum=st.CustomSpectrum(function=lambda k: 0.0 * k, max_wavenumber=1e3)
+    ).modes(LINE),
+    "max_wavenumber=...": lambda: make_strength(spectrum=np.cos),
     "no mode is left ... 0.1 m": lambda: make_strength(1.0).sample(LINE),
     "25000000 modes ... units": lambda: make_strength(1e-8).sample(LINE),
     "draws ... (1, 3)": lambda: make_strength().profiles(LINE, np.zeros((1, 3))),
@@ -276,7 +279,7 @@ def test_objects_are_frozen_compare_and_hash_by_value():
 
 
 def test_a_study_says_which_part_exists_in_python_only():
-    strength = dataclasses.replace(make_strength(), spectrum=st.CustomSpectrum(function=_flat))
+    strength = dataclasses.replace(make_strength(), spectrum=st.CustomSpectrum(_flat, 1e3))
     study = st.Study(
         problem=make_problem(), random=strength, method=st.LocalCriterion(),
         ensemble=st.Ensemble(samples=1),
@@ -295,7 +298,7 @@ def test_a_spectrum_and_a_marginal_name_what_they_lack():
     class Nameless(Marginal):
         type = "nameless"
 
-    with pytest.raises(TypeError, match="power_within, quantile"):
+    with pytest.raises(TypeError, match="cutoff"):
         Ring()
     with pytest.raises(TypeError, match="distribution"):
         Nameless()

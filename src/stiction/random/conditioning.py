@@ -35,7 +35,6 @@ from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memor
 from stiction.profiles.placing import MEASURED
 from stiction.profiles.units import parse
 from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
-from stiction.random.modes import Modes
 from stiction.random.synthesis import condition
 
 NEGLIGIBLE = 1e-8
@@ -55,11 +54,9 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     """Places (rows x, and y on a plane) and values (last row) of what was measured."""
     if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) in (2, 3):  # as kept
         return value
-    read = (info.context or {}).get("read")
-    if read is not None and not isinstance(value, xr.DataArray):
-        table = dict(value) if isinstance(value, dict) else {"file": value}
-        quantity = table.pop("quantity", "strength")
-        value = read(table, quantity)
+    context = info.context or {}
+    if "read" in context and not isinstance(value, xr.DataArray):
+        value = context["read"](value, context.get("quantity", "strength"))
     if isinstance(value, dict) and "dims" in value:
         value = xr.DataArray.from_dict(value)
     if isinstance(value, dict) and "values" in value:
@@ -93,8 +90,8 @@ def _in_si(array: Any) -> Array:
 
 
 def _table(points: Array) -> dict[str, list[float]]:
-    names = ("x", "y")[: len(points) - 1]
-    return dict(zip((*names, "values"), points.tolist(), strict=True))
+    names = ("x", "values") if len(points) == 2 else ("x", "y", "values")
+    return dict(zip(names, points.tolist(), strict=True))
 
 
 Points = Annotated[
@@ -124,17 +121,16 @@ class Conditions:
 
     def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
-        names = interface.dims
-        if len(self.places) != len(names):
-            measured, given = ("xy"[: len(dims)] for dims in (self.places, names))
+        names, places = interface.dims, self.places
+        if len(places) != len(names):
             raise InputError(
-                f"given.profile: was measured over {', '.join(measured)}, the interface runs along"
-                f" {', '.join(given)}"
+                f"given.profile: has {len(places)} coordinates, the interface {len(names)}:"
+                f" {', '.join(names)}"
             )
         problems = [
             f"given.profile: {name} reaches from {row.min():g} to {row.max():g} m, the interface is"
             f" {length:g} m long"
-            for name, row, length in zip(names, self.places, interface.lengths, strict=True)
+            for name, row, length in zip(names, places, interface.lengths, strict=True)
             if row.min() < -1e-9 * length or row.max() > length * (1.0 + 1e-9)
         ]
         low, high = marginal.distribution.support()
@@ -150,17 +146,6 @@ class Conditions:
             raise InputError(problems)
 
 
-def basis(modes: Modes, mean_mode: bool, lengths: Sequence[float], places: Array) -> Array:
-    """Return phi, (points, dimension): z at places (dimensions, points) is phi @ draws."""
-    phase = 2.0 * np.pi * (places / np.array(lengths)[:, None]).T @ modes.numbers[:, 1:]
-    phi = np.empty((phase.shape[0], modes.dimension))
-    start = int(mean_mode)
-    phi[:, :start] = modes.sigma[0]
-    phi[:, start::2] = modes.sigma[1:] * np.cos(phase)
-    phi[:, start + 1 :: 2] = modes.sigma[1:] * np.sin(phase)
-    return phi
-
-
 class Measured(NamedTuple):
     """What was measured of one property: z at its places is phi @ draws, (points, dimension).
 
@@ -173,21 +158,10 @@ class Measured(NamedTuple):
     factor: Any = None
 
     def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
-        """Replace the likelihood of z at each place by a Gaussian.
+        """Replace the likelihood of z at each place by a Gaussian, given z from all else.
 
-        Parameters
-        ----------
-        u : float
-            Draw of the factor between specimens.
-        mean, variance : (points,) arrays
-            Of z from all else.
-
-        Returns
-        -------
-        (points,) arrays
-            Values of z and their precisions.
-        float
-            Logarithm of the factor of the product of all, with unit maxima.
+        `u` is the draw of the factor. Returned are values of z and their precisions, (points,),
+        and the logarithm of the factor of the product of all, with unit maxima.
         """
         factor, law = 1.0, self.marginal.distribution
         if self.factor is not None:
@@ -195,9 +169,7 @@ class Measured(NamedTuple):
         noise, value = self.conditions.noise / factor, self.conditions.values / factor
         # Where the likelihood and z from all else overlap.
         edges = value + REACH * noise * np.array([[-1.0], [1.0]])
-        below = law.cdf(edges)
-        score = np.where(below < 0.5, ndtri(below), -ndtri(law.sf(edges)))
-        score = score.clip(-FURTHEST, FURTHEST)
+        score = _normal_score(law.cdf(edges), law.sf(edges)).clip(-FURTHEST, FURTHEST)
         width = REACH * np.sqrt(variance)
         low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
         low, high = np.where(low < high, (low, high), (mean - width, mean + width))
@@ -217,6 +189,11 @@ class Measured(NamedTuple):
         scale = np.log(total * half[:, 0]) + top[:, 0]
         scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
         return found, precision, float(scale.sum())
+
+
+def _normal_score(below: Array, above: Array) -> Array:
+    """z of which these are the probabilities below and above, from the smaller one."""
+    return np.where(below < 0.5, ndtri(below), -ndtri(above))
 
 
 class Conditioning:
@@ -309,22 +286,17 @@ class Conditioning:
             middle = float(weight @ grid)
             spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, REACH * spread / NODES)
         mass = 0.5 * (weight[1:] + weight[:-1])
-        below, above = np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1]
-        score = np.where(below < 0.5, ndtri(below), -ndtri(above))
+        score = _normal_score(np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1])
         usable = np.isfinite(score)
         self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
         now = self._gaussian(middle, alone)[0]
         return middle, np.array([here for here, _, _ in values]) - now
 
-    def specimen(self, u: Array) -> Array:
-        """Return the draws of the factor between specimens, conditioned."""
-        return u if self.grid is None else np.interp(u, self.score, self.quantile)
-
     def draws(self, draws: Array) -> Array:
         """Return conditioned draws (samples, dimension), a factor between specimens in the last."""
         data, out = self.data, np.array(draws)
         if self.grid is not None:
-            u = out[:, -1] = self.specimen(out[:, -1])
+            u = out[:, -1] = np.interp(out[:, -1], self.score, self.quantile)
             data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
         share = 1.0 + self.values**2
         transposed = np.ascontiguousarray(self.right.T)

@@ -202,22 +202,20 @@ class Gamma(_ByMoments):
 
 @model(kw_only=True)
 class TruncatedNormal(_ByMoments):
-    """Normal distribution cut off at `low` and `high`.
+    """Normal distribution truncated at `low` and `high`.
 
     Parameters
     ----------
-    mean : float
-        Mean of the field, that is after the cut; between `low` and `high`.
-    cv : float
-        Standard deviation over mean, after the cut.
+    mean, cv : float
+        Mean of the field and its standard deviation over the mean, both after truncation.
     low, high : float, optional
         0 and no upper bound if left out.
 
     Raises
     ------
     InputError
-        If no cut normal distribution has these moments: it scatters less than an
-        exponential, between two bounds less than a uniform, distribution.
+        If no truncated normal distribution has these moments: it scatters less than an
+        exponential distribution, and between two bounds less than a uniform one.
 
     Examples
     --------
@@ -244,19 +242,17 @@ class TruncatedNormal(_ByMoments):
                 mean, variance = scipy.stats.truncnorm.stats(*parameters(guess))
             except (FloatingPointError, ValueError):
                 return np.array([1e3, 1e3])
-            return np.array(
-                [(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0]
-            )
+            errors = (mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0
+            return np.array(errors)
 
         # An exponential distribution, and between two bounds a uniform one, are the widest.
         room = min(self._excess**2, self._excess * max(high - self.mean, 0.0) / 2.0)
         found = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if found is None or not np.abs(moments(found.x)).max() < 1e-8:
             raise InputError(
-                f"no normal distribution truncated at low={self.low:g} and high={high:g}"
-                f" has mean={self.mean:g} and cv={self.cv:g}: the mean must lie between"
-                " the bounds, and these limit the scatter; lower cv or the bound, or"
-                " take st.Lognormal or st.Beta"
+                f"no normal distribution truncated at low={self.low:g} and high={high:g} has"
+                f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between the bounds,"
+                " and these limit the scatter; lower cv or the bound, or take st.Lognormal"
             )
         return scipy.stats.truncnorm(*parameters(found.x))
 
@@ -267,7 +263,7 @@ class TruncatedNormal(_ByMoments):
 
 @dataclass(frozen=True)
 class ScipyMarginal(Marginal):
-    """A continuous `scipy.stats` distribution, known by scipy's name and the given parameters.
+    """A continuous `scipy.stats` distribution by its name and parameters.
 
     One without a name in scipy is kept `frozen`: it exists in Python only and equals only itself.
     """
@@ -294,8 +290,8 @@ class ScipyMarginal(Marginal):
 
     @property
     def location_and_scale(self) -> tuple[float, float]:
-        own = {"loc": 0.0, "scale": 1.0} | dict(self.parameters)
-        return own["loc"], own["scale"]
+        own = dict(self.parameters)
+        return own.get("loc", 0.0), own.get("scale", 1.0)
 
     def plain(self) -> dict[str, Any]:
         """Return what a study file holds."""

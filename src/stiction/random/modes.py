@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -20,53 +20,70 @@ HAIR = 1.0 + 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The discrete spectrum on an interface.
+    """The discrete spectrum on an interface: J modes, and the mean mode in front.
 
     Attributes
     ----------
+    interface : Interface
     sigma : (J + 1,) array
-        Standard deviations of modes 0..J; their squares sum to 1. The first is zero
-        without the mean mode.
+        Standard deviations; their squares sum to 1. The first is zero without the mean mode.
     numbers : (dimensions, J + 1) array of int
         Their wave vectors in units of 2 pi/length; of k and -k, one.
     ranks : (J,) array of int
-        Places of modes 1..J in the order of draws, rising, whatever the spectrum leaves
-        out. On a line these are the numbers of the waves.
-    dimension : int
-        Number of standard normal draws a sample.
+        Places of modes 1..J in the order of draws, rising, whatever the spectrum leaves out.
+    has_mean : bool
+        Whether the mean mode is drawn.
     """
 
+    interface: Interface
     sigma: Array
     numbers: NDArray[np.int64]
     ranks: NDArray[np.int64]
-    dimension: int
+    has_mean: bool
 
     @property
     def count(self) -> int:
         """J, the number of modes without the mean; on a line the highest."""
-        return self.sigma.size - 1
+        return self.ranks.size
+
+    @property
+    def dimension(self) -> int:
+        """Number of standard normal draws a sample."""
+        return 2 * self.ranks.size + int(self.has_mean)
 
     @property
     def highest(self) -> tuple[int, ...]:
         """Largest wave number in each direction, in units of 2 pi/length."""
         return tuple(int(most) for most in np.abs(self.numbers).max(axis=1))
 
-    def unresolved(self, interface: Interface) -> float:
-        """Return the share of the variance at wavelengths that the nodes do not resolve."""
-        limit = np.array(interface.shape)[:, None] // 2
+    @property
+    def unresolved(self) -> float:
+        """Share of the variance at wavelengths that the nodes do not resolve."""
+        limit = np.array(self.interface.shape)[:, None] // 2
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
-    def gaussian(self, draws: Array, has_mean: bool, shape: tuple[int, ...]) -> Array:
+    def gaussian(self, draws: Array) -> Array:
         """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
 
         One inverse transform a sample, so that the numbers do not depend on the batch.
         """
-        numbers = self.numbers
+        numbers, shape = self.numbers, self.interface.shape
         if len(shape) == 1:
             numbers = np.concatenate([np.zeros_like(numbers), numbers])
         out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
-        synthesise(draws, self.sigma, numbers, has_mean, out)
+        synthesise(draws, self.sigma, numbers, self.has_mean, out)
         return out.reshape(-1, *shape)
+
+    def basis(self, places: Array) -> Array:
+        """Return phi, (points, dimension): z at places (dimensions, points) is phi @ draws."""
+        lengths = np.array(self.interface.lengths)[:, None]
+        phase = 2.0 * np.pi * (places / lengths).T @ self.numbers[:, 1:]
+        phi = np.empty((phase.shape[0], self.dimension))
+        start = int(self.has_mean)
+        phi[:, :start] = self.sigma[0]
+        phi[:, start::2] = self.sigma[1:] * np.cos(phase)
+        phi[:, start + 1 :: 2] = self.sigma[1:] * np.sin(phase)
+        return phi
 
 
 @lru_cache(maxsize=256)
@@ -84,15 +101,12 @@ def make_modes(
     reach = cutoff / units * HAIR
     if reach.max() < 1.0 and not mean_mode:
         raise InputError(
-            "spectrum: no mode is left on an interface of"
-            f" {' x '.join(f'{length:g}' for length in interface.lengths)} m: the first mode is at"
-            f" {units.min():.3g} rad/m, the spectrum is truncated at {cutoff:.3g} rad/m; shorten"
-            " the correlation length, lengthen the interface or raise the truncation"
+            f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
+            f" is at {units.min():.3g} rad/m, the spectrum is truncated at {cutoff:.3g} rad/m;"
+            " shorten the correlation length, lengthen the interface or raise the truncation"
         )
     numbers = _numbers(interface, reach)
-    wavenumbers: Array = np.abs(units[0] * numbers[0])
-    if dimensions == 2:
-        wavenumbers = np.hypot(wavenumbers, units[1] * numbers[1])
+    wavenumbers = reduce(np.hypot, units[:, None] * numbers, np.zeros(1))
     kept = np.flatnonzero(wavenumbers <= cutoff * HAIR)
     ranks, numbers = kept[1:], numbers[:, kept]
     power = np.zeros(kept.size)
@@ -109,7 +123,7 @@ def make_modes(
     sigma = np.sqrt(power / total)
     for array in (sigma, numbers, ranks):
         array.flags.writeable = False
-    return Modes(sigma, numbers, ranks, 2 * ranks.size + int(mean_mode))
+    return Modes(interface, sigma, numbers, ranks, mean_mode)
 
 
 def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
@@ -121,11 +135,12 @@ def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
     if reach.size == 1:
         _refuse_too_many(reach[0])
         return np.arange(math.floor(reach[0]) + 1)[None, :]
-    _refuse_too_many(max(0.5 * math.pi * float(np.prod(reach)), reach.max()))
     proportion = interface.lengths[0] / interface.lengths[1]
     along, across = max(1, round(proportion)), max(1, round(1.0 / proportion))
-    shells = int(np.ceil(np.max(np.floor(reach) / [along, across])))
-    _refuse_too_many(2.0 * along * across * shells * shells / 8.0)
+    count = float(np.ceil(np.max(np.floor(reach) / [along, across])))
+    rectangle = 2.0 * along * across * count * count
+    _refuse_too_many(max(0.5 * math.pi * float(np.prod(reach)), rectangle / 8.0))
+    shells = int(count)
     jx = np.arange(-along * shells, along * shells + 1)
     jy = np.arange(across * shells + 1)
     x, y = (part.ravel() for part in np.meshgrid(jx, jy, indexing="ij"))
@@ -138,6 +153,6 @@ def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
 def _refuse_too_many(modes: float) -> None:
     if not modes <= MOST_MODES:
         raise InputError(
-            f"spectrum: has {modes:.10g} modes on this interface, at most {MOST_MODES}"
-            " are allowed; truncate it earlier, or check the units of the lengths"
+            f"spectrum: has {modes:.10g} modes on this interface, at most {MOST_MODES} are"
+            " allowed; truncate it earlier, or check the units of the lengths"
         )

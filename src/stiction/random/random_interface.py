@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property, lru_cache, reduce
+from itertools import chain
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, PlainSerializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
@@ -40,10 +47,10 @@ def _pairs(value: Any) -> dict[str, dict[str, float]]:
         )
     flat: list[tuple[Any, Any]] = []
     for key, inner in value.items():
-        if isinstance(inner, Mapping):
-            flat += [((key, other), rho) for other, rho in inner.items()]
-        else:
-            flat.append((key, inner))
+        nested = isinstance(inner, Mapping)
+        flat += (
+            [((key, other), rho) for other, rho in inner.items()] if nested else [(key, inner)]
+        )
     found: dict[str, dict[str, float]] = {}
     for pair, rho in flat:
         if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
@@ -88,7 +95,7 @@ class Stream(NamedTuple):
     ranks: NDArray[np.int64]  # modes drawn, for the property and all that it is correlated with
     mean_mode: bool  # whether the mean mode is drawn
     columns: slice  # of the vector of all draws
-    own: slice | NDArray[np.int64] = slice(None)  # of `columns`: modes of the property itself
+    own: NDArray[np.int64]  # of `columns`: modes of the property itself
 
 
 @model(kw_only=True)
@@ -148,19 +155,16 @@ class RandomInterface:
     correlation: Correlation | None = None
     between: dict[str, AnyMarginal] | None = None
 
-    @model_validator(mode="before")
+    @field_validator(*NAMES, mode="before")
     @classmethod
-    def _name_quantities(cls, given: Any) -> Any:
-        """Name the quantity that a measured profile in a study file holds, for its reader."""
-        found = dict(given) if isinstance(given, dict) else {}
-        for name, field in found.items():
-            known = field.get("given") if isinstance(field, dict) else None
-            if isinstance(known, dict) and isinstance(known.get("profile"), str | dict):
-                quantity = {"quantity": "friction_coefficient" if field.get("of") else name}
-                profile = known["profile"]
-                profile = {"file": profile} if isinstance(profile, str) else profile
-                found[name] = field | {"given": known | {"profile": quantity | profile}}
-        return found or given
+    def _name_quantity(cls, field: Any, info: ValidationInfo) -> Any:
+        """Tell the reader of a study file which quantity a measured profile holds."""
+        if info.context is not None and isinstance(field, dict):
+            coefficient = field.get("of") is not None
+            info.context["quantity"] = (
+                "friction_coefficient" if coefficient else info.field_name
+            )
+        return field
 
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
@@ -174,17 +178,19 @@ class RandomInterface:
             problems.append(
                 f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}"
             )
-        correlated = self.correlation or {}
+        correlated, between = self.correlation or {}, self.between or {}
+        tables = {
+            "correlation": [*correlated, *chain(*correlated.values())],
+            "between": between,
+        }
         problems += [
-            f"correlation: {name!r} is correlated but not random here"
-            for name in (name for one, others in correlated.items() for name in (one, *others))
+            f"{table}: {name!r} is not random here (valid: {', '.join(self.names)})"
+            for table, given in tables.items()
+            for name in given
             if name not in self.names
         ]
-        for name, marginal in (self.between or {}).items():
+        for name, marginal in between.items():
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
-            if name not in self.names:
-                valid = ", ".join(self.names)
-                problems.append(f"between: {name!r} is not random here (valid: {valid})")
             if low < 0.0 or abs(float(mean) - 1.0) > 1e-6:
                 problems.append(
                     f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
@@ -212,11 +218,10 @@ class RandomInterface:
     @property
     def matrix(self) -> Array:
         """Correlation matrix of the properties, in the order of `names`."""
-        names = self.names
-        matrix = np.eye(len(names))
+        matrix = np.eye(len(self.names))
         for one, others in (self.correlation or {}).items():
             for other, rho in others.items():
-                i, j = names.index(one), names.index(other)
+                i, j = self.names.index(one), self.names.index(other)
                 matrix[i, j] = matrix[j, i] = rho
         return matrix
 
@@ -259,12 +264,11 @@ class RandomInterface:
             draws[:, columns] = known.draws(draws[:, columns])
         streams, found = _layout(self, interface), {}
         independent = [draws[:, stream.columns] for stream in streams]
-        for name, stream, row in zip(
-            self.names, streams, lower_factor(self.matrix), strict=False
-        ):
+        rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
+        for (name, field), stream, row in rows:
             mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
             own = np.ascontiguousarray(mixed[:, stream.own])
-            found[name] = self.properties[name].mapped(interface, own)
+            found[name] = from_normal(field.marginal, field.gaussian(interface, own))
         factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
         for (name, marginal), u in factors:
             found[name] *= from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))
@@ -275,11 +279,7 @@ class RandomInterface:
     ) -> dict[str, Array]:
         """Sample profiles by name, (samples, *shape) each, in the unit of each property.
 
-        Parameters
-        ----------
-        interface : Interface
-        samples, seed, first : int
-            Sample i depends on (seed, i) only.
+        Sample i depends on (seed, i) only.
         """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
@@ -301,17 +301,15 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
         ranks = reduce(np.union1d, [one.modes(interface).ranks for one in group])
         mean_mode = any(one.mean_mode for one in group)
         columns = slice(start, start + 2 * ranks.size + int(mean_mode))
-        own: slice | NDArray[np.int64] = slice(None)
-        modes = field.modes(interface)
-        if modes.dimension < columns.stop - start:
-            places = np.searchsorted(ranks, modes.ranks)
-            pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
-            own = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        places = np.searchsorted(ranks, field.modes(interface).ranks)
+        pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
+        own = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
         found.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, own))
         start = columns.stop
+    none = np.arange(0)
     for column, name in enumerate(random.between or (), start):
         number, columns = BETWEEN + NAMES.index(name), slice(column, column + 1)
-        found.append(Stream(number, BLOCK, np.arange(0), True, columns))
+        found.append(Stream(number, BLOCK, none, True, columns, none))
     return found
 
 

@@ -5,7 +5,7 @@ field on a line. That fixes the density in D dimensions as a function of the len
 wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
 added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the truncated
 spectrum, so correlations and lengths are of that. To add a spectrum, derive from
-`SpectralDensity`, or from `ScaledSpectrum` if it has one length, and add it to `SPECTRA`.
+`ScaledSpectrum` and add it to `SPECTRA`.
 """
 
 from __future__ import annotations
@@ -30,50 +30,31 @@ from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
-ACCURACY = 1e-12
-LARGEST_ERROR = 1e-6
+ACCURACY, LARGEST_ERROR = 1e-12, 1e-6
 """Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
 
 
 class SpectralDensity(ABC):
-    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite.
-
-    One of your own has `density`, `power_within` and its inverse `quantile`.
-    """
-
-    power_kept: float | None = None
-    default_power: ClassVar[float] = 0.9997
-    """Share of the power retained by truncation if nothing is given."""
+    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
 
     @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         """Return the density at wave vectors of length k (rad/m), up to a factor."""
 
     @abstractmethod
-    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Return the share of the power at wave vectors shorter than `wavenumber` (rad/m)."""
-
-    @abstractmethod
-    def quantile(self, share: float, dimensions: int = 1) -> float:
-        """Return the wavenumber (rad/m) below which a share of the power lies."""
-
-    def _edges(self, end: float) -> Array:
-        """Wavenumbers (rad/m) from 0 to `end` between which the density is smooth: octaves."""
-        octaves = np.exp2(np.arange(math.log2(LONGEST), math.log2(SHORTEST)))
-        return np.unique([0.0, *octaves[octaves < end], end])
-
     def cutoff(self, dimensions: int = 1) -> float:
         """Return the wavenumber above which the spectrum is truncated, rad/m."""
-        share = self.default_power if self.power_kept is None else self.power_kept
-        return self.quantile(share, dimensions)
+
+    @property
+    def scale(self) -> float:
+        """Wavenumber (rad/m) at which integrals begin to go octave by octave."""
+        return 1e-6 * self.cutoff()
 
     def correlation(self, lag: Array) -> Array:
         """Return the correlation of z at `lag` (m), truncation included, on a line."""
         edges, power = _truncated(self)
-        density = moment(self, 0)
-        found = [
-            integrate(density, edges, float(one), power).sum() for one in np.abs(np.ravel(lag))
-        ]
+        lags = np.abs(np.ravel(lag)).tolist()
+        found = [_integrate(self, edges, lag=one, power=power) for one in lags]
         return np.reshape(found, np.shape(lag)) / power
 
     @property
@@ -82,68 +63,78 @@ class SpectralDensity(ABC):
         return lag_of_correlation(self, math.exp(-1.0))
 
 
-def integrate(
-    density: Callable[[float], float], edges: Array, lag: float = 0.0, power: float = math.inf
-) -> Array:
-    """Integrate a density times cos(k lag) over each interval between `edges`.
+def _integrate(
+    spectrum: SpectralDensity,
+    edges: Array,
+    order: int = 0,
+    lag: float = 0.0,
+    power: float = math.inf,
+) -> float:
+    """Integrate g(k) k^order cos(k lag) from the first of `edges` to the last, piece by piece.
 
     `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides
-    which errors are small: 1e-12 of it, and of each part otherwise.
+    which errors are small: 1e-12 of it, and of each piece otherwise.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
     options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
+
+    def density(k: float) -> float:
+        return float(spectrum.density(np.array([k]))[0]) * k**order
+
     parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
     found, errors = np.array(parts).T
     size = min(power, float(np.abs(found).sum()))
     if not np.all(np.isfinite(found)) or errors.sum() > LARGEST_ERROR * size:
-        raise InputError(
-            "function: its integral over wavenumbers does not settle; name the wavenumbers at which"
-            " it jumps or peaks in break_points"
-        )
-    return np.asarray(found)
-
-
-def moment(spectrum: SpectralDensity, order: int) -> Callable[[float], float]:
-    """Return the density on a line times a power of the wavenumber, as a function of that."""
-    return lambda k: float(spectrum.density(np.array([k]))[0]) * k**order
+        raise InputError("function: its integral over wavenumbers does not converge")
+    return float(found.sum())
 
 
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
-    """Edges of intervals up to the cutoff, rad/m, and the power below it, up to a factor."""
-    edges = spectrum._edges(spectrum.cutoff())
-    return edges, float(integrate(moment(spectrum, 0), edges).sum())
+    """Ends of octaves up to the cutoff, rad/m, and the power below it, up to a factor."""
+    scale, end = spectrum.scale, spectrum.cutoff()
+    octaves = scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / scale))))
+    edges = np.concatenate(([0.0], octaves[octaves < end], [end]))
+    return edges, _integrate(spectrum, edges)
 
 
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Return the first lag at which the correlation of z on a line falls to `target`, m."""
     edges, power = _truncated(spectrum)
-    first, second = (float(integrate(moment(spectrum, m), edges).sum()) for m in (1, 2))
-    slope, step = first / power, 0.25 * math.sqrt(power / second)
+    slope = _integrate(spectrum, edges, order=1) / power
+    step = 0.25 * math.sqrt(power / _integrate(spectrum, edges, order=2))
+
+    def excess(lag: float) -> float:
+        return float(spectrum.correlation(np.array(lag))) - target
+
     before = lag = 0.0
-    excess = 1.0 - target
-    while excess > 0.0:
+    above = 1.0 - target
+    while above > 0.0:
         # The correlation falls no faster than by the mean wavenumber, and is nearly straight
         # between lags that are close against the root mean square of the wavelengths.
-        before, lag = lag, lag + max(excess / slope, step)
-        excess = float(spectrum.correlation(np.array(lag))) - target
+        before, lag = lag, lag + max(above / slope, step)
+        above = excess(lag)
         step *= 1.005  # for spectra whose power sits far below their truncation
-    root: float = brentq(
-        lambda ratio: float(spectrum.correlation(np.array(ratio * lag))) - target,
-        before / lag, 1.0, xtol=1e-15, rtol=1e-14,
-    )  # fmt: skip
-    return root * lag
+    ratio: float = brentq(
+        lambda ratio: excess(ratio * lag), before / lag, 1.0, xtol=1e-15, rtol=1e-14
+    )
+    return ratio * lag
 
 
 @model
 class ScaledSpectrum(SpectralDensity):
-    """Base class of spectra with one length: g depends on k times it only."""
+    """Base class of spectra with one length: g depends on k times it only.
+
+    One of your own has `density`, `power_within` and its inverse `quantile`.
+    """
 
     correlation_length: Positive
     truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Share | None = dataclasses.field(default=None, kw_only=True)
+    default_power: ClassVar[float] = 0.9997
+    """Share of the power retained by truncation if nothing is given."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Any:
@@ -156,23 +147,26 @@ class ScaledSpectrum(SpectralDensity):
             raise InputError("give truncation or power_kept, not both")
         return self
 
+    @abstractmethod
+    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the share of the power at wave vectors shorter than `wavenumber` (rad/m)."""
+
+    @abstractmethod
+    def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber (rad/m) below which a share of the power lies."""
+
     @property
     def scale(self) -> float:
         """Wavenumber in units of which the density is one function, rad/m."""
         return 1.0 / self.correlation_length
 
-    def _edges(self, end: float) -> Array:
-        octaves = self.scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / self.scale))))
-        return np.concatenate(([0.0], octaves[octaves < end], [end]))
-
     def cutoff(self, dimensions: int = 1) -> float:
         if self.truncation is not None:
             return self.truncation * 2.0 * math.pi / self.correlation_length
-        return super().cutoff(dimensions)
+        return self.quantile(self.power_kept or self.default_power, dimensions)
 
     @property
     def efolding_length(self) -> float:
-        """Distance at which the correlation of z first falls to 1/e, m, on a line."""
         # Searched for once a shape: a sweep may hold a hundred thousand lengths.
         unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
@@ -189,9 +183,8 @@ class _PowerOfWavenumber(ScaledSpectrum):
     exponent = 1.0
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        ratio = np.asarray(wavenumber) / self.scale
-        result: Array = (1.0 + ratio * ratio) ** -(self.exponent + 0.5 * (dimensions - 1))
-        return result
+        ratio = wavenumber / self.scale
+        return (1.0 + ratio * ratio) ** -(self.exponent + 0.5 * (dimensions - 1))
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         ratio = (wavenumber / self.scale) ** 2
@@ -246,7 +239,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     def untruncated_correlation(self, lag: Array) -> Array:
         order = self.exponent - 0.5
-        a = np.abs(np.asarray(lag, dtype=np.float64)) * self.scale
+        a = np.abs(lag) * self.scale
         with np.errstate(divide="ignore", invalid="ignore"):
             log_value = (1.0 - order) * math.log(2.0) - gammaln(order) + order * np.log(a)
             log_value = log_value + np.log(kve(order, a)) - a
@@ -270,8 +263,7 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     type: Literal["squared_exponential"] = "squared_exponential"
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        result: Array = np.exp(-((np.asarray(wavenumber) * self.correlation_length / 2.0) ** 2))
-        return result
+        return np.asarray(np.exp(-((wavenumber * self.correlation_length / 2.0) ** 2)))
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         half = wavenumber * self.correlation_length / 2.0
@@ -282,8 +274,7 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
         return 2.0 / self.correlation_length * math.sqrt(square)
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        result: Array = np.exp(-((np.asarray(lag) / self.correlation_length) ** 2))
-        return result
+        return np.asarray(np.exp(-((lag / self.correlation_length) ** 2)))
 
 
 @model
@@ -295,16 +286,10 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     """
 
     type: Literal["exponential"] = "exponential"
-
     default_power: ClassVar[float] = 0.99
 
     def untruncated_correlation(self, lag: Array) -> Array:
-        result: Array = np.exp(-np.abs(np.asarray(lag)) / self.correlation_length)
-        return result
-
-
-LONGEST, SHORTEST = 1e-6, 1e12
-"""Wavenumbers between which a spectrum of one's own is integrated octave by octave, rad/m."""
+        return np.asarray(np.exp(-np.abs(lag) / self.correlation_length))
 
 
 def _refuse_to_write(function: Any) -> Any:
@@ -316,89 +301,40 @@ def _refuse_to_write(function: Any) -> Any:
 class CustomSpectrum(SpectralDensity):
     """User-defined spectrum: any g(k), up to a factor.
 
+    It exists in Python only: a study with a function cannot be written to a file.
+
     Parameters
     ----------
     function : callable
-        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative,
-        integrable. On a plane it is the density there, at wave vectors of length k, so that
-        g(k) k must be integrable; a line cut through the plane then has another spectrum
-        than g.
-    max_wavenumber : float, optional
-        Truncation, rad/m; by `power_kept` if left out.
-    power_kept : float, optional
-        Share of the power retained by truncation; 0.9997 if neither is given.
-    break_points : sequence of float
-        Wavenumbers (rad/m, positive) at which g jumps or has a peak. Anything narrower than
-        a tenth of an octave needs its two ends here, or it may be missed.
-
-    Notes
-    -----
-    It exists in Python only: a study with a function cannot be written to a file. The
-    function is integrated by adaptive quadrature (`scipy.integrate.quad`), octave by octave.
+        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative. On a
+        plane it is the density there, at wave vectors of length k; a line cut through the
+        plane then has another spectrum than g.
+    max_wavenumber : float
+        Truncation, rad/m.
     """
 
     function: Annotated[
         Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})
     ]
-    max_wavenumber: Positive | None = None
-    power_kept: Share | None = None
-    break_points: tuple[Positive, ...] = ()
+    max_wavenumber: Positive
     type: Literal["custom"] = "custom"
 
     @model_validator(mode="after")
     def _is_a_density(self) -> CustomSpectrum:
-        if self.max_wavenumber is not None and self.power_kept is not None:
-            raise InputError("give max_wavenumber or power_kept, not both")
+        wavenumbers = self.max_wavenumber * np.linspace(0.0, 1.0, 64)
         try:
-            values = self.density(np.geomspace(1e-3, 1e6, 64))
+            values = self.density(wavenumbers)
         except Exception as error:
             raise InputError(f"function: fails on an array of wavenumbers: {error!r}") from None
         if values.shape != (64,) or not np.all(np.isfinite(values)) or values.min() < 0.0:
             raise InputError("function: must map (m,) wavenumbers to (m,) finite values >= 0")
-        _cumulative(self, 1)
         return self
-
-    def _edges(self, end: float) -> Array:
-        return np.unique([*super()._edges(end), *(k for k in self.break_points if k < end)])
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
         return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
 
-    def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        edges, sums = _cumulative(self, dimensions)
-        end = min(wavenumber, float(edges[-1]))
-        before = max(int(np.searchsorted(edges, end)) - 1, 0)
-        part = integrate(moment(self, dimensions - 1), np.array([edges[before], end]))
-        return min(float((sums[before] + part[0]) / sums[-1]), 1.0)
-
-    def quantile(self, share: float, dimensions: int = 1) -> float:
-        edges, sums = _cumulative(self, dimensions)
-        above = int(np.searchsorted(sums, share * sums[-1]))
-        root: float = brentq(
-            lambda k: self.power_within(k, dimensions) - share,
-            edges[above - 1], edges[above], xtol=1e-300,
-        )  # fmt: skip
-        return root
-
     def cutoff(self, dimensions: int = 1) -> float:
-        return self.max_wavenumber or super().cutoff(dimensions)
-
-
-@lru_cache(maxsize=64)
-def _cumulative(spectrum: CustomSpectrum, dimensions: int) -> tuple[Array, Array]:
-    """Edges of octaves, rad/m, and the power below each, up to a factor."""
-    edges = spectrum._edges(spectrum.max_wavenumber or SHORTEST)
-    sums = np.cumsum([0.0, *integrate(moment(spectrum, dimensions - 1), edges)])
-    if not 0.0 < sums[-1] < np.inf:
-        raise InputError("function: its integral over wavenumbers must be positive and finite")
-    last = 1.0 - np.interp(1e-3 * SHORTEST, edges, sums) / sums[-1]
-    if spectrum.max_wavenumber is None and last > 1e-3:
-        raise InputError(
-            f"function: {100.0 * last:.2g} % of its power lies above {1e-3 * SHORTEST:g}"
-            f" rad/m: the integral of g(k){' k' * (dimensions - 1)} does not converge;"
-            " give max_wavenumber"
-        )
-    return edges, sums
+        return self.max_wavenumber
 
 
 SPECTRA: dict[str, Any] = {
@@ -409,19 +345,17 @@ SPECTRA: dict[str, Any] = {
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return the spectrum of one, of a table {type, ...}, or of a function g(k)."""
+    """Return the spectrum of one, or of a table {type, ...}."""
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):
         found: SpectralDensity = from_table(SPECTRA, value)
         return found
-    if callable(value) and not isinstance(value, type):
-        return CustomSpectrum(function=value)
     raise InputError(
-        "must be a spectrum such as st.PowerLawSpectrum(...), not its class, or a function g(k),"
-        f" got {describe(value)}"
+        "must be a spectrum such as st.PowerLawSpectrum(...), not its class, or"
+        f" st.CustomSpectrum(function=g, max_wavenumber=...), got {describe(value)}"
     )
 
 
 Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of)]
-"""Any of the spectra above, or a function g(k)."""
+"""Any of the spectra above."""

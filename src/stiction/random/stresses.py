@@ -1,7 +1,6 @@
 """Random properties of a problem as stresses: friction coefficients times the normal pressure."""
 
 from collections.abc import Mapping
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
-WORTH_SAYING = 1e-6
-MOST = 0.5
+WORTH_SAYING, MOST = 1e-6, 0.5
+"""Shares of the strength at or below the residual strength that are warned of, and refused."""
 QUANTILES, PRESSURES = 2000, 64
 """Equally likely values that stand for a random residual strength and a normal pressure."""
 
@@ -38,43 +37,39 @@ def profiles_in_stress(
     """Return sampled profiles with coefficients multiplied by the pressure at each node."""
     found = dict(profiles)
     for name in coefficients_of(random):
-        pressure = profiles.get("normal_pressure", problem.load.normal_pressure)
-        found[name] = found[name] * pressure
+        found[name] = found[name] * profiles.get(
+            "normal_pressure", problem.load.normal_pressure
+        )
     return found
-
-
-def range_of_product(one: tuple[Any, Any], other: tuple[Any, Any]) -> tuple[float, float]:
-    """Return the bounds of a product of two numbers in these ranges, which may be infinite."""
-    ends = [0.0 if a == 0.0 or b == 0.0 else float(a * b) for a in one for b in other]
-    return min(ends), max(ends)
 
 
 def support_in_stress(
     problem: Problem, random: RandomInterface, name: str
 ) -> tuple[float, float]:
     """Return the values between which a property lies, Pa, with its factor between specimens."""
-    factor = (random.between or {}).get(name)
-    marginals = [random.properties[name].marginal, *([factor] if factor else [])]
-    ends = [marginal.distribution.support() for marginal in marginals]
-    if random.properties[name].of is not None and "normal_pressure" in random.names:
-        ends.append(support_in_stress(problem, random, "normal_pressure"))
-    elif random.properties[name].of is not None:
-        ends.append(
-            (np.min(problem.load.normal_pressure), np.max(problem.load.normal_pressure))
-        )
-    return reduce(range_of_product, ends, (1.0, 1.0))
+    field, between = random.properties[name], random.between or {}
+    low, high = field.marginal.distribution.support()
+    factors = [between[name].distribution.support()] if name in between else []
+    if field.of is not None and "normal_pressure" in random.names:
+        factors.append(support_in_stress(problem, random, "normal_pressure"))
+    elif field.of is not None:
+        pressure = problem.load.normal_pressure
+        factors.append((np.min(pressure), np.max(pressure)))
+    for one in factors:  # positive; 0 times infinity is 0 here
+        ends = [a * b if a and b else 0.0 for a in (low, high) for b in one]
+        low, high = min(ends), max(ends)
+    return float(low), float(high)
 
 
-def _equally_likely(distribution: Any, count: int) -> Array:
-    found: Array = distribution.ppf((np.arange(count) + 0.5) / count)
+def _equally_likely(marginal: Any, count: int) -> Array:
+    found: Array = marginal.distribution.ppf((np.arange(count) + 0.5) / count)
     return found
 
 
 def _pressures(problem: Problem, random: RandomInterface) -> Array:
     """Pressures that a point may have, equally likely."""
     if "normal_pressure" in random.names:
-        field = random.properties["normal_pressure"]
-        return _equally_likely(field.marginal.distribution, PRESSURES)
+        return _equally_likely(random.properties["normal_pressure"].marginal, PRESSURES)
     flat = np.sort(np.ravel(problem.load.normal_pressure))
     return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
@@ -91,24 +86,16 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     Properties are taken as independent.
     """
     fields, between = random.properties, random.between or {}
-    residual, coefficients = np.asarray(problem.friction.residual_strength), False
+    pressed = coefficients_of(random)
+    residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
-        field = fields["residual_strength"]
-        coefficients = field.of is not None
-        residual = _equally_likely(field.marginal.distribution, QUANTILES)
-    factors = {
-        name: _equally_likely(between[name].distribution, PRESSURES)
-        for name in ("residual_strength", "strength")
-        if name in between
-    }
-    if "residual_strength" in factors:
-        residual = np.outer(residual, factors["residual_strength"])
-    if coefficients and fields["strength"].of is None:
-        residual = np.outer(residual, _pressures(problem, random))
-    elif fields["strength"].of is not None and not coefficients:
-        residual = np.outer(residual, 1.0 / _pressures(problem, random))
-    if "strength" in factors:
-        residual = np.outer(residual, 1.0 / factors["strength"])
+        residual = _equally_likely(fields["residual_strength"].marginal, QUANTILES)
+    one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
+    for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
+        if name in between:
+            residual = np.outer(residual, _equally_likely(between[name], PRESSURES) ** power)
+        if one_sided and name in pressed:
+            residual = np.outer(residual, _pressures(problem, random) ** power)
     return float(np.mean(fields["strength"].marginal.distribution.cdf(residual)))
 
 
@@ -123,16 +110,16 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
     if share <= WORTH_SAYING:
         return
     low, high = support_in_stress(problem, random, "strength")
-    said = (
+    found = (
         f"strength: {100.0 * share:.3g} % of its marginal, which reaches from {low:g} to"
         f" {high:g} Pa, lies at or below the residual strength"
     )
     if share > MOST:
         raise InputError(
-            f"{said}: most of the interface would not weaken at all. Raise the strength, lower the"
-            " residual strength, or check the unit of both (Pa)"
+            f"{found}: most of the interface would not weaken at all. Raise the strength, lower"
+            " the residual strength, or check the unit of both (Pa)"
         )
     warn_accuracy(
-        f"{said}; there the interface does not weaken. If this is not intended, lower the"
+        f"{found}; there the interface does not weaken. If this is not intended, lower the"
         " residual strength or choose a marginal that stays above it"
     )

@@ -29,13 +29,10 @@ def standard_normal(
     mean_mode: bool,
     block: int = BLOCK,
 ) -> Array:
-    """Draw samples number `first`, `first` + 1, ..., of a stream of a seed.
+    """Draw samples `first`, `first` + 1, ... of a stream: (samples, dimension).
 
-    Returns
-    -------
-    (samples, dimension) array
-        A, B of one mode after the other, of those of the given `ranks` (rising), with A_0
-        in front if `mean_mode`. `block` samples share a generator.
+    A row has A, B of one mode after the other, of those of the given `ranks` (rising), with A_0
+    in front if `mean_mode`. `block` samples share a generator.
     """
     modes = int(ranks[-1]) if ranks.size else 0
     kept: slice | NDArray[np.int64] = slice(2, None)
