@@ -27,6 +27,8 @@ LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
 WEAKEST, STRONGEST = 1e-8, 1.0
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
+LEAST_FRICTION, GREATEST_FRICTION = 1e-3, 10.0
+"""Mean strength over normal pressure, from superlubricity to adhesive gels."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
 weaken."""
@@ -211,17 +213,20 @@ class Problem:
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
         """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
-        ratio = strength / self.solid.shear_modulus
+        ratio, pressure = strength / self.solid.shear_modulus, self.load.normal_pressure
+        coefficient = 1.0 if pressure is None else float(strength / np.mean(pressure))
         if not WEAKEST <= ratio <= STRONGEST:
-            coefficient = 0.0 < strength < 10.0 and self.load.normal_pressure is not None
+            hint = ", and give coefficients as of='friction_coefficient'"
             warn_user(
                 f"strength: its mean, {strength:.4g} Pa, is {ratio:.2g} of the shear modulus; check"
-                " the units of both"
-                + (
-                    ", and give coefficients as of='friction_coefficient'"
-                    if coefficient
-                    else ""
-                ),
+                f" the units of both{hint * (0.0 < strength < 10.0 and pressure is not None)}",
+                UnitWarning,
+            )
+        elif not LEAST_FRICTION <= coefficient <= GREATEST_FRICTION:
+            warn_user(
+                f"strength: its mean, {strength:.4g} Pa, is {coefficient:.2g} of the normal"
+                " pressure; check the units of both, and that friction coefficients are no"
+                " percentages",
                 UnitWarning,
             )
         elif 0.0 < residual < WEAKEST * self.solid.shear_modulus:
@@ -261,9 +266,9 @@ class Problem:
         """
         if self.uniform_rate is None:
             raise InputError(
-                "friction.weakening_rate: a nucleation length needs a uniform weakening rate; pass"
-                " weakening_rate = (strength - residual_strength)/critical_slip if both are"
-                " uniform, otherwise use st.Equilibrium() or st.Rupture()"
+                "friction.weakening_rate: a nucleation length needs a uniform one; give"
+                " weakening_rate, about (strength - residual_strength)/critical_slip, or use"
+                " st.Equilibrium() or st.Rupture(), which need none"
             )
         return self.nucleation_lengths(self.uniform_rate)[0]
 
@@ -308,8 +313,13 @@ class Problem:
             nodes = f"{resolution[0]:.1f} nodes"
             if self.interface.is_plane:
                 nodes = f"{nodes} along x and, in mode III, {resolution[1]:.1f} along y"
+            wanted = 16 if enough <= 12.0 else 32
+            finer = np.ceil(
+                0.5 * np.array(self.interface.shape) * wanted / np.array(resolution)
+            )
             warn_accuracy(
-                f"the nucleation length spans {nodes} (better {enough:g} or more): {cost}"
+                f"the nucleation length spans {nodes}; {wanted} are recommended"
+                f" (interface.nodes = {' x '.join(f'{2 * n:g}' for n in finer)}): {cost}"
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:

@@ -82,7 +82,9 @@ def test_what_comes_back(plane, found):
 
 def test_a_coarse_direction_is_warned_of_by_name(solid):
     coarse = plane_of(solid, (96, 36))
-    with pytest.warns(st.AccuracyWarning, match=r"in mode III, 5\.3 along y \(better 8"):
+    with pytest.warns(
+        st.AccuracyWarning, match=r"in mode III, 5\.3 along y; 16 are recommended"
+    ):
         onset(coarse, smooth((96, 36)))
 
 

@@ -27,6 +27,10 @@ def problem(modulus=1e9, density=1170.0, rate=0.5e12, length=LENGTH, pressure=No
     )
 
 
+def monte_carlo(field):
+    return st.monte_carlo(problem(), field, method=st.LocalCriterion(), samples=2)
+
+
 DOUBTS = {
     "units of shear_modulus = 1e.09 Pa and density = 1.17 kg/m3": lambda: problem(density=1.17),
     "shear wave speed is 0.02924 m/s, which no solid has": lambda: st.Solid(1.0, 0.33, 1170.0),
@@ -35,6 +39,15 @@ DOUBTS = {
     "is 1e.03 of the shear modulus": lambda: problem(slip=2.0).warn_of_units(1e12),
     "its mean, 1 Pa, is 1e-09 of the shear modulus": lambda: st.onset(
         problem(), np.ones(NODES), method=st.LocalCriterion()
+    ),
+    "2e-06 of the normal pressure": lambda: problem(pressure=5e11).warn_of_units(1e6),
+    "percentages": lambda: problem(pressure=5e4).warn_of_units(1e6),
+    "for 2 % give 0.02": lambda: st.Lognormal(mean=1e6, cv=2),
+    "each sample is uniform; check its unit": lambda: monte_carlo(
+        st.RandomField(FIELD.marginal, st.PowerLawSpectrum(4.0), mean_mode=True)
+    ),
+    "friction_coefficient: 8e.07 Pa is 81 times": lambda: st.failure_probability(
+        problem(pressure=2e6), FIELD, friction_coefficient=40, method=st.LocalCriterion()
     ),
     "residual_strength: its mean, 0.45 Pa": lambda: problem().warn_of_units(1e6, 0.45),
 }
@@ -47,6 +60,11 @@ def test_a_wrong_unit_is_doubted(words):
     assert caught[0].filename == __file__
 
 
+@pytest.mark.parametrize("family", [st.Lognormal, st.Weibull, st.Gamma, st.TruncatedNormal])
+def test_a_coefficient_of_variation_in_per_cent_is_refused(family):
+    refuses("at most 10, got 15; for 15 % give 0.15", partial(family, mean=1e6, cv=15))
+
+
 @pytest.mark.parametrize("changes", [{"modulus": 1e3}, {"length": 100.0}])
 def test_more_nodes_than_anybody_has_suggest_a_unit(changes):
     with pytest.raises(st.InputError, match="check the units of all lengths, moduli"):
@@ -57,7 +75,7 @@ def test_ensembles_warn_too_and_point_at_the_caller():
     field = st.RandomField(scipy.stats.uniform(0.3, 0.2), SPECTRUM)
     method = st.LocalCriterion()
     with pytest.warns(st.UnitWarning, match="of the shear modulus") as caught:
-        st.monte_carlo(problem(), field, method=method, samples=2)
+        monte_carlo(field)
     assert {one.filename for one in caught if one.category is st.UnitWarning} == {__file__}
     with pytest.warns(st.UnitWarning, match="of the shear modulus"):
         st.failure_probability(problem(), field, 0.1, method=method)

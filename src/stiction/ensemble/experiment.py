@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.methods import Solver, Values, prepared, variables_of
 from stiction.model import Count, Names, Number, model
 from stiction.problem import Problem, refusals
@@ -78,7 +78,13 @@ class Experiment:
             problems += error.problems
         for name, field in random.properties.items():
             try:
-                field.modes(self.problem.interface)
+                if not field.modes(self.problem.interface).ranks.size:
+                    warn_user(
+                        f"{name}: its correlation length is so long for this interface that each"
+                        " sample is uniform; check its unit, and give scatter between specimens"
+                        " as between= of st.RandomInterface",
+                        UnitWarning,
+                    )
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
         problems += refusals(self.problem, method)

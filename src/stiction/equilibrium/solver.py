@@ -33,11 +33,11 @@ from stiction.results import Variable, position
 
 FINE = 8.0
 """Nodes in the nucleation length below which there is a warning."""
-ROUGHLY = (
-    "single onsets of a line are off by 0.4 % at 9 nodes and by 3 % at 4 for a correlation length"
-    " of a quarter of it, by 3 and 9 % for a tenth; those of a plane by 0.15 % at 9 along x and 6"
-    " along y, by 0.5 % at 6 and 4; Equilibrium(discretization_error=True) estimates it"
-)
+ROUGHLY = {
+    1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
+    " quarter of it, by 3 and 9 % if it is a tenth",
+    2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
+}
 SHARE = 0.5
 """Estimated error, in per cent of the onset, from which on there is a warning."""
 EVENT_CORE = 1e-3
@@ -176,7 +176,9 @@ class Solver:
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
         if self.coarse is None:
-            self.problem.warn_if_coarse(rows, FINE, ROUGHLY)
+            cost = ROUGHLY[len(self.problem.interface.shape)]
+            how = "Equilibrium(discretization_error=True) estimates it"
+            self.problem.warn_if_coarse(rows, FINE, f"{cost}; {how}")
         first, states = self.program.first(rows, self.slip)
         interface = self.problem.interface
         places = slice(POSITION, POSITION + len(interface.shape))

@@ -146,8 +146,13 @@ def _in_order(array: Any) -> Any:
     """Return a profile with rising coordinates; a list of points on a plane becomes a map."""
     if "row" in array.dims:
         array = array.set_index(row=["x", "y"])
-    if not all(index.is_unique for index in array.indexes.values()):
-        raise InputError(f"x repeats: there are two values at one position{OF_A_PLANE}")
+    for index in array.indexes.values():
+        if index.has_duplicates:
+            twin = index[index.duplicated()]
+            raise InputError(
+                f"x repeats: there are two values at {twin[0]} m ({twin.size} such places); keep"
+                f" one of the two, or their mean{OF_A_PLANE}"
+            )
     array = array.unstack()
     return array.sortby([dim for dim in array.dims if dim in array.coords])
 

@@ -19,9 +19,12 @@ from pydantic import model_validator
 from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, is_finite, model
+
+WIDEST = 10.0
+"""Greatest coefficient of variation; from 1 on a warning asks whether it is in per cent."""
 
 
 class Marginal(ABC):
@@ -109,7 +112,16 @@ class _ByMoments(Marginal):
             raise InputError(
                 f"mean and cv: must have finite squares, got mean={self.mean:g}, cv={self.cv:g}"
             )
+        if self.cv > WIDEST:
+            hint = f"; for {self.cv:g} % give {self.cv / 100:g}"
+            raise InputError(f"cv: must be at most {WIDEST:g}, got {self.cv:g}{hint}")
         _ = self.distribution  # there may be none with these moments
+        if self.cv > 1.0:
+            warn_user(
+                f"cv: {self.cv:g} is a standard deviation of {self.cv:g} times the mean; for"
+                f" {self.cv:g} % give {self.cv / 100:g}",
+                UnitWarning,
+            )
         return self
 
     @property

@@ -353,6 +353,7 @@ def as_random_interface(given: Any) -> RandomInterface:
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):
         raise InputError(
-            f"random: must be a RandomInterface or a RandomField, got {describe(given)}"
+            f"random: must be a RandomInterface or a RandomField, got {describe(given)}; a"
+            " profile goes into st.onset, and st.fit_field fits a field to it"
         )
     return given

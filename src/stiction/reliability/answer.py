@@ -20,8 +20,8 @@ from stiction.model import Real, at_least
 from stiction.progress import Meter
 from stiction.reliability.tail import two_levels_refused
 
-TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6)]
-"""A smaller coefficient of variation would take more than 1e12 failures."""
+TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
+"""A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""
 Confidence: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it

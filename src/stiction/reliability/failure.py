@@ -37,7 +37,7 @@ FREQUENT = 0.01
 """From here on plain sampling needs no more evaluations than subset simulation."""
 NEGLIGIBLE = 1e-15
 """Probability that anything slips below which no sample is drawn."""
-DOUBTFUL = 1e-2
+DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 SHOWN = 20
 """Failing profiles kept."""
@@ -138,10 +138,11 @@ def failure_probability(
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
     low, high = state.bounds
     mean = experiment.mean("strength")
-    if max(low, 0.0) < stress < DOUBTFUL * mean:
+    if max(low, 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
+        name = "stress" if friction_coefficient is None else "friction_coefficient"
         warn_user(
-            f"stress: {stress:g} Pa is {stress / mean:.1g} of the mean strength, {mean:.3g} Pa;"
-            " check its unit (Pa), and give a coefficient as friction_coefficient=",
+            f"{name}: {stress:g} Pa is {stress / mean:.2g} times the mean strength, {mean:.3g} Pa;"
+            " check the units (stress in Pa, friction_coefficient without unit)",
             UnitWarning,
         )
     with state.meter:
