@@ -10,10 +10,7 @@ from contextvars import ContextVar
 from difflib import get_close_matches
 from typing import NamedTuple
 
-_SYMBOLS = {
-    "E": "youngs_modulus", "G": "shear_modulus", "nu": "poisson_ratio", "rho": "density",
-    "std": "cv", "sigma": "cv",
-}  # fmt: skip
+_SYMBOLS = {"E": "youngs_modulus", "nu": "poisson_ratio", "rho": "density"}
 _OURS = ("stiction", "pydantic", "dataclasses", "functools")
 
 
@@ -62,7 +59,7 @@ class WorkerError(RunError):
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
     """Text that refuses a name and offers the nearest valid one."""
     names = list(valid)
-    near = get_close_matches(given, names, n=1, cutoff=0.5) or [_SYMBOLS.get(given)]
+    near = get_close_matches(given, names, n=1, cutoff=0.5) or [_SYMBOLS.get(given, "")]
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     hint = f"; did you mean {near[0]!r}?" if near[0] else ""
     return f"{what}: unknown {shown}{hint} (valid: {', '.join(names)})"

@@ -138,7 +138,7 @@ def test_stability_limits(mode, ratio, plane, courant):
 
 def test_a_coarse_grid_warns_with_the_error_to_expect():
     for nodes, text in (
-        (48, "7.4 nodes .*: expect more than 15 %"),
+        (48, "7.4 nodes; .*: expect more than 15 %"),
         (80, "expect up to 6 %"),
     ):
         problem = make_problem(nodes=nodes)
