@@ -56,13 +56,18 @@ class WorkerError(RunError):
     """Workers died or could not be reached."""
 
 
-def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
-    """Text that refuses a name and offers the nearest valid one."""
+def unknown(given: str, valid: Iterable[str]) -> str:
+    """Return a text that refuses a name and offers the nearest valid one."""
     names = list(valid)
     near = get_close_matches(given, names, n=1, cutoff=0.5) or [_SYMBOLS.get(given, "")]
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     hint = f"; did you mean {near[0]!r}?" if near[0] else ""
-    return f"{what}: unknown {shown}{hint} (valid: {', '.join(names)})"
+    return f"unknown {shown}{hint} (valid: {', '.join(names)})"
+
+
+def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
+    """Return the same text, which begins with what the name is for."""
+    return f"{what}: {unknown(given, valid)}"
 
 
 @contextmanager

@@ -92,29 +92,26 @@ def cache_folder() -> Path:
     return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
 
 
-def private_folder(root: Path, *inside: str) -> Path:
-    """A folder in `root`, made if need be, in which nobody else can have put anything.
+def private_folder(folder: Path) -> Path:
+    """Return a folder, made if need be, in which nobody else can have put anything.
 
     Compiled kernels are pickles: who can write one can run code as whoever loads it.
 
     Raises
     ------
     InputError
-        If `root` or a folder below it belongs to somebody else, or others may write there.
+        If it belongs to somebody else, or others may write there.
     """
-    folder = root
-    for part in ("", *inside):
-        folder = folder / part
-        try:
-            folder.mkdir(mode=0o700, parents=part == "", exist_ok=True)
-            found = folder.stat()
-        except OSError:  # nothing can be kept there: kernels are compiled each time
-            return root.joinpath(*inside)
-        foreign = hasattr(os, "getuid") and found.st_uid not in (os.getuid(), 0)
-        if foreign or (os.name == "posix" and found.st_mode & 0o022):
-            problem = "belongs to another user" if foreign else "can be written by others"
-            raise InputError(
-                f"cache: {folder} {problem}, who could put compiled code there that runs as you;"
-                " set STICTION_CACHE_DIR (or NUMBA_CACHE_DIR) to a folder of your own"
-            )
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError:  # nothing can be kept there: kernels are compiled each time
+        return folder
+    foreign = hasattr(os, "getuid") and found.st_uid not in (os.getuid(), 0)
+    if foreign or (os.name == "posix" and found.st_mode & 0o022):
+        problem = "belongs to another user" if foreign else "can be written by others"
+        raise InputError(
+            f"cache: {folder} {problem}, who could put compiled code there that runs as you;"
+            " set STICTION_CACHE_DIR (or NUMBA_CACHE_DIR) to a folder of your own"
+        )
     return folder

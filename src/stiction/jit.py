@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numba
 import numpy as np
-from numba.core import caching, event
+from numba.core import caching
 
 from stiction.files import cache_folder, private_folder
 
@@ -24,28 +24,8 @@ ZERO: Any = np.int64(0)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-
-class _Compilation(event.Listener):
-    """Says once for each part of the package that its kernels are being compiled."""
-
-    def __init__(self) -> None:
-        self.parts: set[str] = set()
-
-    def on_start(self, event: event.Event) -> None:
-        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-        # A function made by exec has no module, its __module__ is None.
-        package, _, rest = str(getattr(function, "__module__", "")).partition(".")
-        part = rest.partition(".")[0]
-        if package == "stiction" and part not in self.parts:
-            self.parts.add(part)
-            logger.warning("compiling kernels: %s (on first use only, then cached)", part)
-
-    def on_end(self, event: event.Event) -> None:
-        pass
-
-
-event.register("numba:compile", _Compilation())
-
+_KEPT = numba.config.CACHE_DIR
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
 
@@ -76,9 +56,8 @@ def _folder(module: str) -> Path:
     type inside kernels and belong to every state.
     """
     texts = _kernel_sources()
-    reached = {name for name in texts if name.startswith("stiction.friction")}
-    reached |= {module} & texts.keys()
-    waiting = list(reached)
+    waiting = [name for name in texts if name == module or name.startswith("stiction.friction")]
+    reached = set(waiting)
     while waiting:
         for source, member in _IMPORT.findall(texts[waiting.pop()]):
             names = {source.decode(), f"{source.decode()}.{member.decode()}"}
@@ -86,13 +65,7 @@ def _folder(module: str) -> Path:
             waiting += new
             reached |= new
     digest = hashlib.sha256(b"".join(texts[name] for name in sorted(reached))).hexdigest()[:16]
-    if _KEPT:
-        return private_folder(Path(_KEPT), digest)
-    return private_folder(cache_folder(), "compiled", digest)
-
-
-_KEPT = numba.config.CACHE_DIR
-_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    return private_folder((Path(_KEPT) if _KEPT else cache_folder() / "compiled") / digest)
 
 
 class _Locator(caching._CacheLocator):
@@ -140,20 +113,24 @@ class _Cache(caching.FunctionCache):
     _impl_class = _Format
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        return super().load_overload(signature, target) if _is_own(signature) else None
+        found = super().load_overload(signature, target) if _is_own(signature) else None
+        if found is None:
+            _announce(self._py_func.__module__.split(".")[1:2])
+        return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
         if _is_own(signature):
             super().save_overload(signature, data)
 
 
-def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
-    """Compile on first call, cached on disk where that is possible."""
-    compiled: Any = numba.njit(**options)(function)
-    with contextlib.suppress(RuntimeError):  # numba finds no folder in which it may write
-        compiled._cache = _Cache(function)
-    result: Kernel = compiled
-    return result
+_announced: set[str] = set()
+
+
+def _announce(part: list[str]) -> None:
+    """State once for each part of the package that its kernels are being compiled."""
+    for name in {*part} - _announced:
+        _announced.add(name)
+        logger.warning("compiling kernels: %s (on first use only, then cached)", name)
 
 
 def _is_own(kind: Any) -> bool:
@@ -164,6 +141,15 @@ def _is_own(kind: Any) -> bool:
     if named is not None and not named.__module__.startswith("stiction."):
         return False
     return _is_own(getattr(kind, "types", ()))
+
+
+def _compile(function: Kernel, options: dict[str, Any]) -> Kernel:
+    """Compile on first call, cached on disk where that is possible."""
+    compiled: Any = numba.njit(**options)(function)
+    with contextlib.suppress(RuntimeError):  # numba finds no folder in which it may write
+        compiled._cache = _Cache(function)
+    result: Kernel = compiled
+    return result
 
 
 def jit(function: Kernel) -> Kernel:

@@ -106,7 +106,8 @@ def methods() -> Mapping[str, Any]:
     return MappingProxyType(found)
 
 
-def _method(value: Any) -> Any:
+def as_method(value: Any) -> Any:
+    """Return a method, or raise a ValueError that names what it lacks."""
     if isinstance(value, type):
         raise ValueError(f"must be an object; write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
@@ -120,7 +121,7 @@ def _method(value: Any) -> Any:
     return value
 
 
-MethodObject: TypeAlias = Annotated[Any, BeforeValidator(_method)]
+MethodObject: TypeAlias = Annotated[Any, BeforeValidator(as_method)]
 """Annotation of an argument that is a method; see `stiction.model.checked`."""
 
 

@@ -12,7 +12,7 @@ import operator
 import os
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
@@ -30,7 +30,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError, unknown
 from stiction.progress import Show
 
 T = TypeVar("T")
@@ -40,15 +40,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # -- kinds of values -----------------------------------------------------------------------------
 
 
-def _is_real(value: Any) -> bool:
-    """Numbers of any library, but no text and no truth values, which pydantic would convert."""
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
-
-
 def _number(value: Any) -> float:
+    """A number of any library, but no text and no truth value, which pydantic would convert."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if not _is_real(value):
+    if not isinstance(value, numbers.Real) or isinstance(value, bool):
         raise ValueError("must be a number")
     try:
         return float(value)
@@ -57,12 +53,12 @@ def _number(value: Any) -> float:
 
 
 def _count(value: Any) -> int:
-    """Whole numbers of any library, 1e4 too."""
-    if isinstance(value, numbers.Integral) and _is_real(value):
+    """A whole number of any library; 1e4 counts as one."""
+    if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
-    if not _is_real(value) or not float(value).is_integer():
+    if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
         raise ValueError("must be a whole number")
-    return int(float(value))
+    return int(value)
 
 
 def is_whole(value: Any, least: int) -> bool:
@@ -82,7 +78,7 @@ def is_finite(value: Any) -> bool:
 
 
 def real_array(value: Any) -> Array:
-    """`value` as a float64 array, or a TypeError that names what it is instead."""
+    """Return `value` as a float64 array, or raise a TypeError that names what it is instead."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise TypeError("got a masked array")
     try:
@@ -93,6 +89,13 @@ def real_array(value: Any) -> Array:
         kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
         raise TypeError(f"got {kind}")
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+
+
+def _numbers(value: Any) -> Array:
+    try:
+        return real_array(value)
+    except (TypeError, OverflowError) as error:
+        raise InputError(f"must be numbers; {error}") from None
 
 
 def is_unplaced(value: Any) -> bool:
@@ -136,59 +139,48 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _numbers(value: Any) -> Array:
-    try:
-        return real_array(value)
-    except (TypeError, OverflowError) as error:
-        raise InputError(f"must be numbers; {error}") from None
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be True or False")
+    return bool(value)
 
 
-def _is_flag(value: Any) -> bool:
-    return isinstance(value, bool | np.bool_)
+def _show(value: Any) -> Any:
+    if callable(value) and not isinstance(value, type):
+        return value
+    return _flag(value)
 
 
-def _is_show(value: Any) -> bool:
-    return _is_flag(value) or (callable(value) and not isinstance(value, type))
+def _names(value: Any) -> tuple[str, ...]:
+    names = tuple(value) if isinstance(value, list | tuple | set | frozenset) else (value,)
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError("must be a name or a list of names")
+    return names
 
 
-def _is_text(value: Any) -> bool:
-    """Whether it is valid UTF-8, which TOML, JSON and NetCDF need."""
-    return isinstance(value, str) and value == value.encode(errors="ignore").decode()
-
-
-def _is_path(value: Any) -> bool:
+def _path(value: Any) -> Path:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
-    if not text or not _is_text(text) or "\0" in text:
-        return False
-    return all(len(os.fsencode(part)) <= 255 for part in Path(text).parts)
-
-
-def _listed(names: Any) -> tuple[Any, ...]:
-    return tuple(names) if isinstance(names, list | tuple | set | frozenset) else (names,)
-
-
-def _are_names(value: Any) -> bool:
-    return all(isinstance(name, str) for name in _listed(value))
-
-
-def _must(
-    be: str, valid: Callable[[Any], bool], made: Callable[[Any], Any] = lambda value: value
-) -> BeforeValidator:
-    """Return the validator of an annotation that refuses what is not `valid`."""
-
-    def read(value: Any) -> Any:
-        if not valid(value):
-            raise ValueError(f"must be {be}")
-        return made(value)
-
-    return BeforeValidator(read)
+    valid = isinstance(text, str) and text == text.encode(errors="ignore").decode()
+    if (
+        not valid
+        or not text
+        or "\0" in text
+        or max(map(len, Path(text).parts), default=0) > 255
+    ):
+        raise ValueError("must be a path in UTF-8, each name at most 255 letters")
+    return Path(text)
 
 
 @functools.cache
 def at_least(least: int) -> Any:
     """Return the annotation of a whole number not below `least`."""
-    valid = functools.partial(is_whole, least=least)
-    return Annotated[int, _must(f"a whole number >= {least}", valid, int)]
+
+    def read(value: Any) -> int:
+        if not is_whole(value, least):
+            raise ValueError(f"must be a whole number >= {least}")
+        return int(value)
+
+    return Annotated[int, BeforeValidator(read)]
 
 
 Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
@@ -196,7 +188,6 @@ Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
 """Whole numbers from 1 and from 0; 1e4 counts as one."""
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
-Seconds: TypeAlias = Positive
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
 """Real numbers of any shape, as a float64 array."""
 PROFILE_SCHEMA = [
@@ -211,44 +202,36 @@ Profile: TypeAlias = Annotated[
     PlainSerializer(_plain),
     WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
 ]
-"""A number, or a read-only array of shape (nodes,)."""
-OptionalProfile: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(lambda value, info: None if value is None else _profile(value, info)),
-    PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": [*PROFILE_SCHEMA, {"type": "null"}]}),
-]
-"""The same, or None for 'not given'."""
-Flag: TypeAlias = Annotated[bool, _must("True or False", _is_flag, bool)]
-Progress: TypeAlias = Annotated[Show, _must("True, False or a function", _is_show)]
+OptionalProfile: Any = Profile | None
+"""A number, or a read-only array of shape (nodes,); or None for 'not given'."""
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
+Progress: TypeAlias = Annotated[Show, BeforeValidator(_show)]
 """True, False, or a function of (done, total)."""
-Text: TypeAlias = Annotated[str, _must("text in UTF-8", _is_text)]
-Names: TypeAlias = Annotated[
-    tuple[str, ...], _must("a name or a list of names", _are_names, _listed)
-]
+Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
+"""Text in valid UTF-8; pydantic looks at it only if its length is limited."""
+Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
 """One name or several, as a tuple."""
-FilePath: TypeAlias = Annotated[
-    Path, _must("a path in UTF-8, each name at most 255 bytes", _is_path, Path)
-]
+FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
 Mode: TypeAlias = Literal["II", "III"]
 
 
 # -- mistakes ------------------------------------------------------------------------------------
 
 
+class _Inside(InputError):
+    """Mistakes inside a model, as pairs of a path and a text."""
+
+    def __init__(self, found: list[tuple[str, str]]) -> None:
+        super().__init__(text for _, text in found)
+        self.found = found
+
+
 def describe(value: Any) -> str:
-    """Short form of what was given, for messages."""
+    """Return a short form of what was given, for messages."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}"
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _models_in(annotation: Any) -> list[type]:
-    """The model classes that an annotation mentions: X, X | Y, Annotated[X | Y, ...]."""
-    if dataclasses.is_dataclass(annotation):
-        return [annotation] if isinstance(annotation, type) else []
-    return [cls for part in typing.get_args(annotation) for cls in _models_in(part)]
 
 
 def keys_of(cls: Any) -> dict[str, str]:
@@ -258,91 +241,72 @@ def keys_of(cls: Any) -> dict[str, str]:
     return {(name in known and known[name].alias) or name: name for name in names}
 
 
-def _hints(cls: type) -> dict[str, Any]:
-    hints = typing.get_type_hints(cls, include_extras=True)
-    return {key: hints[name] for key, name in keys_of(cls).items()}
+def _mistakes(
+    error: pydantic.ValidationError, valid: Sequence[str], call: bool
+) -> list[tuple[str, str]]:
+    """Return the mistakes that pydantic found in one model or call, each with its path.
 
-
-def _place(
-    owner: Any, location: tuple[int | str, ...]
-) -> tuple[list[str], list[str], list[type]]:
-    """The path as the user wrote it, the keys valid in its last step, the models valid there.
-
-    Pydantic numbers positional arguments, and puts the chosen member of a union into the path.
+    `valid` are the names of its keys or arguments. What lies inside another model was explained
+    there. Pydantic adds the members of a union to the path of a `call`; they are left out.
     """
-    if not isinstance(owner, type):
-        names = list(inspect.signature(owner).parameters) if owner else []
-        first = location[:1] if owner else ()
-        steps = [names[i] if isinstance(i, int) and i < len(names) else i for i in first]
-        steps += [step for step in location[len(first) :] if isinstance(step, int)]
-        return [str(step) for step in steps], names, []
-    path: list[str] = []
-    hints: dict[str, Any] = {}
-    inside = [owner]
-    for step in location:
-        if path and (chosen := [one for one in inside if getattr(one, "type", None) == step]):
-            inside = chosen
-            continue
-        hints = {key: hint for one in inside for key, hint in _hints(one).items()} or hints
-        if isinstance(step, int) and not path and step < len(hints):
-            step = list(hints)[step]
-        path.append(str(step))
-        inside = _models_in(hints.get(str(step)))
-    return path, list(hints), inside
-
-
-def explain(error: pydantic.ValidationError, owner: Any, root: str = "") -> list[str]:
-    """List the mistakes that pydantic found, one text each, with the path to the key.
-
-    `owner` is the model that was validated, or the function that was called, or None. Paths begin
-    with `root`.
-    """
-    texts: list[tuple[str, str, str]] = []
+    found: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
     for item in error.errors():
-        steps, valid, models = _place(owner, item["loc"])
-        path = ".".join([root, *steps] if root else steps)
-        kind, given = item["type"], describe(item.get("input"))
-        context = item.get("ctx") or {}
+        kind, given = item["type"], f", got {describe(item.get('input'))}"
+        context, steps = item.get("ctx") or {}, list(item["loc"])
         wrong = context.get("error")
-        text, member, end = "", "", ""
+        if steps and isinstance(steps[0], int) and steps[0] < len(valid):
+            steps[0] = valid[steps[0]]
+        if call or isinstance(wrong, _Inside):
+            named = steps[: bool(valid)]
+            steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
+        path = ".".join(map(str, steps))
+        if isinstance(wrong, InputError):
+            pairs = [("", text) for text in wrong.problems]
+            for inner, text in wrong.found if isinstance(wrong, _Inside) else pairs:
+                found[_joined(path, inner), text, ""] = [""]
+            continue
+        text, member = str(wrong), ""
         if kind == "unexpected_positional_argument":
-            return [f"{owner.__name__}: give its arguments by name (valid: {', '.join(valid)})"]
+            return [("", f"give the arguments by name (valid: {', '.join(valid)})")]
         if kind.startswith("missing"):
-            text = f"{path}: missing"
+            text, given = "missing", ""
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
-            table, _, key = path.rpartition(".")
-            text = unknown_name(table or owner.__name__, key, valid)
+            path, text, given = "", unknown(path, valid), ""
         elif kind == "union_tag_invalid":
             tags = [tag.strip("' ") for tag in context["expected_tags"].split(",")]
-            text = unknown_name(f"{path}.type", str(context["tag"]), tags)
+            path, text, given = f"{path}.type", unknown(str(context["tag"]), tags), ""
         elif kind == "union_tag_not_found":
-            text = f"{path}.type: missing, got {given}"
-        elif isinstance(wrong, InputError):
-            prefix = f"{path}: " if path else ""
-            texts += [(f"{prefix}{problem}", "", "") for problem in wrong.problems]
-            continue
-        elif wrong is not None:
-            text = f"{path}: {wrong}, got {given}"
-        else:
-            text, end = f"{path}: must be ", f", got {given}"
-            member = item["msg"].removeprefix("Input should be ")
-            classes = [str(context[key]) for key in ("class_name", "class") if key in context]
-            if kind == "model_attributes_type":  # one of several, told apart by its type
-                classes = [one.__name__ for one in models]
-            if classes:
-                some = (f"{'an' if name[0] in 'AEIO' else 'a'} {name}" for name in classes)
-                member = " or ".join(some)
-        texts.append((text, member, end))
-    whole: dict[tuple[str, str], list[str]] = {}  # members of a union have an item each
-    for text, member, end in texts:
-        whole.setdefault((text, end), []).append(member)
+            path, text = f"{path}.type", "missing"
+        elif wrong is None:
+            name = str(context.get("class_name") or context.get("class") or "")
+            text, member = "must be ", item["msg"].removeprefix("Input should be ")
+            member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else member
+        found.setdefault((path, text, given), []).append(member)
     return [
-        text + " or ".join(dict.fromkeys(members)) + end
-        for (text, end), members in whole.items()
+        (path, text + " or ".join(dict.fromkeys(members)) + given)
+        for (path, text, given), members in found.items()
     ]
 
 
+def _joined(*steps: str, by: str = ".") -> str:
+    return by.join(filter(None, steps))
+
+
+def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
+    """List the mistakes that pydantic found, one text each, with its path below `root`."""
+    found = _mistakes(error, (), True)
+    return [_joined(_joined(root, path), text, by=": ") for path, text in found]
+
+
 # -- objects and functions -----------------------------------------------------------------------
+
+
+def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
+    """Validate a model, whose mistakes it explains itself: it has the names of its keys."""
+    try:
+        return handler(given)
+    except pydantic.ValidationError as error:
+        raise _Inside(_mistakes(error, list(keys_of(cls)), False)) from None
 
 
 @typing.overload
@@ -358,6 +322,9 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
+    explained: Any = classmethod(_explained)
+    # A name of its own, so that it lies outside the validators of a base class.
+    setattr(cls, f"_explained_{cls.__name__}", pydantic.model_validator(mode="wrap")(explained))
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
     decorate = pydantic_dataclass(
         frozen=True, eq=False, repr=False, kw_only=kw_only, config=config
@@ -370,7 +337,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
         try:
             validated_init(self, *args, **kwargs)
         except pydantic.ValidationError as error:
-            raise InputError(explain(error, wrapped, cls.__name__)) from None
+            raise InputError(explain(error, cls.__name__)) from None
 
     # Validation inside another model must keep calling pydantic's own path, not this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
@@ -380,7 +347,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
 
 def _comparable(value: Any) -> Any:
-    """What stands for a value where objects are compared and hashed."""
+    """Return what stands for a value where objects are compared and hashed."""
     if isinstance(value, np.ndarray):
         return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
     if hasattr(value, "identical"):  # labelled arrays
@@ -390,8 +357,8 @@ def _comparable(value: Any) -> Any:
     return tuple(map(_comparable, value)) if isinstance(value, list) else value
 
 
-def _fields(self: Any) -> list[Any]:
-    return [_comparable(getattr(self, field.name)) for field in dataclasses.fields(self)]
+def _fields(self: Any) -> tuple[Any, ...]:
+    return tuple(_comparable(getattr(self, one.name)) for one in dataclasses.fields(self))
 
 
 def _equal(self: Any, other: Any) -> bool:
@@ -399,7 +366,7 @@ def _equal(self: Any, other: Any) -> bool:
 
 
 def _hash(self: Any) -> int:
-    return hash(tuple(_fields(self)))
+    return hash(_fields(self))
 
 
 def brief(self: Any) -> str:
@@ -425,7 +392,7 @@ def _shown(value: Any) -> str:
 
 
 def to_plain(value: Any) -> Any:
-    """The object as plain dicts, lists and numbers: what TOML and JSON hold.
+    """Return the object as plain dicts, lists and numbers: what TOML and JSON hold.
 
     Raises
     ------
@@ -458,19 +425,23 @@ def checked(function: Function) -> Function:
         function
     )
     function.__annotations__ = written
+    names = list(inspect.signature(function).parameters)
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
             return validated(*args, **kwargs)
         except pydantic.ValidationError as error:
-            raise InputError(explain(error, function)) from None
+            found = _mistakes(error, names, True)
+            raise InputError(
+                f"{path or function.__name__}: {text}" for path, text in found
+            ) from None
 
     return typing.cast(Function, call)
 
 
 def _instances(hint: Any) -> Any:
-    """The annotation, with model classes that take instances only."""
+    """Return the annotation, with model classes that take instances only."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
     own = dataclasses.is_dataclass(hint)
@@ -485,7 +456,7 @@ def check(name: str, value: Any, annotation: Any) -> Any:
     try:
         return _adapter(annotation).validate_python(value)
     except pydantic.ValidationError as error:
-        raise InputError(explain(error, None, name)) from None
+        raise InputError(explain(error, name)) from None
 
 
 @functools.lru_cache(maxsize=64)

@@ -1,19 +1,19 @@
 """Progress of long work, and its time limit: one mechanism for everything that takes long.
 
-A terminal shows a bar, a notebook a line that is rewritten, a pipe a line now and then; all of it
-on standard error, and only after two seconds. The code that works reports what is done (`advance`)
+A terminal and a notebook show a line with a bar, a pipe has a line now and then; all of it on
+standard error, and only after two seconds. The code that works reports what is done (`advance`)
 and tests whether its time is `over`.
 """
 
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
 """True shows progress once work takes long; a callable gets (done, total); False is silent."""
@@ -134,73 +134,39 @@ _live: list[Meter] = []
 
 def _watch(ended: threading.Event) -> None:
     """Show one of the meters that run until the outermost has ended."""
-    show, shown = None, SILENT
-    with ExitStack() as stack:
-        while not ended.wait(TICK):
-            old = [meter for meter in tuple(_live) if meter.elapsed >= AFTER]
-            if old:  # the outermost whose total is known, else the innermost
-                shown = next((meter for meter in old if meter.total), old[-1])
-                show = show or stack.enter_context(_display())
-                show(shown, False)
-        if show is not None:
-            show(shown, True)
+    shown, show = None, _display()
+    while not ended.wait(TICK):
+        old = [meter for meter in tuple(_live) if meter.elapsed >= AFTER]
+        if old:  # the outermost whose total is known, else the innermost
+            shown = next((meter for meter in old if meter.total), old[-1])
+            show(shown, False)
+    if shown is not None:
+        show(shown, True)
 
 
-def _display() -> AbstractContextManager[Callable[[Meter, bool], object]]:
-    """A function that shows a meter, with a flag at its last call."""
-    shell = sys.modules.get("IPython")
-    active = shell.get_ipython() if shell is not None else None
-    if type(active).__name__ == "ZMQInteractiveShell":
-        return _notebook()
-    return _terminal() if sys.stderr is not None and sys.stderr.isatty() else _pipe()
-
-
-@contextmanager
-def _pipe() -> Iterator[Callable[[Meter, bool], object]]:
-    """A line every ten seconds and every tenth of the time: few, however long it takes."""
+def _display() -> Callable[[Meter, bool], None]:
+    """Return a function that shows a meter, with a flag at its last call."""
+    stream = sys.stderr
+    if stream is not None and (stream.isatty() or "ipykernel" in sys.modules):
+        return _rewrite
     soon = LONG
 
-    def show(meter: Meter, last: bool) -> None:
+    def write_line(meter: Meter, last: bool) -> None:  # few lines, however long it takes
         nonlocal soon
         if meter.elapsed >= soon or (last and soon > LONG):
             soon = max(meter.elapsed + LONG, 1.1 * meter.elapsed)
-            print(f"{meter.what}: {meter.text}", file=sys.stderr, flush=True)
+            print(f"{meter.what}: {meter.text}", file=stream, flush=True)
 
-    yield show
-
-
-@contextmanager
-def _terminal() -> Iterator[Callable[[Meter, bool], object]]:
-    """A line with a bar that goes away when the work is done; warnings appear above it."""
-    from rich.console import Console
-    from rich.live import Live
-    from rich.text import Text
-
-    def show(meter: Meter, last: bool) -> None:
-        line = Text(_with_bar(meter), no_wrap=True, overflow="ellipsis")
-        live.update(line, refresh=True)
-
-    console = Console(stderr=True)
-    with Live(
-        console=console, auto_refresh=False, transient=True, redirect_stdout=False
-    ) as live:
-        yield show
+    return write_line
 
 
-@contextmanager
-def _notebook() -> Iterator[Callable[[Meter, bool], object]]:
-    """A line below the cell, rewritten; rich would need ipywidgets."""
-    from IPython.display import display
-
-    line: Any = display({"text/plain": ""}, raw=True, display_id=True)
-    yield lambda meter, last: line.update({"text/plain": _with_bar(meter)}, raw=True)
-
-
-def _with_bar(meter: Meter) -> str:
-    if not meter.total:
-        return f"{meter.what} {meter.text}"
-    full = round(30 * min(1.0, meter.done / meter.total))
-    return f"{meter.what} [{'#' * full:.<30}] {meter.text}"
+def _rewrite(meter: Meter, last: bool) -> None:
+    """Show a line with a bar, which goes away when the work is done."""
+    full = round(30 * min(1.0, meter.done / meter.total)) if meter.total else 0
+    bar = f"[{'#' * full:.<30}] " if meter.total else ""
+    columns = shutil.get_terminal_size().columns - 1
+    line = "" if last else f"{meter.what} {bar}{meter.text}"
+    print(f"\r{line[:columns]:{columns}}\r", end="", file=sys.stderr, flush=True)
 
 
 class Portions:

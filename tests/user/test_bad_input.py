@@ -98,8 +98,8 @@ MISTAKES = {
     ),
     "samples ... >= 1 ... 0": lambda: monte_carlo(samples=0),
     "samples ... less than or equal to 10000000000": lambda: st.Ensemble(samples=10**13),
-    "title ... text ... b'x'": lambda: make_study(title=b"x"),
-    "title ... UTF-8": lambda: make_study(title="\udcff"),
+    "title ... valid string ... b'x'": lambda: make_study(title=b"x"),
+    "title ... valid string": lambda: make_study(title="\udcff"),
     # Names and choices
     "'plan' ... did you mean 'plane'": lambda: st.Solid(**GOOD_SOLID, plan="stress"),
     "plane ... 'strain' ... 'stran'": lambda: solid(plane="stran"),
@@ -141,8 +141,8 @@ MISTAKES = {
     "method ... method object ... got 3": lambda: st.external.limit_state(
         make_problem(), make_strength(), 3
     ),
-    "Study.method: must be a LocalCriterion or an Equilibrium ... got 0": lambda: make_study(
-        method=0
+    "Study.method: must be a method object such as st.LocalCriterion() ... got 0": lambda: (
+        make_study(method=0)
     ),
     "where: must be a Problem or an Interface, got 3": lambda: st.plot.field(3, ONE),
     "profile ... must be a DataArray over x ... (64, 64)": lambda: make_strength().given(

@@ -15,11 +15,6 @@ from stiction import progress
 from stiction.progress import Meter, Portions
 
 
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
 @pytest.fixture
 def hasty(monkeypatch):
     """The same waits, a hundred times shorter."""
@@ -49,32 +44,18 @@ def test_a_pipe_gets_few_lines_the_last_at_the_end(hasty, capsys):
     assert "of 60 samples" in lines[0]
 
 
-def test_a_terminal_gets_a_bar_that_goes_away(hasty, monkeypatch):
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+@pytest.mark.parametrize("where", ["terminal", "notebook"])
+def test_a_bar_is_rewritten_and_goes_away(where, hasty, monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: where == "terminal", raising=False)
+    monkeypatch.setattr(sys, "stderr", stream)
+    if where == "notebook":
+        monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
     work(Meter("by equilibrium", 20))
-    text = terminal.getvalue()
-    assert "by equilibrium" in text
-    assert "of 20 samples" in text
-    assert text.rstrip("\n").endswith("\x1b[2K")  # the line is erased
-
-
-def test_a_notebook_gets_a_line_that_is_rewritten(hasty, monkeypatch, capsys):
-    shown = []
-
-    def write(data, **options):
-        shown.append(data["text/plain"])
-        return types.SimpleNamespace(update=write)
-
-    shell = type("ZMQInteractiveShell", (), {})()
-    monkeypatch.setitem(
-        sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell)
-    )
-    monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=write))
-    work(Meter("in a notebook", 20))
-    assert any(line.startswith("in a notebook [#") for line in shown)
-    assert "20 of 20 samples" in shown[-1]
-    assert capsys.readouterr().err == ""
+    *lines, last = stream.getvalue().split("\r")[1::2]
+    assert all(line.startswith("by equilibrium [") for line in lines)
+    assert "of 20 samples" in lines[-1]
+    assert not last.strip()
 
 
 def test_one_of_nested_meters_is_shown(hasty, capsys):

@@ -16,7 +16,7 @@ from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
-from stiction.model import Count, Flag, Names, Number, Progress, Seconds, checked
+from stiction.model import Count, Flag, Names, Number, Positive, Progress, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
@@ -135,7 +135,7 @@ def monte_carlo(
     workers: Count | None = None,
     executor: AnyExecutor | None = None,
     progress: Progress = True,
-    time_limit: Seconds | None = None,
+    time_limit: Positive | None = None,
     pilot: Flag = True,
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.

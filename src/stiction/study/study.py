@@ -25,13 +25,13 @@ from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import STUDY, Damaged, Store, read_json
 from stiction.errors import InputError, StoreError
-from stiction.methods import methods
+from stiction.methods import as_method, methods
 from stiction.model import (
     Count,
     FilePath,
     Flag,
+    Positive,
     Progress,
-    Seconds,
     Text,
     check,
     checked,
@@ -54,8 +54,15 @@ from stiction.study.sweep import (
 
 T = TypeVar("T")
 
+
+def _method(value: Any) -> Any:
+    return value if isinstance(value, dict) else as_method(value)
+
+
 AnyMethod: Any = Annotated[
-    functools.reduce(operator.or_, methods().values()), Field(discriminator="type")
+    functools.reduce(operator.or_, methods().values()),
+    Field(discriminator="type"),
+    BeforeValidator(_method),
 ]
 """Any registered method; in a study file ``type`` selects it."""
 
@@ -213,7 +220,7 @@ class Study:
         workers: Count | None = None,
         executor: AnyExecutor | None = None,
         progress: Progress = True,
-        time_limit: Seconds | None = None,
+        time_limit: Positive | None = None,
         retry: Flag = False,
         part: Any = None,
         pilot: Flag = True,
@@ -380,7 +387,7 @@ def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
     try:
         return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
-        raise InputError(dict.fromkeys(explain(error, Study))) from None
+        raise InputError(dict.fromkeys(explain(error))) from None
 
 
 def open_run(path: Any) -> StoredRun:

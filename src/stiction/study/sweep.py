@@ -83,7 +83,7 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
     try:
         found: _Range = pydantic.TypeAdapter(_Range).validate_python(given)
     except pydantic.ValidationError as error:
-        raise InputError(explain(error, _Range, key)) from None
+        raise InputError(explain(error, key)) from None
     spread = np.geomspace if found.spacing == "log" else np.linspace
     values = spread(found.start, found.stop, found.count)
     whole = all(isinstance(given[name], numbers.Integral) for name in ("start", "stop"))
