@@ -18,7 +18,7 @@ from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, Sample, named_profiles, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.profiles.reading import gather
-from stiction.progress import Meter, Portions, Show
+from stiction.progress import Meter, Portions
 from stiction.results import (
     DIRECTION,
     FRICTION_COEFFICIENT,
@@ -146,7 +146,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
 
     def solve(sample: Sample) -> Values:
         values = {name: np.asarray(found) for name, found in solver(sample).items()}
-        _check_values(method, values, variables, sample)
+        _check_values(method.label, values, variables, sample)
         pressure = sample.normal_pressure.mean(axis=sample.axes)
         if not np.isnan(pressure).all():
             values["friction_coefficient"] = values["critical_stress"] / pressure
@@ -156,34 +156,22 @@ def prepared(problem: Problem, method: Method) -> Solver:
 
 
 def _check_values(
-    method: Method, values: Values, variables: Mapping[str, Variable], sample: Sample
+    name: str, values: Values, variables: Mapping[str, Variable], sample: Sample
 ) -> None:
+    if values.keys() != variables.keys():
+        raise InputError(
+            f"method: the solver of {name} must return its variables {', '.join(variables)};"
+            f" got {', '.join(values)}"
+        )
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
     sizes |= {"sample": sample.samples, DIRECTION: 2}
-    problems = [f"does not return {name!r}" for name in variables if name not in values]
-    for name, found in values.items():
-        if name not in variables:
-            problems.append(f"returns {name!r}, which is none of its variables")
-            continue
-        dims = variables[name].dims
-        shape = tuple(sizes.get(dim) for dim in dims)
-        if found.shape != shape and None not in shape:
-            problems.append(
-                f"returns {name!r} of shape {found.shape}, not {shape} over ({', '.join(dims)})"
+    for one, variable in variables.items():
+        shape = tuple(sizes.get(dim) for dim in variable.dims)
+        if values[one].shape != shape and None not in shape:
+            raise InputError(
+                f"method: the solver of {name} must return {one!r} of shape {shape} over"
+                f" ({', '.join(variable.dims)}), got {values[one].shape}"
             )
-    if problems:
-        raise InputError([f"method: the solver of {method.label} {text}" for text in problems])
-
-
-def _in_portions(problem: Problem, method: Method, sample: Sample, progress: Show) -> Values:
-    """All samples, some at a time: the numbers of one do not depend on those beside it."""
-    solver = prepared(problem, method)
-    parts: list[Mapping[str, NDArray[Any]]] = []
-    with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
-        for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
-            parts.append(solver(sample.part(some)))
-            meter.advance(some.stop - some.start)
-    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
 def variables_of(
@@ -277,7 +265,12 @@ def onset(
         profiles, measured = gather(named_profiles(profiles), problem.interface, gaps)
     sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
-    values = _in_portions(problem, method, sample, progress)
+    solver, parts = prepared(problem, method), []
+    with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
+        for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
+            parts.append(solver(sample.part(some)))
+            meter.advance(some.stop - some.start)
+    values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     if hasattr(method, "warn_of"):
         method.warn_of(problem, sample, values)
     result = label(problem, method, values, np.arange(sample.samples), attributes)

@@ -1,18 +1,17 @@
-"""The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests."""
+"""The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests.
+
+It is written in public names, which are imported on first use: a `Problem` needs no random field.
+"""
+
+from __future__ import annotations
 
 from typing import Literal
 
-from stiction.friction import LinearWeakening
-from stiction.interface import Interface
+import stiction as st
 from stiction.model import Positive, checked
-from stiction.problem import Problem
-from stiction.random.marginals import Beta
-from stiction.random.random_field import RandomField
-from stiction.random.spectra import PowerLawSpectrum
-from stiction.solid import Solid
 
 
-def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> Problem:
+def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
     """Return the interface of Albertini, Karrer, Grigoriu and Kammer (2020).
 
     G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m, W = 0.5 TPa/m, mode II. Only the
@@ -26,15 +25,15 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
         The paper states plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu),
         which belongs to plane strain. ``plane="strain"`` gives the printed value.
     """
-    return Problem(
-        solid=Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
-        interface=Interface(length=0.1, nodes=nodes),
-        friction=LinearWeakening(weakening_rate=0.5e12, residual_strength=0.0),
+    return st.Problem(
+        solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
+        interface=st.Interface(length=0.1, nodes=nodes),
+        friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.0),
     )
 
 
 @checked
-def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField:
+def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.RandomField:
     """Return the random strength of Albertini et al. (2020, Eqs. 2 to 7).
 
     Beta(1.5, 3) on [0.66, 1.66] MPa; power-law spectrum (k^2 + lambda^2)^-4, truncated at
@@ -48,7 +47,7 @@ def strength(problem: Problem, correlation_ratio: Positive = 0.5) -> RandomField
         xi_0/h_n, positive; xi_0 = 2 pi/lambda.
     """
     length = correlation_ratio * problem.nucleation_length
-    return RandomField(
-        marginal=Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=PowerLawSpectrum(correlation_length=length, exponent=4.0, truncation=2.5),
+    return st.RandomField(
+        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        spectrum=st.PowerLawSpectrum(correlation_length=length, exponent=4.0, truncation=2.5),
     )

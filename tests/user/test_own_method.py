@@ -122,12 +122,12 @@ class Broken:
     [
         (
             Broken({}, {"margin": Variable("Pa", "margin")}),
-            "solver of broken does not return 'margin'",
+            "broken must return .*, margin; got",
         ),
-        (Broken({"margin": np.ones(3)}), "returns 'margin', which is none of its variables"),
+        (Broken({"margin": np.ones(3)}), "broken must return .*; got .*, margin"),
         (
             Broken({"critical_load": np.ones(2)}),
-            r"'critical_load' of shape \(2,\), not \(3,\) over \(sample\)",
+            r"'critical_load' of shape \(3,\) over \(sample\), got \(2,\)",
         ),
     ],
 )
