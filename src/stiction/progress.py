@@ -8,7 +8,6 @@ and tests whether its time is `over`.
 from __future__ import annotations
 
 import math
-import shutil
 import sys
 import threading
 import time
@@ -22,6 +21,8 @@ AFTER = 2.0
 """Seconds of silence: who waits no longer than this needs no bar."""
 LONG = 10.0
 """Seconds between lines in a pipe, at least."""
+WIDTH = 100
+"""Letters of a line in a notebook."""
 TICK = 0.25
 PORTION = 0.25
 """Seconds of work between two looks at the clock."""
@@ -134,21 +135,24 @@ _live: list[Meter] = []
 
 def _watch(ended: threading.Event) -> None:
     """Show one of the meters that run until the outermost has ended."""
-    shown, show = None, _display()
+    shown = show = None
     while not ended.wait(TICK):
         old = [meter for meter in tuple(_live) if meter.elapsed >= AFTER]
         if old:  # the outermost whose total is known, else the innermost
             shown = next((meter for meter in old if meter.total), old[-1])
+            show = show or _display()
             show(shown, False)
-    if shown is not None:
+    if shown is not None and show is not None:
         show(shown, True)
 
 
 def _display() -> Callable[[Meter, bool], None]:
     """Return a function that shows a meter, with a flag at its last call."""
     stream = sys.stderr
-    if stream is not None and (stream.isatty() or "ipykernel" in sys.modules):
-        return _rewrite
+    if stream is not None and stream.isatty():
+        return _terminal()
+    if "ipykernel" in sys.modules:
+        return _notebook
     soon = LONG
 
     def write_line(meter: Meter, last: bool) -> None:  # few lines, however long it takes
@@ -160,13 +164,36 @@ def _display() -> Callable[[Meter, bool], None]:
     return write_line
 
 
-def _rewrite(meter: Meter, last: bool) -> None:
-    """Show a line with a bar, which goes away when the work is done."""
+def _with_bar(meter: Meter) -> str:
     full = round(30 * min(1.0, meter.done / meter.total)) if meter.total else 0
     bar = f"[{'#' * full:.<30}] " if meter.total else ""
-    columns = shutil.get_terminal_size().columns - 1
-    line = "" if last else f"{meter.what} {bar}{meter.text}"
-    print(f"\r{line[:columns]:{columns}}\r", end="", file=sys.stderr, flush=True)
+    return f"{meter.what} {bar}{meter.text}"
+
+
+def _terminal() -> Callable[[Meter, bool], None]:
+    """Return a function that shows a bar, which goes away at the end; warnings appear above it."""
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    live = Live(
+        console=Console(stderr=True), auto_refresh=False, transient=True, redirect_stdout=False
+    )
+
+    def show(meter: Meter, last: bool) -> None:
+        if last:
+            live.stop()
+        else:
+            live.start()
+            live.update(Text(_with_bar(meter), no_wrap=True, overflow="ellipsis"), refresh=True)
+
+    return show
+
+
+def _notebook(meter: Meter, last: bool) -> None:
+    """Show a line that is rewritten, and goes away at the end; rich would need ipywidgets."""
+    line = "" if last else _with_bar(meter)
+    print(f"\r{line:{WIDTH}}\r", end="", file=sys.stderr, flush=True)
 
 
 class Portions:

@@ -44,16 +44,27 @@ def test_a_pipe_gets_few_lines_the_last_at_the_end(hasty, capsys):
     assert "of 60 samples" in lines[0]
 
 
-@pytest.mark.parametrize("where", ["terminal", "notebook"])
-def test_a_bar_is_rewritten_and_goes_away(where, hasty, monkeypatch):
-    stream = io.StringIO()
-    monkeypatch.setattr(stream, "isatty", lambda: where == "terminal", raising=False)
-    monkeypatch.setattr(sys, "stderr", stream)
-    if where == "notebook":
-        monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
-    work(Meter("by equilibrium", 20))
-    *lines, last = stream.getvalue().split("\r")[1::2]
-    assert all(line.startswith("by equilibrium [") for line in lines)
+def test_a_terminal_gets_a_bar_that_goes_away_with_warnings_above_it(hasty, monkeypatch):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with Meter("outer"):
+        work(Meter("by equilibrium", 20))
+        print("a warning", file=sys.stderr)
+        time.sleep(0.1)
+    text = terminal.getvalue()
+    assert "by equilibrium [" in text
+    assert "of 20 samples" in text
+    assert any(line.endswith("a warning") for line in text.splitlines())
+    assert text.rstrip("\n").endswith("\x1b[2K")  # the line is erased
+
+
+def test_a_notebook_gets_a_line_that_is_rewritten(hasty, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
+    work(Meter("in a notebook", 20))
+    *lines, last = capsys.readouterr().err.split("\r")[1::2]
+    assert all(line.startswith("in a notebook [") for line in lines)
     assert "of 20 samples" in lines[-1]
     assert not last.strip()
 
