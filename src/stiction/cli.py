@@ -486,8 +486,7 @@ def rupture(
         for draw in (plot.rupture, plot.front):
             _save_figure(draw(result, problem=problem), out / draw.__name__)
     if film:
-        with Meter("drawing the film"):
-            echo(f"film: {plot.film(result, out / 'rupture.gif')}")
+        echo(f"film: {plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")
 
 

@@ -40,6 +40,9 @@ class LimitState:
     workers: int = 1  # threads; the numbers do not depend on this
     meter: Meter = SILENT  # counts the samples
 
+    def __repr__(self) -> str:
+        return f"<LimitState: {self.dimension} standard normal draws to {self.event}, Pa>"
+
     @cached_property
     def _portions(self) -> Portions:
         return Portions(self.workers)

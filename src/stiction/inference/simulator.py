@@ -53,7 +53,7 @@ def simulator(
     Raises
     ------
     InputError
-        If a parameter does not exist or another argument is invalid. The function raises it
+        If an argument is invalid. The function raises it if a parameter does not exist, or
         if the parameters do not make a valid problem.
 
     Examples

@@ -25,12 +25,20 @@ from stiction.plot.ruptures import (
     since_onset,
 )
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
+from stiction.progress import Meter, Show
 
 Frames = tuple[Figure, list[Any], Callable[[int], None]]
 """A figure, the artists that move in it, and a function that shows a frame."""
 
 
-def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20) -> Path:
+def film(
+    run: xr.Dataset,
+    path: str | Path,
+    *,
+    frames: int = 160,
+    fps: int = 20,
+    progress: Show = True,
+) -> Path:
     """Write a film of a rupture: stress and slip rate.
 
     Parameters
@@ -44,6 +52,8 @@ def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20)
         as the interface accelerates.
     fps : int
         Frames per second.
+    progress : bool or callable
+        As in `stiction.monte_carlo`.
 
     Returns
     -------
@@ -61,8 +71,8 @@ def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20)
     if target.suffix != ".gif":
         raise InputError(f"path: must end in .gif, got {target.name!r}")
     shown = np.unique(np.linspace(0, run.sizes["time"] - 1, frames).round().astype(int))
-    images = []
-    with paper_style():
+    images, still = [], Image.Dither.NONE  # with dithering, parts at rest would flicker
+    with paper_style(), Meter("film", shown.size, progress, unit="frames") as meter:
         figure, moving, show = (_plane_film if "y" in run.dims else _line_film)(run)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
@@ -77,11 +87,11 @@ def film(run: xr.Dataset, path: str | Path, *, frames: int = 160, fps: int = 20)
             for part in moving:
                 figure.draw_artist(part)
             frame = Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
-            # Without dithering the parts that stand still stay still.
-            images.append(frame.quantize(64, dither=Image.Dither.NONE))
-    images[0].save(
-        target, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
-    )
+            images.append(frame.quantize(128, Image.Quantize.FASTOCTREE, dither=still))
+            meter.advance()
+        images[0].save(
+            target, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
+        )
     return target
 
 
@@ -96,8 +106,8 @@ def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, Callable[[int], None]]:
 
     def show(i: int) -> None:
         text.set_text(
-            f"{factor * since[i]:,.1f} {unit} since the onset,  "
-            rf"$\langle\tau\rangle$ = {mean[i]:.3f} {stress_unit}"
+            f"{factor * since[i]:,.1f} {unit} since the onset,"
+            f"  mean stress {mean[i]:.3f} {stress_unit}"
         )
 
     return text, show
