@@ -120,10 +120,10 @@ def test_factor_of_a_singular_matrix():
     ("correlation", "message"),
     [
         ({("strength", "residual"): 0.5}, "did you mean 'residual_strength'"),
-        ({("strength", "residual_strength"): 1.5}, r"must be a number in \[-1, 1\], got 1.5"),
-        ({("strength", "critical_slip"): 0.5}, "'critical_slip' is not random here"),
+        ({("strength", "residual_strength"): 1.5}, "must be less than or equal to 1, got 1.5"),
+        ({("strength", "critical_slip"): 0.5}, "correlation: unknown 'critical_slip'"),
         ({("strength", "strength"): 0.5}, "two different properties"),
-        (0.5, "must map pairs of names to numbers"),
+        (0.5, "must be a valid dictionary"),
         (
             {("strength", "residual_strength"): 0.5, ("residual_strength", "strength"): 0.4},
             "given twice",

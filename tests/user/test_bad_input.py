@@ -82,7 +82,9 @@ MISTAKES = {
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
     "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
     "mean and cv ... finite squares ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
-    "correlation_length ... 1e-100": lambda: st.PowerLawSpectrum(correlation_length=5e-324),
+    "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(
+        correlation_length=5e-324
+    ),
     "exponent ... 0.6 ... 0.5": lambda: st.PowerLawSpectrum(1.0, exponent=0.5),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
     "arrival ... 1 ... 1.5": lambda: st.Rupture(loading_rate=1e7, arrival=1.5),

@@ -107,7 +107,7 @@ def test_noise_and_scatter_can_be_swept(study):
         (lambda r: r["strength"]["given"].update(nois=1.0), "did you mean 'noise'"),
         (lambda r: r["strength"]["given"].update(profile="scam.csv"), "scam.csv: cannot be read"),
         (lambda r: r["between"].update(strenght={"type": "lognormal", "mean": 1.0, "cv": 0.1}),
-         "between: 'strenght' is not random here"),
+         "between: unknown 'strenght'; did you mean 'strength'"),
         (lambda r: r["between"]["strength"].update(mean=1.2), "must be positive with mean 1"),
     ],
 )  # fmt: skip

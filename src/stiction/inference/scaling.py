@@ -25,6 +25,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.inference.prior import Prior, full_key
+from stiction.random.marginals import affine_parameters
 
 MARGINAL = "random.strength.marginal."
 PRESSURE = "problem.load.normal_pressure"
@@ -54,7 +55,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     if reason := _no_scaling(prior, problem, random, method):
         return _none(middle, reason)
     field = random.strength
-    names, (location, scale) = field.marginal.affine, field.marginal.location_and_scale
+    names, location, scale = affine_parameters(field.marginal)
     full = [full_key(name) for name in prior.names]
     places = {
         key.removeprefix(MARGINAL): i for i, key in enumerate(full) if key.startswith(MARGINAL)
@@ -69,7 +70,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     aside = prior.theta(np.full((1, prior.dimension), 0.9))[0]
     for slope, i in enumerate(keys, 1):
         theta = np.where(np.arange(prior.dimension) == i, aside, middle)
-        moved, stretched = prior.at(theta)[1].strength.marginal.location_and_scale
+        _, moved, stretched = affine_parameters(prior.at(theta)[1].strength.marginal)
         shifts[slope] = (moved - location) / (aside[i] - middle[i])
         stretches[slope] = (stretched - scale) / (aside[i] - middle[i])
         shifts[0] -= shifts[slope] * middle[i]

@@ -34,7 +34,7 @@ from stiction.interface import Interface
 from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
 from stiction.profiles.placing import MEASURED
 from stiction.profiles.units import parse
-from stiction.random.mapping import FURTHEST, from_normal, quantile_of_normal
+from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
 
 NEGLIGIBLE = 1e-8
@@ -43,6 +43,8 @@ DOUBTFUL = 5.0
 """Standard deviations of chi-square beyond which measured values do not suit a field."""
 IMPOSSIBLE = 4.0
 """Errors beyond a bound of the marginal that no measured value has."""
+FURTHEST = 37.0
+"""Largest z whose tail of the normal distribution is a float."""
 REACH, NODES, TURNS = 8.0, 49, 8
 """Half width of Gaussians, nodes across them, and turns between likelihood and regression."""
 FLAT, SHARP, TINY, SETTLED = 1e-4, 1e-4, 1e-12, 1e-3

@@ -18,13 +18,9 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.jit import jit
 
-REACH = 8.0
-PIECES = 4096
+REACH, PIECES = 8.0, 4096
 TOLERANCE = 2e-10  # relative; the promise is 1e-9
-
-TERMS, MOST_TERMS = 40, 1000
-FURTHEST = 37.0  # up to here the tail of the normal distribution is a float
-STEP = 0.0025
+TERMS, MOST_TERMS, STEP = 40, 1000, 0.0025
 SMALL = 1e-6  # share of the variance
 
 
@@ -34,12 +30,10 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
     Phi(z) rounds to 1 long before z = 8. The upper tail keeps its digits only through
     Phi(-z), and only where scipy inverts the survival function of the family directly.
     """
-    z = np.asarray(z, dtype=np.float64)
     tail = ndtr(-np.abs(z))
     lower = distribution.ppf(np.where(z < 0.0, tail, 0.5))
     upper = distribution.isf(np.where(z < 0.0, 0.5, tail))
-    result: Array = np.where(z < 0.0, lower, upper)
-    return result
+    return np.where(z < 0.0, lower, upper)
 
 
 @jit
@@ -108,33 +102,18 @@ def hermite_coefficients(marginal: Any) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
     c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By a
-    fine trapezoidal rule on |z| <= 8, which stays accurate where the map has kinks. Heavy
-    tails have their variance further out and in high orders: then on |z| <= 37, and up to
-    order 1000. The last coefficient stands for all the rest of the variance, so that the
-    correlation is 1 at zero lag. An `InputError` if scipy's quantile and moments disagree.
+    fine trapezoidal rule on |z| <= 8, which stays accurate where the map has kinks. The last
+    coefficient stands for all the rest of the variance, so that the correlation is 1 at zero
+    lag. An `InputError` if scipy's quantile and moments disagree.
     """
-    coefficients, tail = _expand(marginal.distribution, REACH)
-    if tail > SMALL:
-        coefficients, tail = _expand(marginal.distribution, FURTHEST)
-    coefficients.flags.writeable = False
-    return coefficients
-
-
-def _expand(distribution: Any, reach: float) -> tuple[Array, float]:
-    """Coefficients from |z| <= `reach`, and the share of the variance that lies beyond."""
-    half = round(reach / STEP)
+    distribution, half = marginal.distribution, round(REACH / STEP)
     z = np.arange(-half, half + 1) * STEP
     # Without the mean: it would cost a narrow marginal its digits.
     mean, variance = float(distribution.mean()), float(distribution.var())
     if not variance > 0.0:
         raise InputError("marginal: its standard deviation is zero in double precision")
-    value = quantile_of_normal(distribution, z) - mean
-    # Far out some of scipy's families have no quantile; what that costs shows in the rest.
-    value[(np.abs(z) > REACH) & ~np.isfinite(value)] = 0.0
-    # A half of the weight with each factor: high orders overflow far out without it.
     root = np.sqrt(STEP / np.sqrt(2.0 * np.pi)) * np.exp(-0.25 * z * z)
-    value *= root
-    tail = 1.0 - float(np.sum(value * value)) / variance
+    value = (quantile_of_normal(distribution, z) - mean) * root
     found, rest = [mean], variance
     previous, current = np.zeros_like(z), root
     for m in range(MOST_TERMS):
@@ -145,14 +124,13 @@ def _expand(distribution: Any, reach: float) -> tuple[Array, float]:
             break
         following = (z * current - np.sqrt(m) * previous) / np.sqrt(m + 1.0)
         previous, current = current, following
-    # More than round-off means that scipy's quantile fails.
-    if not rest > -SMALL * variance or (reach == FURTHEST and rest > 0.5 * variance):
+    if not rest > -SMALL * variance:  # more than round-off
         raise InputError(
-            "marginal: scipy's quantile of this distribution is not accurate enough in its tails"
-            f" for a correlation: {100.0 * rest / variance:.2g} % of its variance are missing"
+            "marginal: scipy's quantile of this distribution is not accurate enough"
         )
-    found.append(np.sqrt(max(rest, 0.0)))
-    return np.array(found), tail
+    coefficients = np.array([*found, np.sqrt(max(rest, 0.0))])
+    coefficients.flags.writeable = False
+    return coefficients
 
 
 def correlation_of_mapped(rho: Array, coefficients: Array) -> Array:

@@ -21,14 +21,14 @@ from scipy.special import gammaln
 
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.kinds import OneOf, from_table
-from stiction.model import Positive, Real, describe, is_finite, model
+from stiction.model import Positive, Real, check, model
 
 WIDEST = 10.0
 """Greatest coefficient of variation; from 1 on a warning asks whether it is in per cent."""
 
 
 class Marginal(ABC):
-    """Base class of marginals: a frozen `scipy.stats` distribution."""
+    """Base class of marginals."""
 
     type: str
 
@@ -36,16 +36,6 @@ class Marginal(ABC):
     @abstractmethod
     def distribution(self) -> Any:
         """The same as a frozen `scipy.stats` distribution."""
-
-    @property
-    def affine(self) -> tuple[str, ...]:
-        """Names of parameters that only shift or scale the distribution while the others stay."""
-        return ()
-
-    @property
-    def location_and_scale(self) -> tuple[float, float]:
-        """a and b, linear in the parameters `affine`, which do not change (tau_p - a)/b."""
-        return 0.0, 1.0
 
 
 @model(kw_only=True)
@@ -82,15 +72,7 @@ class Beta(Marginal):
 
     @cached_property
     def distribution(self) -> Any:
-        return scipy.stats.beta(self.alpha, self.beta, *self.location_and_scale)
-
-    @property
-    def affine(self) -> tuple[str, ...]:
-        return ("low", "high")
-
-    @property
-    def location_and_scale(self) -> tuple[float, float]:
-        return self.low, self.high - self.low
+        return scipy.stats.beta(self.alpha, self.beta, self.low, self.high - self.low)
 
 
 @model(kw_only=True)
@@ -142,14 +124,6 @@ class _ByMoments(Marginal):
     def distribution(self) -> Any:
         shape, mean_over_scale = self._shape(self._ratio)
         return self.family(shape, self.low, self._excess / mean_over_scale)
-
-    @property
-    def affine(self) -> tuple[str, ...]:
-        return ("mean",) if self.low == 0.0 else ()
-
-    @property
-    def location_and_scale(self) -> tuple[float, float]:
-        return self.low, self._excess
 
 
 @model(kw_only=True)
@@ -268,10 +242,6 @@ class TruncatedNormal(_ByMoments):
             )
         return scipy.stats.truncnorm(*parameters(found.x))
 
-    @property
-    def affine(self) -> tuple[str, ...]:
-        return super().affine if self.high is None else ()
-
 
 @dataclass(frozen=True)
 class ScipyMarginal(Marginal):
@@ -296,15 +266,6 @@ class ScipyMarginal(Marginal):
     def distribution(self) -> Any:
         return self.frozen or getattr(scipy.stats, self.type)(**dict(self.parameters))
 
-    @property
-    def affine(self) -> tuple[str, ...]:
-        return () if self.frozen is not None else ("loc", "scale")
-
-    @property
-    def location_and_scale(self) -> tuple[float, float]:
-        own = dict(self.parameters)
-        return own.get("loc", 0.0), own.get("scale", 1.0)
-
     def plain(self) -> dict[str, Any]:
         """Return what a study file holds."""
         if self.frozen is not None:
@@ -312,6 +273,22 @@ class ScipyMarginal(Marginal):
                 f"marginal is the Python distribution {self.type!r}, not a named one"
             )
         return {"type": self.type, **dict(self.parameters)}
+
+
+def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
+    """Return the names of parameters that only shift or scale a marginal, and a and b.
+
+    These are linear in the parameters, which do not change (tau_p - a)/b.
+    """
+    if isinstance(marginal, Beta):
+        return ("low", "high"), marginal.low, marginal.high - marginal.low
+    if isinstance(marginal, ScipyMarginal) and marginal.frozen is None:
+        own = dict(marginal.parameters)
+        return ("loc", "scale"), own.get("loc", 0.0), own.get("scale", 1.0)
+    unbounded = isinstance(marginal, _ByMoments) and getattr(marginal, "high", None) is None
+    if unbounded and marginal.low == 0.0:
+        return ("mean",), 0.0, marginal.mean
+    return (), 0.0, 1.0
 
 
 MARGINALS: dict[str, Any] = {
@@ -343,31 +320,24 @@ def marginal_of(value: Any) -> Marginal:
     name = str(getattr(family, "name", None))
     if type(family) is not type(getattr(scipy.stats, name, None)):  # a histogram, say
         return ScipyMarginal(type(family).__name__, frozen=value)
-    given = zip(_parameter_names(family), value.args, strict=False)
-    return _of_scipy(name, dict(given) | value.kwds)
+    return _of_scipy(name, value.kwds, value.args)
 
 
-def _parameter_names(family: Any) -> list[str]:
-    shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
-    return [*shapes, "loc", "scale"]
-
-
-def _of_scipy(name: str, parameters: Mapping[str, Any]) -> Marginal:
+def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) -> Marginal:
+    """The marginal of scipy's name for a family and its parameters, the `first` in order."""
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]
         raise InputError(unknown_name("type", name, valid))
-    known = _parameter_names(family)
+    shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
+    known = [*shapes, "loc", "scale"]
+    parameters = {**dict(zip(known, first, strict=False)), **given}
     problems = [unknown_name(name, key, known) for key in parameters if key not in known]
-    problems += [f"{name}.{key}: missing" for key in known[:-2] if key not in parameters]
-    problems += [
-        f"{name}.{key}: must be a finite number, got {describe(value)}"
-        for key, value in parameters.items()
-        if not is_finite(value)
-    ]
+    problems += [f"{name}.{key}: missing" for key in shapes if key not in parameters]
     if problems:
         raise InputError(problems)
-    return ScipyMarginal(name, tuple((key, float(one)) for key, one in parameters.items()))
+    values = {key: check(f"{name}.{key}", one, Real) for key, one in parameters.items()}
+    return ScipyMarginal(name, tuple(values.items()))
 
 
 _OF_SCIPY = {"type": "string", "description": "name of a continuous scipy.stats distribution"}

@@ -9,19 +9,13 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    BeforeValidator,
-    PlainSerializer,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.friction import SCALES
 from stiction.interface import Interface
-from stiction.model import Number, check_memory, checked, describe, is_finite, model
+from stiction.model import Number, Real, check_memory, checked, describe, model
 from stiction.random.conditioning import Conditioning
 from stiction.random.mapping import from_normal
 from stiction.random.marginals import AnyMarginal
@@ -38,40 +32,27 @@ DEFINITE = 1e-12
 """Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
 
 
-def _pairs(value: Any) -> dict[str, dict[str, float]]:
+def _pairs(value: Any) -> Any:
     """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
     if not isinstance(value, Mapping):
-        raise InputError(
-            "must map pairs of names to numbers, such as"
-            f' {{("strength", "residual_strength"): 0.8}}, got {describe(value)}'
-        )
+        return value
     flat: list[tuple[Any, Any]] = []
     for key, inner in value.items():
-        nested = isinstance(inner, Mapping)
-        flat += (
-            [((key, other), rho) for other, rho in inner.items()] if nested else [(key, inner)]
-        )
-    found: dict[str, dict[str, float]] = {}
+        nested = inner.items() if isinstance(inner, Mapping) else ()
+        flat += [((key, other), rho) for other, rho in nested] or [(key, inner)]
+    found: dict[str, dict[str, Any]] = {}
     for pair, rho in flat:
         if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
             raise InputError(f"must name two different properties, got {describe(pair)}")
-        unknown = [unknown_name("correlation", str(n), NAMES) for n in pair if n not in NAMES]
-        if unknown:
-            raise InputError(unknown)
-        if not is_finite(rho) or not -1.0 <= rho <= 1.0:
-            raise InputError(
-                f"{', '.join(pair)}: must be a number in [-1, 1], got {describe(rho)}"
-            )
-        first, second = sorted(pair, key=NAMES.index)
+        first, second = sorted(map(str, pair), key=[*NAMES, *map(str, pair)].index)
         if second in found.setdefault(first, {}):
             raise InputError(f"{first}, {second}: given twice")
-        found[first][second] = float(rho)
+        found[first][second] = rho
     return found
 
 
-Correlation = Annotated[
-    dict[str, dict[str, float]], BeforeValidator(_pairs), PlainSerializer(lambda value: value)
-]
+Coefficient = Annotated[Real, Field(ge=-1.0, le=1.0)]
+Correlation = Annotated[dict[str, dict[str, Coefficient]], BeforeValidator(_pairs)]
 
 
 def lower_factor(matrix: Array) -> Array:
@@ -184,7 +165,7 @@ class RandomInterface:
             "between": between,
         }
         problems += [
-            f"{table}: {name!r} is not random here (valid: {', '.join(self.names)})"
+            unknown_name(table, name, self.names)
             for table, given in tables.items()
             for name in given
             if name not in self.names
