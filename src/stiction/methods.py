@@ -15,9 +15,8 @@ from pydantic import BeforeValidator
 
 from stiction.errors import InputError
 from stiction.model import Progress, checked, to_plain
-from stiction.problem import Problem, Sample, named_profiles, refusals
+from stiction.problem import Problem, Sample, refusals
 from stiction.profiles.placing import with_gaps
-from stiction.profiles.reading import gather
 from stiction.progress import Meter, Portions
 from stiction.results import (
     DIRECTION,
@@ -234,7 +233,7 @@ def onset(
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
         method adds. Every variable has `units` and `long_name`. If gaps were filled, also
-        `in_gap`, whether the onset lies in one, and the coordinate `measured` of nodes.
+        `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
 
     Raises
     ------
@@ -260,10 +259,7 @@ def onset(
     if refused := refusals(problem, method):
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
-    measured: Any = True
-    if not isinstance(profiles, Sample):
-        profiles, measured = gather(named_profiles(profiles), problem.interface, gaps)
-    sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
+    sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     solver, parts = prepared(problem, method), []
     with Meter(f"onset by {method.label}", sample.samples, progress) as meter:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,18 +17,17 @@ from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, describe, is_unplaced, model, real_array
-from stiction.profiles.placing import describe_gaps, turned
+from stiction.profiles.placing import Gaps, describe_gaps, turned
 from stiction.profiles.reading import at_nodes
 from stiction.results import PROFILES
 from stiction.solid import Solid
 
-ACCEPTED = ("barriers", "overstress", "constant")
 FEWEST_NODES = 4
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
-WEAKEST, STRONGEST = 1e-8, 1.0
+RIGIDITY = (1e-8, 1.0)
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
-LEAST_FRICTION, GREATEST_FRICTION = 1e-3, 10.0
+FRICTION = (1e-3, 10.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
@@ -182,13 +182,13 @@ class Problem:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
         problems: list[str] = []
         shape = self.interface.shape
-        nodes = " x ".join(map(str, shape))
         for part in ("friction", "load"):
             owner, placed = getattr(self, part), {}
             for name, value in vars(owner).items():
                 if isinstance(value, np.ndarray) and value.shape != shape:
                     problems.append(
-                        f"{part}.{name}: must have one entry for each of the {nodes} nodes, got"
+                        f"{part}.{name}: must have one entry for each of the"
+                        f" {' x '.join(map(str, shape))} nodes, got"
                         f" {describe(value)}{turned(value.shape, shape)}"
                     )
                 if is_unplaced(value):
@@ -213,32 +213,28 @@ class Problem:
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
         """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
-        ratio, pressure = strength / self.solid.shear_modulus, self.load.normal_pressure
-        coefficient = 1.0 if pressure is None else float(strength / np.mean(pressure))
-        if not WEAKEST <= ratio <= STRONGEST:
-            hint = ", and give coefficients as of='friction_coefficient'"
-            warn_user(
-                f"strength: its mean, {strength:.4g} Pa, is {ratio:.2g} of the shear modulus; check"
-                f" the units of both{hint * (0.0 < strength < 10.0 and pressure is not None)}",
-                UnitWarning,
+        modulus, pressure = self.solid.shear_modulus, self.load.normal_pressure
+        doubts = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+        hint = ""
+        if pressure is not None:
+            doubts.append(
+                ("strength", strength, "normal pressure", np.mean(pressure), FRICTION)
             )
-        elif not LEAST_FRICTION <= coefficient <= GREATEST_FRICTION:
-            warn_user(
-                f"strength: its mean, {strength:.4g} Pa, is {coefficient:.2g} of the normal"
-                " pressure; check the units of both, and that friction coefficients are no"
-                " percentages",
-                UnitWarning,
-            )
-        elif 0.0 < residual < WEAKEST * self.solid.shear_modulus:
-            warn_user(
-                f"residual_strength: its mean, {residual:.4g} Pa, is"
-                f" {residual / strength:.2g} of that of the strength; check the units of both",
-                UnitWarning,
-            )
-        elif self.friction.weakening_rate is None:  # otherwise warned of with the problem
-            (scale, value), drop = self.friction.scale, np.array(strength - residual)
-            rate = float(self.friction.rate(drop, scale, np.median(value)))
-            self._warn_if_short(max(rate, 1e-300))
+            hint = "; coefficients need of='friction_coefficient', and are no percentages"
+        if residual:
+            doubts.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
+        for name, mean, what, of, (least, most) in doubts:
+            if not least * of <= mean <= most * of:
+                warn_user(
+                    f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
+                    f" units of both{hint}",
+                    UnitWarning,
+                )
+                return
+        if self.friction.weakening_rate is None:  # otherwise warned of with the problem
+            scale, value = self.friction.scale
+            rate = self.friction.rate(np.array(strength - residual), scale, np.median(value))
+            self._warn_if_short(max(float(rate), 1e-300))
 
     @property
     def load_profile(self) -> Any:
@@ -310,16 +306,15 @@ class Problem:
         """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
         resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
         if min(resolution) < enough:
-            nodes = f"{resolution[0]:.1f} nodes"
+            spanned = f"{resolution[0]:.1f} nodes"
             if self.interface.is_plane:
-                nodes = f"{nodes} along x and, in mode III, {resolution[1]:.1f} along y"
+                spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
             wanted = 16 if enough <= 12.0 else 32
-            finer = np.ceil(
-                0.5 * np.array(self.interface.shape) * wanted / np.array(resolution)
-            )
+            finer = 0.5 * np.array(self.interface.shape) * wanted / np.array(resolution)
+            nodes = " x ".join(f"{2 * n:g}" for n in np.ceil(finer))
             warn_accuracy(
-                f"the nucleation length spans {nodes}; {wanted} are recommended"
-                f" (interface.nodes = {' x '.join(f'{2 * n:g}' for n in finer)}): {cost}"
+                f"the nucleation length spans {spanned}; {wanted} are recommended"
+                f" (interface.nodes = {nodes}): {cost}"
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
@@ -348,37 +343,47 @@ class Problem:
         A node whose strength is not above its residual strength does not weaken: its strength is
         constant. An `AccuracyWarning` gives the share of such nodes.
         """
+        return self.placed_sample(profiles, accept)[0]
+
+    def placed_sample(
+        self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
+    ) -> tuple[Sample, Any]:
+        """Return a sample, and where all of its profiles were measured.
+
+        The mask has the shape (samples, *shape) or (1, *shape); it is True if nothing is missing.
+        """
         if isinstance(profiles, Sample):
-            return profiles
-        if not isinstance(accept, Collection) or any(one not in ACCEPTED for one in accept):
-            names = ", ".join(map(repr, ACCEPTED))
-            raise InputError(f"accept: must be a collection of {names}, got {accept!r}")
-        given, problems = named_profiles(profiles), []
-        friction, load, interface = self.friction, self.load, self.interface
+            return profiles, True
+        given, friction, interface = named_profiles(profiles), self.friction, self.interface
+        if "strength" not in given:
+            raise InputError("strength: missing among the profiles")
+        problems: list[str] = []
+        measured = [np.ones((1, *interface.shape), dtype=bool)]
         scales = [name for name in SCALES if name in given]
         if len(scales) > 1:
             problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
 
-        def checked(name: str, own: Any, samples: int | None, infinite: bool = False) -> Any:
+        def read(name: str, own: Any, samples: int | None) -> Any:
             try:
-                return profiles_of(name, given.get(name, own), interface, samples, infinite)
+                value, known = at_nodes(name, given.get(name, own), interface, gaps)
+                if not np.all(known):
+                    measured.append(known.reshape(-1, *interface.shape))
+                return _rows(name, value, interface, samples, "barriers" in accept)
             except InputError as error:
                 problems.extend(error.problems)
                 return np.ones(1)
 
-        if "strength" not in given:
-            raise InputError("strength: missing among the profiles")
-        strength = checked("strength", None, None, "barriers" in accept)
+        strength = read("strength", None, None)
         samples = len(strength)
         residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
-        residual = checked("residual_strength", residual, samples)
-        initial = checked("initial_stress", load.initial_stress, samples)
+        residual = read("residual_strength", residual, samples)
+        initial = read("initial_stress", self.load.initial_stress, samples)
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
-        if load.normal_pressure is not None or "normal_pressure" in given:
-            pressure = checked("normal_pressure", load.normal_pressure, samples)
-        scale, own_scale = friction.scale
+        if self.load.normal_pressure is not None or "normal_pressure" in given:
+            pressure = read("normal_pressure", self.load.normal_pressure, samples)
+        scale, value = friction.scale
         scale = scales[0] if scales else scale
-        value = checked(scale, own_scale, samples)
+        value = read(scale, value, samples)
         problems = problems or self._impossible(strength, residual, initial, accept)
         if problems:
             raise InputError(problems)
@@ -395,9 +400,10 @@ class Problem:
                     f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
                     " % of the nodes; these do not weaken: their strength is constant"
                 )
-        self._check_resolution(steepest_rate(strength, residual, rates))
         load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
-        return Sample(strength, residual, rates, initial, load_shape, pressure)
+        sample = Sample(strength, residual, rates, initial, load_shape, pressure)
+        self._check_resolution(sample.steepest_rate)
+        return sample, reduce(np.logical_and, measured)
 
     def _impossible(
         self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
@@ -416,11 +422,11 @@ class Problem:
         if nowhere.any():
             number = int(np.argmax(nowhere))
             least, most = strength[number].min(), strength[number].max()
-            lower = np.broadcast_to(residual, strength.shape)[number]
             problems.append(
                 "strength: must be finite and above residual_strength at one node or more; in"
                 f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
-                f" {lower.min():g} to {lower.max():g} Pa: check the units of both"
+                f" {residual[number].min():g} to {residual[number].max():g} Pa: check the units of"
+                " both"
             )
         return problems
 
@@ -435,58 +441,52 @@ class Problem:
         return rates
 
 
-def profiles_of(
-    name: str,
-    value: Any,
-    interface: Interface,
-    samples: int | None = None,
-    infinite: bool = False,
+def _rows(
+    name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
 ) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError` naming it.
 
-    A single profile (*shape) is one sample; where `samples` is given, a number, a profile
-    or one number a sample, of shape (samples, 1), is broadcast to all. Of labelled arrays
-    the names of dimensions, the coordinates and the units decide. Positive infinity passes
-    if `infinite`.
+    A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
+    or one number a sample, of shape (samples, 1), is broadcast to all.
     """
     shape = interface.shape
-    nodes = ", ".join(map(str, shape))
-    valid = f"({samples or 'samples'}, {nodes}) or ({nodes}{',' if len(shape) == 1 else ''})"
-    if samples is not None:
-        valid += f", ({samples}, 1) or a number"
+    column = (samples or 0, *(1 for _ in shape))
     try:
-        array = real_array(at_nodes(name, value, interface)[0])
+        array = real_array(value)
     except TypeError as error:
-        raise InputError(f"{name}: must be numbers of shape {valid}; {error}") from None
+        raise InputError(f"{name}: must be numbers; {error}") from None
     if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
         array = array[..., 0]
-    column = (samples or 0, *(1 for _ in shape))
     if array.shape == (samples, 1):
         array = array.reshape(column)
-    several = array.shape[1:] == shape and samples in (None, len(array))
+    several = array.shape[1:] == shape and samples in (None, len(array)) and array.size > 0
     broadcast = samples is not None and array.shape in ((), column)
     if not (array.shape == shape or several or broadcast):
+        nodes = ", ".join(map(str, shape))
+        valid = (
+            f"({nodes}{',' if len(shape) == 1 else ''}) or ({samples or 'samples'}, {nodes})"
+        )
+        valid += "" if samples is None else f", ({samples}, 1) or a number"
         hint = turned(array.shape[-2:], shape)
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{hint}")
-    if array.size == 0:
-        raise InputError(f"{name}: has no samples, shape {array.shape}")
-    _check_values(name, array, interface, infinite)
+    _check_values(name, array, interface, barriers and name == "strength")
     if samples is not None:
         return np.broadcast_to(array, (samples, *shape))
     return array[None] if array.shape == shape else array
 
 
 def _check_values(name: str, array: Array, interface: Interface, infinite: bool) -> None:
-    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
     missing = np.isnan(array)
     if missing.any() and array.shape[-len(interface.shape) :] == interface.shape:
         raise InputError(
-            f"{name}: {describe_gaps(missing, interface)}; gaps='fill' of st.onset and"
-            " st.read_profile fills them with straight lines"
+            f"{name}: {describe_gaps(missing, interface)}; pass gaps='fill' to st.onset or"
+            " st.read_profile to fill them"
         )
+    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
     if bad.any():
-        entry = tuple(int(i) for i in np.argwhere(np.atleast_1d(bad))[0])
-        raise InputError(f"{name}: must be finite; entry {entry} is not, or beyond {LARGEST:g}")
+        entry = tuple(np.argwhere(bad)[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        raise InputError(f"{name}: must be finite; entry {entry} is {given}")
     least = f"{array.min():g} {PROFILES[name].units}"
     if name in SCALES and array.min() <= 0.0:
         raise InputError(f"{name}: must be positive, got {least}")

@@ -171,7 +171,7 @@ MISTAKES = {
     "strength ... numbers": lambda: onset("strong"),
     "strength: values are missing": lambda: onset(np.full(256, np.nan)),
     "strength ... finite ... 1e+100": lambda: onset(np.full(256, 1e308)),
-    "strength ... no samples": lambda: onset(np.ones((0, 256))),
+    "strength ... (0, 256)": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),
     "strength ... masked": lambda: onset(np.ma.masked_less(np.arange(256.0), 3)),
     "residual_strength ... in sample 0 ... residual_strength 2e+06 to 2e+06 Pa": lambda: onset(

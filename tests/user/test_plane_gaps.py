@@ -64,7 +64,7 @@ def test_an_onset_in_a_gap_of_a_map_says_so():
     values[24, 4] = values[24, 9] = 0.3e6
     with pytest.raises(st.InputError, match="values are missing"):
         st.onset(problem, values, method=st.LocalCriterion())
-    with pytest.warns(st.AccuracyWarning, match="lies in a gap of the profile"):
+    with pytest.warns(st.AccuracyWarning, match="reaches into a gap of the profile"):
         found = st.onset(problem, values, method=st.LocalCriterion(), gaps="fill")
     assert bool(found["in_gap"].item())
     whole = st.onset(problem, VALUES, method=st.LocalCriterion())

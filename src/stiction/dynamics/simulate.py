@@ -22,9 +22,8 @@ from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
 from stiction.errors import InputError, StoreError, warn_accuracy
 from stiction.model import Progress, checked, to_plain
-from stiction.problem import Problem, named_profiles, refusals
+from stiction.problem import Problem, refusals
 from stiction.profiles.placing import with_gaps
-from stiction.profiles.reading import gather
 from stiction.progress import Meter
 from stiction.results import DIRECTION, Variable, along, coordinate
 
@@ -96,8 +95,7 @@ def simulate_rupture(
     save = Save() if save is None else save
     if refused := refusals(problem, method):
         raise InputError(refused)
-    given, measured = gather(named_profiles(profiles), problem.interface)
-    rows = problem.sample(given, accept=method.accepts)
+    rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
     stations = save.nodes(problem.interface)

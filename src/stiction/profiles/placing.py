@@ -6,7 +6,6 @@ anywhere. What is missing stays NaN unless it is filled on request.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -255,47 +254,35 @@ def describe_gaps(missing: Mask, interface: Interface) -> str:
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
-    """Return a result with the gaps of its profiles, and a mark of onsets that lie in one."""
+    """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
     if np.all(measured):
         return result
-    interface = problem.interface
-    position = result["critical_position"]
-    places = np.reshape(position.values, (-1, len(interface.shape)))
+    interface, position = problem.interface, result["critical_position"]
+    places = position.values.reshape(-1, len(interface.shape))
     rate = problem.uniform_rate
     patch = interface.spacings if rate is None else problem.nucleation_lengths(rate)
-    inside = _missing_near(places, measured, interface, interface.spacings)
-    near = _missing_near(places, measured, interface, [0.5 * h for h in patch]) & ~inside
-    for where, what, verb in (
-        (inside, "the onset", "lies in"),
-        (near, "the critical patch", "reaches into"),
-    ):
-        if where.any():
-            first = zip(interface.dims, places[int(np.argmax(where))], strict=True)
-            at = ", ".join(f"{dim} = {place:.6g} m" for dim, place in first)
-            warn_accuracy(
-                f"{what} at {at} {verb} a gap of the profile ({where.sum()} of {where.size}"
-                " samples): the strength there was filled in, not measured"
-            )
-    found = position.isel(direction=0, drop=True) if interface.is_plane else position
-    about = {"units": "1", "long_name": "whether the onset lies in a gap of the profile"}
-    result[IN_GAP] = (found.dims, inside.reshape(found.shape), about)
-    one = len(measured) == 1
-    nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
-    mask = (interface.dims, measured[0]) if one else (("sample", *interface.dims), measured)
-    return result.assign_coords(nodes | {MEASURED: mask})
-
-
-def _missing_near(
-    places: Array, measured: Mask, interface: Interface, reach: Sequence[float]
-) -> Mask:
-    """Return whether nodes nearer than `reach` (m, by direction) to places (k, D) are missing."""
     missing = ~measured
-    for axis, (nodes, length) in enumerate(
-        zip(interface.coordinates.values(), interface.lengths, strict=True)
-    ):
-        apart = nodes - places[:, axis, np.newaxis]
-        apart = np.abs(np.mod(apart + 0.5 * length, length) - 0.5 * length)
-        near = apart < (1.0 - 1e-9) * reach[axis]
-        along = (nodes.size if i == axis else 1 for i in range(len(interface.shape)))
-        missing = missing & near.reshape(len(places), *along)
-    return np.asarray(missing.any(axis=interface.axes))
+    for axis, (dim, nodes) in enumerate(interface.coordinates.items()):
+        length, spacing = interface.lengths[axis], interface.spacings[axis]
+        apart = nodes - places[:, axis, np.newaxis] + 0.5 * length
+        apart = np.abs(np.mod(apart, length) - 0.5 * length)
+        near = apart < (1.0 - 1e-9) * max(0.5 * patch[axis], spacing)
+        missing = missing & near.reshape(
+            -1, *(nodes.size if dim == d else 1 for d in interface.dims)
+        )
+    found = missing.any(axis=interface.axes)
+    if found.any():
+        first = zip(interface.dims, places[int(np.argmax(found))], strict=True)
+        warn_accuracy(
+            f"the critical patch at {', '.join(f'{dim} = {at:.6g} m' for dim, at in first)} reaches"
+            f" into a gap of the profile ({found.sum()} of {found.size} samples): the strength"
+            " there was filled in, not measured"
+        )
+    dims = tuple(dim for dim in position.dims if dim != "direction")
+    about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
+    result[IN_GAP] = (dims, found.reshape([position.sizes[dim] for dim in dims]), about)
+    nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
+    along = (("sample", *interface.dims), measured)
+    return result.assign_coords(
+        nodes | {MEASURED: along if len(measured) > 1 else (interface.dims, measured[0])}
+    )

@@ -411,28 +411,6 @@ def at_nodes(
     return value, True
 
 
-def gather(
-    given: Mapping[str, Any], interface: Interface, gaps: Gaps = "refuse"
-) -> tuple[dict[str, Any], Any]:
-    """Put what a caller gave on the nodes, and find where all of it was measured.
-
-    The mask has the shape (samples, *shape) or (1, *shape); it is True if nothing is missing.
-    """
-    problems: list[str] = []
-    values, measured = {}, True
-    for name, value in given.items():
-        try:
-            values[name], whole = at_nodes(name, value, interface, gaps)
-        except InputError as error:
-            problems += error.problems
-            continue
-        if not np.all(whole):
-            measured = measured & whole.reshape(-1, *interface.shape)
-    if problems:
-        raise InputError(problems)
-    return values, measured
-
-
 def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
     """Return the profile that a study file names for a parameter, its path relative to `folder`.
 
