@@ -6,7 +6,6 @@ Computes, draws, judges and writes a page. A second call completes what is missi
 import argparse
 import os
 import sys
-import time
 import warnings
 from pathlib import Path
 
@@ -28,7 +27,6 @@ NEEDS = {
 def main(arguments: list[str] | None = None) -> None:
     """Run the command."""
     options = _options(arguments)
-    started = time.monotonic()
     import stiction as st
     from reproduction import claims, modulus, page, runner, statements_onset, statements_rupture
     from reproduction.runner import FULL, QUICK, USUAL
@@ -36,24 +34,26 @@ def main(arguments: list[str] | None = None) -> None:
     size = QUICK if options.quick else FULL if options.full else USUAL
     out = Path(options.out)
     run = runner.Runner(out, size, options.seed, options.workers)
+    rows = statements_onset.GROUPS | statements_rupture.GROUPS
+    rows |= {"Which modulus": modulus.CLAIMS}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
-        data = claims.Data(_compute(run, options.figures), size)
-        images = _draw(run, data, options.figures, out / "figures")
+        with run.started(_jobs(size, options.figures)) as studies:
+            data = claims.Data(studies, size)
+            images = _draw(run, data, options.figures, out / "figures")
+            if options.figures:
+                run.say(f"figures in {out / 'figures'}")
+                return
+            groups = {
+                title: [claims.judge(claim, data) for claim in each]
+                for title, each in rows.items()
+            }
     warned = sorted(
         {str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning)}
     )
-    if options.figures:
-        run.say(f"figures in {out / 'figures'}")
-        return
-    rows = statements_onset.GROUPS | statements_rupture.GROUPS
-    rows |= {"Which modulus": modulus.CLAIMS}
-    groups = {
-        title: [claims.judge(claim, data) for claim in each] for title, each in rows.items()
-    }
     claims.write_csv([found for each in groups.values() for found in each], out / "claims.csv")
     page.write(out / "report.html", data, groups, images, run, warned)
-    run.say(f"done in {time.monotonic() - started:.0f} s: {out / 'report.html'}")
+    run.say(f"done: {out / 'report.html'}")
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
@@ -81,34 +81,28 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _compute(run, figures) -> dict:
+def _jobs(size, figures) -> list:
     from reproduction import studies
 
     wanted = {*BASIC, *(name for number in figures for name in NEEDS[number])}
-    results = {}
-    for name, text, function in studies.jobs(run.size):
-        if not figures or name.removesuffix("-inertia") in wanted:
-            started = time.monotonic()
-            run.say(text)
-            results[name] = function(run)
-            run.seconds[name] = time.monotonic() - started
-    return results
+    jobs = studies.jobs(size)
+    return [job for job in jobs if not figures or job[0].removesuffix("-inertia") in wanted]
 
 
 def _draw(run, data, chosen, folder: Path) -> dict:
+    """Draw figures as soon as their studies are done."""
     import stiction as st
     from reproduction.figures import beyond, paper
 
     folder.mkdir(parents=True, exist_ok=True)
-    run.say("figures")
-    started = time.monotonic()
     images = {}
     with st.plot.paper_style():
         for number in chosen or NEEDS:
             module = paper if number <= 7 else beyond
             images[number] = folder / f"figure_{number:02}.png"
-            getattr(module, f"figure_{number}")(data).savefig(images[number], dpi=200)
-    run.seconds["figures"] = time.monotonic() - started
+            figure = getattr(module, f"figure_{number}")(data)
+            run.say(f"figure {number}")
+            figure.savefig(images[number], dpi=200)
     return images
 
 

@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,20 +40,20 @@ class Series:
 
 
 class Data:
-    """The studies by name, with short ways to their numbers."""
+    """The studies by name, as futures, with short ways to their numbers."""
 
-    def __init__(self, studies: Mapping[str, xr.Dataset], size: Size) -> None:
+    def __init__(self, studies: Mapping[str, Future], size: Size) -> None:
         self.studies, self.size = studies, size
 
     def __contains__(self, name: str) -> bool:
         return name in self.studies
 
     def __getitem__(self, name: str) -> xr.Dataset:
-        return self.studies[name]
+        return self.studies[name].result()
 
     def at(self, study: str, name: str, ratio: float) -> np.ndarray:
         """Return a variable of a study at one xi_0/h_n."""
-        return self.studies[study][name].sel(correlation_ratio=ratio).values
+        return self[study][name].sel(correlation_ratio=ratio).values
 
     def stress(self, ratio: float, study: str = "local") -> np.ndarray:
         """Return tau_cr of every sample, Pa."""
@@ -71,7 +72,7 @@ class Data:
 
     def what_if(self, name: str, variable: str, point: int) -> np.ndarray:
         """Return a variable of a what-if at one of its points."""
-        return self.studies[name][variable].isel(point=point).values
+        return self[name][variable].isel(point=point).values
 
 
 Measured = tuple[Sequence[Series], Sequence[Series]]

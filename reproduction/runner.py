@@ -1,11 +1,14 @@
 """Where studies are run and kept: a folder that a second call only completes."""
 
+import collections
+import contextlib
 import dataclasses
 import functools
 import hashlib
 import inspect
 import itertools
 import json
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,6 +17,9 @@ import xarray as xr
 
 import stiction as st
 from reproduction import setting
+
+with contextlib.suppress(ImportError):  # xarray would import it in several threads at once
+    import dask.base  # noqa: F401
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,18 +45,44 @@ FULL = Size(samples=10_000, ruptures=20, readings=2000, trend=10_000, what_if=40
 
 
 class Runner:
-    """Runs studies of a size into a folder, on so many threads."""
+    """Runs studies of a size into a folder, side by side on so many threads."""
 
     def __init__(self, out: Path, size: Size, seed: int, workers: int) -> None:
         self.folder = out / "studies"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.size, self.seed, self.workers = size, seed, workers
-        self.started = time.monotonic()
-        self.seconds: dict[str, float] = {}
+        self.began = time.monotonic()
+        self.locks = collections.defaultdict(threading.Lock)
+
+    @contextlib.contextmanager
+    def started(self, jobs):
+        """Compute studies, given as (name, text, function); yield their futures by name.
+
+        They share the threads of `pool`. One study more than these is under way, so that no
+        thread waits for the last samples of a study.
+        """
+
+        def compute(text, function):
+            self.say(text)
+            return function(self)
+
+        with (
+            ThreadPoolExecutor(self.workers) as self.pool,
+            ThreadPoolExecutor(self.workers + 1) as studies,
+        ):
+            try:
+                found = {name: studies.submit(compute, *job) for name, *job in jobs}
+                yield found
+                for future in found.values():
+                    future.result()
+            except BaseException:
+                for pool in (studies, self.pool):
+                    pool.shutdown(wait=False, cancel_futures=True)
+                raise
 
     def say(self, text: str) -> None:
         """Print a line of progress."""
-        print(f"{time.monotonic() - self.started:5.0f} s  {text}", flush=True)
+        print(f"{time.monotonic() - self.began:5.0f} s  {text}", flush=True)
 
     def study(self, name: str, study: st.Study) -> xr.Dataset:
         """Run a study into its folder, or what is missing of it."""
@@ -58,7 +90,8 @@ class Runner:
         plain["ensemble"] = {k: v for k, v in plain["ensemble"].items() if k != "samples"}
         plain.pop("title", None)
         place = self.folder / f"{name}-{_digest(plain)}"
-        return study.run(out=place, workers=self.workers, progress=False, pilot=False)
+        with self.locks[place]:
+            return study.run(out=place, executor=self.pool, progress=False, pilot=False)
 
     def sweep(self, name: str, problem, field_of, method, samples: int, ratios=setting.RATIOS):
         """Run one study at each xi_0/h_n, with draws of its own, along 'correlation_ratio'."""
@@ -69,7 +102,6 @@ class Runner:
                 random=field_of(ratio),
                 method=method,
                 ensemble=st.Ensemble(samples=samples, seed=self.seed_of(ratio)),
-                title=f"{name} at xi_0/h_n = {ratio:g}",
             )
             parts.append(self.study(f"{name}-{ratio:g}", study))
         return along("correlation_ratio", ratios, parts)
@@ -80,8 +112,7 @@ class Runner:
 
     def map(self, function, items) -> list:
         """Return [function(*item) for item in items], computed by all threads."""
-        with ThreadPoolExecutor(self.workers) as pool:
-            return list(pool.map(function, *zip(*items, strict=True)))
+        return list(self.pool.map(function, *zip(*items, strict=True)))
 
     def grid(self, function, **axes) -> xr.Dataset:
         """Return the datasets function(*point) of all points of a grid, along its axes."""
@@ -91,13 +122,13 @@ class Runner:
             parts = [along(name, values, parts[i : i + len(values)]) for i in starts]
         return parts[0]
 
-    def batches(self, function, dim: str, values, samples: int, size: int = 250) -> xr.Dataset:
+    def batches(self, function, dim: str, values, samples: int) -> xr.Dataset:
         """Return function(value, first, count) of all samples at each value, by batches.
 
         Variables along 'sample' are joined, others are added.
         """
-        firsts = range(0, samples, size)
-        items = [(v, first, min(size, samples - first)) for v in values for first in firsts]
+        firsts = range(0, samples, 256)  # draws come in blocks of 256
+        items = [(v, first, min(256, samples - first)) for v in values for first in firsts]
         parts, rows = self.map(function, items), []
         for i in range(0, len(parts), len(firsts)):
             row = parts[i : i + len(firsts)]
@@ -120,11 +151,13 @@ def kept(**inputs):
             source = inspect.getsource(function)
             mark = _digest([run.seed, st.__version__, source, values])
             place = run.folder / f"{function.__name__}-{mark}.nc"
-            if not place.exists():
-                unfinished = place.with_suffix(".unfinished")
-                function(run, **values).to_netcdf(unfinished)
-                unfinished.replace(place)
-            return xr.load_dataset(place)
+            with run.locks[place]:
+                found = None if place.exists() else function(run, **values)
+                with run.locks["netCDF"]:  # its library is for one thread at a time
+                    if found is not None:
+                        found.to_netcdf(place.with_suffix(".unfinished"))
+                        place.with_suffix(".unfinished").replace(place)
+                    return xr.load_dataset(place)
 
         return study
 

@@ -10,7 +10,6 @@ from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
 from reproduction.rules import above, below, corrected, each, falling, graded, rising, within
 from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
-from reproduction.studies import points
 
 KPA, MPA, PER_CENT = 1e-3, 1e-6, 100.0
 RARE = below(0.01, "extremely unlikely: 60 simulations would not show it")
@@ -376,20 +375,13 @@ CASES = {
 
 def shares(d: Data, name: str, chosen=None, *, inertia: bool = False) -> Series:
     """Return the share of samples with an arrested event at points of a what-if."""
-    label = "share with an arrested event, " + (
-        "with inertia" if inertia else "without inertia"
-    )
+    label = f"share with an arrested event, {'with' if inertia else 'without'} inertia"
+    events = d[f"{name}-inertia" if inertia else name]["arrested_events"]
     if inertia:
-        study = d[f"{name}-inertia"]["arrested_events"].values
-        rows = list(zip(points(name), study, strict=True))
-        label += f" ({study.shape[1]} ruptures each)"
-    else:
-        study = d[name]["arrested_events"].values
-        rows = [(i, study[i]) for i in range(len(study))]
+        label += f" ({events.sizes['sample']} ruptures each)"
     chosen = chosen or range(len(CASES[name]))
-    return Series(
-        label, "", [(CASES[name][i], share(row > 0)) for i, row in rows if i in chosen]
-    )
+    rows = zip(events["point"].values, events.values > 0, strict=True)
+    return Series(label, "", [(CASES[name][i], share(row)) for i, row in rows if i in chosen])
 
 
 def _both(name: str, *chosen: int):

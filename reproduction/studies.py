@@ -254,7 +254,6 @@ def trend(run: Runner) -> xr.Dataset:
             method=LOCAL,
             ensemble=st.Ensemble(samples=run.size.trend, seed=run.seed),
             sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
-            title="Critical stress against correlation length",
         )
         found = run.study(f"trend-{int(mode)}", study).rename(correlation_length="ratio")
         parts.append(found[["critical_stress"]].assign_coords(ratio=list(TREND)))
@@ -550,7 +549,7 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
         change = free["first_instability"].values / periodic["first_instability"].values - 1.0
         return xr.Dataset({"change": ("sample", change), "end": ("sample", end)})
 
-    return run.batches(batch, "case", range(len(cases)), count, size=50)
+    return run.batches(batch, "case", range(len(cases)), count)
 
 
 @kept()
@@ -562,19 +561,10 @@ def failure(run: Runner) -> xr.Dataset:
     ).drop_attrs()  # fmt: skip
 
 
-WHAT_IFS = {
-    "skewness": "strength skewed to low and to high values",
-    "exponent": "spectral exponent at equal decay length",
-    "length": "length of the interface",
-    "normal_load": "normal pressure",
-    "wide_strength": "range of the strength",
-    "random_load": "random initial stress",
-    "random_residual": "random residual strength",
-    "correlation": "residual strength correlated with the strength",
-    "uniform_dc": "uniform d_c instead of uniform weakening rate",
-}
-LOCAL_ONLY = ("skewness", "exponent", "length")
-"""What-ifs by the local criterion, which afford many samples."""
+WHAT_IFS = (
+    "wide_strength", "correlation", "random_residual", "random_load", "normal_load", "length",
+    "exponent", "skewness", "uniform_dc",
+)  # fmt: skip
 ARRESTS = {
     "wide_strength": ((1, 3),),
     "random_load": ((3, 5),),
@@ -587,7 +577,7 @@ ARRESTS = {
 def what_if(run: Runner, name: str) -> xr.Dataset:
     """A study file of `what_if/`, its swept points stacked along 'point'."""
     study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
-    most = run.size.trend if name in LOCAL_ONLY else run.size.what_if
+    most = run.size.trend if study.method == LOCAL else run.size.what_if
     ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
     return stacked(run.study(name, dataclasses.replace(study, ensemble=ensemble)))
 
@@ -600,23 +590,18 @@ def stacked(found: xr.Dataset) -> xr.Dataset:
 
 
 def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
-    """The points of a what-if in which arrest is the question, with inertia."""
+    """Points of a what-if in which arrest is the question, with inertia; 'point' numbers them."""
     plain = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml").to_dict()
+    sizes = [len(next(iter(axis.values()))) for axis in plain["sweep"]]
+    numbers = np.arange(math.prod(sizes)).reshape(sizes)[np.ix_(*ARRESTS[name])]
     plain["sweep"] = [
         {key: [values[i] for i in chosen] for key, values in axis.items()}
         for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
     ]
     plain["method"] = RUNAWAY
     plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
-    return stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
-
-
-def points(name: str) -> list[int]:
-    """Return the points of a what-if, numbered as in `stacked`, that are run with inertia."""
-    plain = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml").to_dict()
-    sizes = [len(next(iter(axis.values()))) for axis in plain["sweep"]]
-    grid = np.arange(math.prod(sizes)).reshape(sizes)
-    return [int(point) for point in grid[np.ix_(*ARRESTS[name])].ravel()]
+    found = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
+    return found.assign_coords(point=numbers.ravel())
 
 
 STUDIES = (
@@ -630,8 +615,9 @@ def jobs(size: Size):
     """Yield the name, the progress line and the function of every study."""
     for study in (*STUDIES, dynamic) if size.dynamic else STUDIES:
         yield study.__name__, study.__doc__.partition(".")[0], study
-    for name, text in WHAT_IFS.items():
-        yield name, f"What if: {text}", functools.partial(what_if, name=name)
+    for name in WHAT_IFS:
+        text = f"What if: {name.replace('_', ' ')}"
+        yield name, text, functools.partial(what_if, name=name)
         if name in ARRESTS:
-            text = f"What if: {text}, {size.arrests} ruptures each"
+            text += f", {size.arrests} ruptures each"
             yield f"{name}-inertia", text, functools.partial(what_if_dynamic, name=name)

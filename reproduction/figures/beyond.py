@@ -126,9 +126,6 @@ def figure_11(d: Data):
     return figure
 
 
-XI_UNIT = r"$h_\mathrm{n}$"
-
-
 def figure_12(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
     figure = common.new(5.6)
@@ -210,7 +207,9 @@ def _shares(axes, d: Data, name: str, title: str) -> None:
         error = np.array([200 * number.error for _, number in series.rows])
         inside = (np.minimum(error, value), np.minimum(error, 100 - value))
         axes.errorbar(value, y, xerr=inside, fmt=marker, color=colour, ms=4, label=text)
-    axes.set_yticks(range(len(places)), [case.replace("h_n", XI_UNIT) for case in places])
+    axes.set_yticks(
+        range(len(places)), [case.replace("h_n", r"$h_\mathrm{n}$") for case in places]
+    )
     axes.set(xlim=(-3, 103), title=title, ylim=(len(places) - 0.5, -0.5))
 
 
