@@ -1,8 +1,7 @@
 """A field that is known in part: measured values with errors, and what follows for the rest.
 
-A Gaussian field on an interface is a linear function of its draws a, z(x) = phi(x)^T a,
-with a standard normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose
-posterior is
+A Gaussian field is a linear function of its draws, z(x) = phi(x)^T a with a standard normal.
+So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
 
     a | z ~ N(mu, P),  P = (1 + Psi^T Psi)^-1,  mu = P Psi^T (z_k/error_k)
 
@@ -37,19 +36,14 @@ from stiction.profiles.units import parse
 from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
 
-NEGLIGIBLE = 1e-8
-"""Singular values below which a direction of the draws stays as it is, to round-off."""
-DOUBTFUL = 5.0
-"""Standard deviations of chi-square beyond which measured values do not suit a field."""
-IMPOSSIBLE = 4.0
-"""Errors beyond a bound of the marginal that no measured value has."""
-FURTHEST = 37.0
-"""Largest z whose tail of the normal distribution is a float."""
-REACH, NODES, TURNS = 8.0, 49, 8
-"""Half width of Gaussians, nodes across them, and turns between likelihood and regression."""
-FLAT, SHARP, TINY, SETTLED = 1e-4, 1e-4, 1e-12, 1e-3
-"""Least precision of a measured z, its error that needs no turns, least variance, and a change of z
-that ends the turns."""
+DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
+IMPOSSIBLE = 4.0  # errors beyond a bound of the marginal that no measured value has
+FURTHEST = 37.0  # largest z whose tail of the normal distribution is a float
+REACH, NODES = 8.0, 49  # half width of Gaussians, and nodes across them
+TURNS, SETTLED = 8, 1e-3  # between likelihood and regression; change of z that ends them
+NEGLIGIBLE = 1e-8  # singular value below which a direction of the draws stays as it is
+FLAT, SHARP = 1e-4, 1e-4  # least precision of a measured z; its error that needs no turns
+TINY = 1e-12  # least variance
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
@@ -199,15 +193,8 @@ def _normal_score(below: Array, above: Array) -> Array:
 
 
 class Conditioning:
-    """Standard normal draws, given what was measured.
+    """Standard normal draws, given what was measured of properties, one with a factor at most.
 
-    Parameters
-    ----------
-    measured : sequence of Measured
-        Of one or several properties; at most one has a factor between specimens.
-
-    Notes
-    -----
     The draw u of a factor between specimens has the posterior
 
         log p(u | values) = -u^2/2 + log scale(u) - chi^2(u)/2 - sum log(1 + s^2(u))/2,

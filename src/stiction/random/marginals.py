@@ -94,27 +94,18 @@ class _ByMoments(Marginal):
             raise InputError(
                 f"mean and cv: must have finite squares, got mean={self.mean:g}, cv={self.cv:g}"
             )
+        hint = f"got {self.cv:g}; for {self.cv:g} % give {self.cv / 100:g}"
         if self.cv > WIDEST:
-            hint = f"; for {self.cv:g} % give {self.cv / 100:g}"
-            raise InputError(f"cv: must be at most {WIDEST:g}, got {self.cv:g}{hint}")
+            raise InputError(f"cv: must be at most {WIDEST:g}, {hint}")
         _ = self.distribution  # there may be none with these moments
         if self.cv > 1.0:
-            warn_user(
-                f"cv: {self.cv:g} is a standard deviation of {self.cv:g} times the mean; for"
-                f" {self.cv:g} % give {self.cv / 100:g}",
-                UnitWarning,
-            )
+            warn_user(f"cv: is a standard deviation over a mean, {hint}", UnitWarning)
         return self
-
-    @property
-    def _excess(self) -> float:
-        """Mean above the lower bound."""
-        return self.mean - self.low
 
     @property
     def _ratio(self) -> float:
         """Standard deviation over the mean above the lower bound."""
-        return self.cv * self.mean / self._excess
+        return self.cv * self.mean / (self.mean - self.low)
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         """Shape of the family, and mean above `low` over scale, that have this ratio."""
@@ -123,7 +114,7 @@ class _ByMoments(Marginal):
     @cached_property
     def distribution(self) -> Any:
         shape, mean_over_scale = self._shape(self._ratio)
-        return self.family(shape, self.low, self._excess / mean_over_scale)
+        return self.family(shape, self.low, (self.mean - self.low) / mean_over_scale)
 
 
 @model(kw_only=True)
@@ -232,7 +223,8 @@ class TruncatedNormal(_ByMoments):
             return np.array(errors)
 
         # An exponential distribution, and between two bounds a uniform one, are the widest.
-        room = min(self._excess**2, self._excess * max(high - self.mean, 0.0) / 2.0)
+        excess = self.mean - self.low
+        room = min(excess**2, excess * max(high - self.mean, 0.0) / 2.0)
         found = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if found is None or not np.abs(moments(found.x)).max() < 1e-8:
             raise InputError(

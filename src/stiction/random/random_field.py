@@ -23,11 +23,9 @@ from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import CustomSpectrum, Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import block_of, standard_normal
 
-ENOUGH_ACCOUNTED = 0.01
-FEWEST_LENGTHS = 8.0 * math.pi
-"""e-folding lengths in an interface below which a missing mean mode may be felt."""
-LOST, FALLEN = 1e-4, 0.02
-"""What is worth a warning: a share of the variance, and a negative correlation."""
+FEWEST_LENGTHS = 8.0 * math.pi  # e-folding lengths that make a mean mode superfluous
+# What is worth a warning: a share of the variance, a negative correlation, an error of one.
+LOST, FALLEN, UNCERTAIN = 1e-4, 0.02, 0.01
 
 Of: TypeAlias = Literal["strength", "z"]
 
@@ -106,12 +104,8 @@ class RandomField:
     ) -> Array:
         """Draw the standard normal numbers of samples `first`, `first` + 1, ....
 
-        Draw j of sample i depends on (seed, i, j) only, not on the batch or spectrum.
-
-        Returns
-        -------
-        (samples, dimension) array
-            A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
+        Draw j of sample i depends on (seed, i, j) only, not on the batch or spectrum. Returned
+        are (samples, dimension): A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
         modes = self.modes(interface)
         check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
@@ -131,12 +125,7 @@ class RandomField:
         return modes.gaussian(draws)
 
     def profiles(self, interface: Interface, draws: Array) -> Array:
-        """Map draws, (samples, dimension) in the order of `draws`, to profiles.
-
-        Returns
-        -------
-        (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
-        """
+        """Map draws (samples, dimension) to profiles (samples, *shape), in the field's unit."""
         if self.conditions is not None:
             draws = conditioning(self, interface).draws(draws)
         return from_normal(self.marginal, self.gaussian(interface, draws))
@@ -145,6 +134,9 @@ class RandomField:
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
         """Return the field conditioned on measured values: fixed there, random elsewhere.
 
+        It is a field of the measured interface only. Its samples use the draws of this field,
+        and tend to the samples of this field as the noise grows.
+
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
@@ -152,12 +144,6 @@ class RandomField:
             ``st.read_profile("scan.csv")``; NaN where nothing was measured.
         noise : float
             Standard deviation of the error of a value, in the same unit, positive.
-
-        Returns
-        -------
-        RandomField
-            The conditioned field, for the measured interface only. Its samples use the
-            draws of this field, and tend to the samples of this field as the noise grows.
 
         Examples
         --------
@@ -198,11 +184,7 @@ class RandomField:
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> Array:
-        """Sample profiles; sample i depends on (seed, i) only.
-
-        Returns
-        -------
-        (samples, nodes) array, in the unit of the marginal; (samples, nx, ny) on a plane
+        """Sample profiles, (samples, *shape), in the field's unit; i depends on (seed, i) only.
 
         Warns
         -----
@@ -244,16 +226,8 @@ class RandomField:
     def correlation(self, interface: Interface, *, of: Of = "strength") -> Array:
         """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
-        Parameters
-        ----------
-        interface : Interface
-        of : {"strength", "z"}
-            The mapped field (Hermite expansion; Grigoriu, 1995) or the Gaussian one.
-
-        Warns
-        -----
-        AccuracyWarning
-            If the tails of the marginal are too heavy for its correlation; it gives the error.
+        It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian
+        one, z. An `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
         """
         modes = self.modes(interface)
         # The field whose amplitudes are its own standard deviations.
@@ -267,7 +241,7 @@ class RandomField:
         coefficients = hermite_coefficients(self.marginal)
         # The last coefficient stands for what the expansion leaves out.
         error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
-        if error > ENOUGH_ACCOUNTED:
+        if error > UNCERTAIN:
             warn_accuracy(
                 f"the correlation of the strength is uncertain by up to {error:.2g}: the tails of"
                 " its marginal are too heavy, or its jumps too sharp, for the expansion"
@@ -284,12 +258,12 @@ class RandomField:
         if of == "z":
             return float(self.spectrum.efolding_length)
         coefficients = self._map_coefficients()
+
+        def excess(rho: float) -> float:
+            return float(correlation_of_mapped(np.array(rho), coefficients)) - math.exp(-1.0)
+
         # The correlation of the mapped field is monotone in that of z.
-        rho = brentq(
-            lambda rho: correlation_of_mapped(np.array(rho), coefficients) - math.exp(-1.0),
-            0.0, 1.0, xtol=1e-16,
-        )  # fmt: skip
-        return lag_of_correlation(self.spectrum, float(rho))
+        return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
     @checked
     def with_efolding_length(self, length: Positive, *, of: Of = "strength") -> RandomField:

@@ -24,12 +24,9 @@ from stiction.random.synthesis import BLOCK, block_of, standard_normal
 from stiction.results import PROFILES
 
 NAMES = tuple(PROFILES)
-COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
-"""What may be given as friction coefficients."""
-BETWEEN = 1000
-"""Number of the stream of draws of the first property's factor between specimens."""
-DEFINITE = 1e-12
-"""Eigenvalue of a correlation matrix from which on it is negative and not round-off."""
+COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses
+BETWEEN = 1000  # number of the stream of draws of the first property's factor
+DEFINITE = 1e-12  # what is round-off in eigenvalues of a correlation matrix
 
 
 def _pairs(value: Any) -> Any:
@@ -221,12 +218,8 @@ class RandomInterface:
     ) -> Array:
         """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
 
-        Draw j of a property of sample i depends on (seed, property, i, j) only.
-
-        Returns
-        -------
-        (samples, dimension) array
-            Draws of each property side by side, in the order of `names`; then those of `between`.
+        Draw j of a property of sample i depends on (seed, property, i, j) only. Returned are
+        (samples, dimension): each property in the order of `names`, then those of `between`.
         """
         each = self.dimension(interface) + len(self.names) * interface.size
         check_memory("samples", 8.0 * samples * each)
