@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.windows import exact_weight
+from stiction.criterion import eigenfunction
 from stiction.equilibrium.method import Equilibrium
 
 DEPTH = 0.4e6
@@ -26,7 +26,7 @@ def relative_error(nodes_per_patch, periods):
     )
     t = (np.arange(4000) + 0.5) * np.pi / 4000.0
     measure = np.sin(t) * np.pi / 4000.0
-    mean = np.sum(exact_weight().at(np.cos(t)) * np.exp(-((np.cos(t) / 4.0) ** 2)) * measure)
+    mean = np.sum(eigenfunction.weight(np.cos(t)) * np.exp(-((np.cos(t) / 4.0) ** 2)) * measure)
     return abs(onset.first_instability.item() - (1e6 - DEPTH * mean)) / DEPTH
 
 

@@ -138,7 +138,6 @@ NOT_SCALING = {
         PRESSED, COEFFICIENTS, LOCAL, SMALL | {"problem.load.normal_pressure": (1e6, 2e6)},
     ),
     "shape": (PROBLEM, STRENGTH, LOCAL, {"marginal.alpha": (1.0, 3.0)}),
-    "rounded weights": (PROBLEM, STRENGTH, st.LocalCriterion(weights="rounded"), THREE),
 }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.criterion.windows import exact_weight
+from stiction.criterion import eigenfunction
 from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.statistics.moments import nucleation_statistics, strength_spectrum
 
@@ -17,7 +17,7 @@ def infinite_ratio(problem, strength):
     """Var[tau_n]/Var[tau_p] on an infinite line: 1500 x 1500 cells of the definition."""
     t = (np.arange(1500) + 0.5) * np.pi / 1500
     s, measure = np.cos(t), np.sin(t) * np.pi / 1500
-    share = exact_weight().at(s) * measure
+    share = eigenfunction.weight(s) * measure
     lags = np.abs(s[:, None] - s[None, :]) * problem.nucleation_length / 2.0
     rho = strength.spectrum.untruncated_correlation(lags)
     c = correlation_of_mapped(rho, hermite_coefficients(strength.marginal))
@@ -93,11 +93,6 @@ def test_uniform_load_and_initial_stress_scale(problem, make_strength):
     found = nucleation_statistics(loaded, make_strength())
     assert found.mean == pytest.approx((plain.mean - 1e5) / 2.0)
     assert found.variance == pytest.approx(plain.variance / 4.0)
-
-
-def test_rounded_weights_are_too_heavy(problem, make_strength):
-    found = nucleation_statistics(problem, make_strength(), weights="rounded")
-    assert found.mean / found.strength_mean == pytest.approx(1.00036, abs=1e-5)  # to its digits
 
 
 def test_load_that_varies_is_refused(problem, make_strength):

@@ -8,8 +8,8 @@ from scipy.stats import kstest
 from setups import make_problem
 
 import stiction as st
+from stiction.criterion import eigenfunction
 from stiction.criterion.local import beyond_residual
-from stiction.criterion.windows import exact_weight
 
 
 # With the error of the weights on the grid, a tenth of the strength's own variation at most.
@@ -29,7 +29,7 @@ def test_nucleation_stress_is_the_weighted_integral(make_strength, nodes, error)
     for node in (0, 100, 201):
         x = problem.interface.x[node] + half * s
         values = (spectrum @ np.exp(1j * np.outer(k, x))).real
-        expected = values @ (exact_weight().at(s) * measure)
+        expected = values @ (eigenfunction.weight(s) * measure)
         np.testing.assert_allclose(found[:, node], expected, rtol=error)
 
 
@@ -87,7 +87,7 @@ def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(contrast):
 def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength):
     """E[tau_n] = E[tau_p]; Var from the correlation, for four correlation lengths."""
     k = 2.0 * np.pi * np.abs(np.fft.fftfreq(256, 0.1 / 256.0))
-    multiplier = exact_weight().multiplier(k * problem.nucleation_length / 2.0)
+    multiplier = eigenfunction.multiplier(k * problem.nucleation_length / 2.0)
     samples = 4096
     for ratio in (0.25, 0.5, 1.0, 2.0):
         strength = make_strength(ratio)

@@ -9,7 +9,8 @@ from importance import by_importance
 from setups import RATE, beta_strength, make_problem
 
 import stiction as st
-from stiction.criterion.windows import STRETCHES, middle_aspect, windows_of
+from stiction.criterion.average import averages
+from stiction.criterion.windows import windows_of
 
 NUCLEATION = 2.0 * 0.5788869418506 * 1e9 / 0.67 / RATE
 METHOD = st.LocalCriterion()
@@ -33,12 +34,10 @@ def test_what_is_returned(plane):
     averages = st.theory.nucleation_stress(plane, strength)
     assert averages.shape == strength.shape
     np.testing.assert_allclose(found.critical_load, averages.min(axis=(1, 2)), rtol=1e-13)
-    aspects = middle_aspect(plane) * np.array(STRETCHES)
+    aspects = [window.aspect for window in windows_of(plane, RATE)]
     assert np.isin(found.critical_aspect.values, aspects).all()
     extents = found.critical_patch_extent.values
     np.testing.assert_allclose(extents[:, 0] / extents[:, 1], found.critical_aspect, rtol=1e-12)
-    each = [st.theory.nucleation_stress(plane, strength[0], aspect=a).min() for a in aspects]
-    assert aspects[int(np.argmin(each))] == found.critical_aspect.values[0]
     # Of an ellipse of these extents, as far as whole nodes make one.
     area = 0.25 * np.pi * found.critical_patch_extent.prod("direction")
     np.testing.assert_allclose(found.critical_patch_area, area, rtol=0.15)
@@ -95,11 +94,10 @@ def test_sample_i_is_the_same_whatever_batch_and_workers(plane):
 @pytest.mark.parametrize("mean_mode", [False, True])
 def test_variance_of_the_nucleation_stress_is_that_of_theory(plane, mean_mode):
     field = field_of(1.0, mean_mode=mean_mode, anisotropy=1.4)
-    aspect = middle_aspect(plane)
     theory = st.theory.nucleation_statistics(plane, field)
-    tau_n = st.theory.nucleation_stress(
-        plane, field.sample(plane.interface, samples=400, seed=2), aspect=aspect
-    )
+    middle = windows_of(plane, RATE, stretches=(1.0,))
+    strength = field.sample(plane.interface, samples=400, seed=2)
+    tau_n = np.array(list(averages(plane.interface, middle, strength, np.ones((48, 48)))))
     each = ((tau_n - theory.mean) ** 2).mean(axis=(1, 2))
     # Four standard errors of the mean of independent samples.
     assert abs(each.mean() - theory.variance) < 4.0 * each.std() / 20.0
@@ -162,11 +160,6 @@ def test_refusals_name_what_is_wrong(plane):
             plane.interface,
             plane.friction,
         )
-    rounded = st.LocalCriterion(weights="rounded")
-    with pytest.raises(st.InputError, match="rounded.*line"):
-        st.monte_carlo(plane, field, method=rounded, samples=2, progress=False)
-    with pytest.raises(st.InputError, match="rounded.*line"):
-        st.theory.nucleation_stress(plane, np.full((48, 48), 1e6), weights="rounded")
     wide = dataclasses.replace(plane, interface=st.Interface((0.02, 0.014), (64, 48)))
     with pytest.raises(st.InputError, match="swapped: the first axis of a profile is x"):
         st.onset(wide, np.full((48, 64), 1e6), method=METHOD)
@@ -175,9 +168,6 @@ def test_refusals_name_what_is_wrong(plane):
     uneven = dataclasses.replace(plane, friction=st.LinearWeakening(weakening_rate=varying))
     with pytest.raises(st.InputError, match="weakening_rate varies"):
         st.monte_carlo(uneven, field, method=METHOD, samples=2, progress=False)
-    line = st.Problem(plane.solid, st.Interface(0.1, 512), plane.friction)
-    with pytest.raises(st.InputError, match="aspect: must be left out on a line"):
-        st.theory.nucleation_stress(line, np.full(512, 1e6), aspect=1.0)
 
 
 def test_coarse_directions_are_named(plane):

@@ -7,7 +7,8 @@ import pytest
 from planes import WAVENUMBERS, plane_sample
 from setups import LENGTH, RATE, smooth_noise
 
-from stiction.criterion.average import local_onset
+import stiction as st
+from stiction.criterion.average import least_average
 from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
@@ -92,14 +93,15 @@ def test_local_criterion_is_an_upper_bound_for_every_aspect():
     symbol = plane.symbol(SHAPE)
     aspects = (1.0, 1.25, 1.5)
     windows = [ellipse_window(symbol, SHAPE, plane.lengths, RATE, a) for a in aspects]
+    interface = st.Interface(plane.lengths, SHAPE)
     for seed in range(4):
         strength = strength_of(seed)
-        local = local_onset(windows, strength, ONE)
+        local = least_average(interface, windows, strength[None], ONE).load[0]
         exact = onset_of(strength, gap=1e-6)
-        assert local.load >= exact.lower
-        assert local.load < 1.2 * exact.upper
+        assert local >= exact.lower
+        assert local < 1.2 * exact.upper
         uneven = 1.0 + 0.2 * strength_of(seed + 10) / 1e6
-        load = local_onset(windows, strength, uneven).load
+        load = least_average(interface, windows, strength[None], uneven).load[0]
         found = plane_onset(plane, strength, uneven, RATE * ONE, 1e-6)
         assert load >= found.lower
 

@@ -1,198 +1,74 @@
-"""The least moving average over places and windows."""
+"""The average of strength over load with the weights of critical patches, and where it is least."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from rocket_fft import c2r, r2c
 
 from stiction.arrays import Array
 from stiction.criterion.windows import Window
-from stiction.jit import jit
+from stiction.interface import Interface
+from stiction.jit import ZERO, jit
 
 STENCIL = 10
 # Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
 _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
 
-@jit
-def _slope(power: Array, u: float) -> tuple[float, float]:
-    """First and second derivative of a polynomial."""
-    slope, curvature = 0.0, 0.0
-    for p in range(STENCIL - 1, 0, -1):
-        curvature = curvature * u + slope
-        slope = slope * u + p * power[p]
-    return slope, curvature
+class Least(NamedTuple):
+    """Least averages (Pa), their places in nodes, and the numbers of their windows."""
 
-
-@jit
-def _fit(values: Array, cell: int, power: Array) -> None:
-    """The polynomial through the ten nodes around the cell from node `cell` to the next."""
-    power[:] = 0.0
-    for j in range(STENCIL):
-        value = values[(cell - STENCIL // 2 + 1 + j) % values.size] - values[cell]
-        for p in range(STENCIL):
-            power[p] += _FIT[p, j] * value
-
-
-@jit
-def _between(values: Array, node: int, side: int, power: Array) -> tuple[float, float]:
-    """The minimum between the lowest `node` and the one beside it: its value and place, in nodes.
-
-    Newton's method on the slope of the local polynomial, kept between the points where the slope
-    is known to change sign; it bisects where the function is not convex.
-    """
-    cell = node if side > 0 else (node - 1) % values.size
-    _fit(values, cell, power)
-    u = -0.5 * side
-    if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
-        return values[node], float(node)
-    low, high = -0.5, 0.5
-    for _ in range(50):
-        slope, curvature = _slope(power, u)
-        if slope > 0.0:
-            high = u
-        else:
-            low = u
-        move = -slope / curvature if curvature > 0.0 else np.inf
-        if abs(move) < 1e-11:
-            break
-        u = u + move if low < u + move < high else 0.5 * (low + high)
-    value = 0.0
-    for p in range(STENCIL - 1, -1, -1):
-        value = value * u + power[p]
-    return values[cell] + value, node + 0.5 * side + u
-
-
-@jit
-def _above_secants(values: Array, node: int, side: int) -> float:
-    """What a convex function of these values cannot fall below between a node and the next.
-
-    It lies above the lines through the two values on either side, extended until they meet. Where
-    the values are not convex there is no such bound.
-    """
-    nodes = values.size
-    here, following = values[node], values[(node + side) % nodes]
-    before = here - values[(node - side) % nodes]
-    after = values[(node + 2 * side) % nodes] - following
-    rise = following - here
-    if not before <= rise <= after:
-        return -np.inf
-    if before == after:
-        return min(here, following)
-    return here + before * (after - rise) / (after - before)
-
-
-@jit
-def _limited(
-    values: Array, ratio: Array, reach: int, node: int, power: Array
-) -> tuple[float, float]:
-    """The minimum near `node`, kept to what weights that are not negative allow.
-
-    The polynomial rings where the strength jumps. It may not fall below the least ratio of
-    strength to load under the patch, nor below the secants of the values around.
-    """
-    least = np.inf
-    for j in range(node - reach, node + reach + 1):
-        least = min(least, ratio[j % ratio.size])
-    lowest, where = values[node], float(node)
-    for side in (-1, 1):
-        value, place = _between(values, node, side, power)
-        value = max(value, least, _above_secants(values, node, side))
-        if value < lowest:
-            lowest, where = value, place
-    return lowest, where
-
-
-@jit
-def refine_minimum(values: Array, ratio: Array, reach: int) -> tuple[float, float]:
-    """Minimum of a smooth function between the nodes of its `values`, and its place in nodes.
-
-    A parabola through each local minimum of the nodes estimates how low the function falls there;
-    a polynomial through ten nodes takes the lowest, and any other that might be lower.
-    """
-    nodes = values.size
-    lows = np.empty(nodes // 2 + 1)
-    lowest = np.empty(nodes // 2 + 1, dtype=np.int64)
-    power = np.empty(STENCIL)
-    count, best = 0, 0
-    left, middle = values[nodes - 1], values[0]
-    for i in range(nodes):
-        right = values[i + 1] if i + 1 < nodes else values[0]
-        if middle <= left and middle < right:
-            shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
-            lows[count] = middle - 0.25 * (left - right) * shift
-            lowest[count] = i
-            if lows[count] < lows[best]:
-                best = count
-            count += 1
-        left, middle = middle, right
-    if count == 0:  # constant
-        return values[0], 0.0
-    value, place = _limited(values, ratio, reach, lowest[best], power)
-    for i in range(count):
-        if i == best:
-            continue
-        # A cubic through four nodes differs from the parabola by at most 0.065 third differences.
-        node = lowest[i]
-        left, middle, right = values[node - 1], values[node], values[(node + 1) % nodes]
-        before = abs(right - 3.0 * middle + 3.0 * left - values[node - 2])
-        after = abs(values[(node + 2) % nodes] - 3.0 * right + 3.0 * middle - left)
-        if lows[i] - 0.065 * max(before, after) < value:
-            other, elsewhere = _limited(values, ratio, reach, node, power)
-            if other < value:
-                value, place = other, elsewhere
-    place %= nodes
-    return value, place if place < nodes else 0.0  # a tiny negative place rounds to `nodes`
-
-
-@jit
-def minimum_rows(
-    excess: Array, load: Array, multiplier: Array, reach: int, minimum: Array, place: Array
-) -> None:
-    """Minimum over x of <g, excess>/<g, load> for every row, and where, in units of nodes.
-
-    The weight of the load has unit integral; a patch reaches `reach` nodes to either side.
-    """
-    rows, nodes = excess.shape
-    scale = np.fft.irfft(np.fft.rfft(load) * (multiplier / multiplier[0]), nodes)
-    for row in range(rows):
-        ratio = multiplier[0] * excess[row] / load
-        values = np.fft.irfft(np.fft.rfft(excess[row]) * multiplier, nodes) / scale
-        # The weights keep to this bound; only the rounding of the transforms may not.
-        least = ratio.min()
-        for i in range(nodes):
-            values[i] = max(values[i], least)
-        minimum[row], place[row] = refine_minimum(values, ratio, reach)
-
-
-class LocalOnset(NamedTuple):
-    """Least moving average (Pa), the place it is at (in nodes, (2,)), and the window."""
-
-    load: float
+    load: Array
     place: Array
-    window: int
+    window: NDArray[np.int64]
 
 
-def local_onset(windows: Sequence[Window], excess: Array, profile: Array) -> LocalOnset:
-    """Find the least <s, y>/<p, y> over places and windows y of a plane.
+def averages(
+    interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
+) -> Iterator[Array]:
+    """Yield <s, y>/<p, y> of each sample over each window y, centred at every node, (*shape).
 
-    Strength less initial stress (Pa) and load profile are (nx, ny). The load is that of a node,
-    which is exact for the discrete problem.
+    Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
     """
-    strength = np.fft.rfft2(excess)
-    uniform = bool((profile == profile[0, 0]).all())
-    load = None if uniform else np.fft.rfft2(profile)
-    lowest, best, chosen = np.inf, excess, 0
-    for number, window in enumerate(windows):
-        average = np.fft.irfft2(strength * window.spectrum, excess.shape)
-        if load is None:
-            average /= profile[0, 0]
-        else:
-            average /= np.fft.irfft2(load * window.spectrum, excess.shape)
-        least = float(average.min())
-        if least < lowest:
-            lowest, best, chosen = least, average, number
-    return LocalOnset(lowest, _between_nodes(best), chosen)
+    load = interface.transform(profile)
+    scales = [interface.inverse_transform(load * (one.spectrum / one.total)) for one in windows]
+    for strength in excess:
+        waves = interface.transform(strength)
+        for window, scale in zip(windows, scales, strict=True):
+            yield interface.inverse_transform(waves * window.spectrum) / scale
+
+
+def least_average(
+    interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
+) -> Least:
+    """Find the least average of each sample over places and windows, see `averages`.
+
+    On a line the minimum is taken between the nodes. On a plane the load is that of a node, which
+    is exact for the discrete problem, and only the place lies between the nodes.
+    """
+    count = len(excess)
+    load, place, chosen = (
+        np.full(count, np.inf),
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
+    )
+    if not interface.is_plane:
+        multiplier, axis = np.array(windows[0].spectrum), np.arange(1)
+        scale, spectrum = np.empty(excess.shape[1]), np.empty(multiplier.size, dtype=complex)
+        _filter(profile, multiplier / multiplier[0], axis, spectrum, scale)
+        reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
+        _minimum_of_rows(excess, profile, scale, multiplier, reach, axis, spectrum, load, place)
+        return Least(load, place, chosen)
+    place = np.zeros((count, 2))
+    for number, average in enumerate(averages(interface, windows, excess, profile)):
+        i, window = divmod(number, len(windows))
+        # The weights keep to this bound; only the rounding of the transforms may not.
+        least = max(average.min(), np.min(excess[i] / profile))
+        if least < load[i]:
+            load[i], place[i], chosen[i] = least, _between_nodes(average), window
+    return Least(load, place, chosen)
 
 
 def _between_nodes(average: Array) -> Array:
@@ -209,3 +85,135 @@ def _between_nodes(average: Array) -> Array:
         if bend > 0.0:
             place[axis] += 0.5 * (before - after) / bend
     return np.mod(place, average.shape)
+
+
+@jit
+def _filter(field: Array, multiplier: Array, axis: Array, spectrum: Array, out: Array) -> None:
+    """`out` = a line with its Fourier modes multiplied."""
+    r2c(field, spectrum, axis, True, 1.0, 1)
+    for i in range(spectrum.size):
+        spectrum[i] *= multiplier[i]
+    c2r(spectrum, out, axis, False, 1.0 / out.size, 1)
+
+
+@jit
+def _estimates(values: Array, i: int) -> tuple[float, float]:
+    """Minimum near a node by a parabola, and by how much it may be lower; infinite if none is near.
+
+    A cubic through four nodes differs from the parabola by at most 0.065 third differences.
+    """
+    n = values.size
+    left, middle, right = values[i - 1], values[i], values[i + 1 - n]
+    if not (middle <= left and middle < right):
+        return np.inf, 0.0
+    shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    before = abs(right - 3.0 * middle + 3.0 * left - values[i - 2])
+    after = abs(values[i + 2 - n] - 3.0 * right + 3.0 * middle - left)
+    return middle - 0.25 * (left - right) * shift, 0.065 * max(before, after)
+
+
+@jit
+def _slope(power: Array, u: float) -> tuple[float, float]:
+    """First and second derivative of a polynomial."""
+    slope, curvature = 0.0, 0.0
+    for p in range(STENCIL - 1, 0, -1):
+        curvature = curvature * u + slope
+        slope = slope * u + p * power[p]
+    return slope, curvature
+
+
+@jit
+def _minimum_near(
+    values: Array, strength: Array, profile: Array, reach: int, node: int, power: Array
+) -> tuple[float, float]:
+    """Minimum between a node and the next on either side, and its place, by local polynomials.
+
+    By Newton's method on the slope, kept between the points where the slope is known to change
+    sign; it bisects where the function is not convex. The polynomial rings where the strength
+    jumps: the minimum is not below the least ratio of strength to load under the patch, nor, where
+    the values are convex, below the lines through two values on either side, extended until they
+    meet.
+    """
+    n = values.size
+    least = np.inf
+    for j in range(node - reach, node + reach + 1):
+        least = min(least, strength[j % n] / profile[j % n])
+    lowest, place = values[node], float(node)
+    for side in (-1, 1):
+        cell = node if side > 0 else (node - 1) % n
+        for p in range(STENCIL):
+            power[p] = 0.0
+        for j in range(STENCIL):
+            value = values[(cell - STENCIL // 2 + 1 + j) % n] - values[cell]
+            for p in range(STENCIL):
+                power[p] += _FIT[p, j] * value
+        u = -0.5 * side
+        if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
+            continue
+        low, high = -0.5, 0.5
+        for _ in range(50):
+            slope, curvature = _slope(power, u)
+            if slope > 0.0:
+                high = u
+            else:
+                low = u
+            move = -slope / curvature if curvature > 0.0 else np.inf
+            if abs(move) < 1e-11:
+                break
+            u = u + move if low < u + move < high else 0.5 * (low + high)
+        value = 0.0
+        for p in range(STENCIL - 1, -1, -1):
+            value = value * u + power[p]
+        value = max(values[cell] + value, least)
+        here, beside = values[node], values[(node + side) % n]
+        before, rise = here - values[(node - side) % n], beside - here
+        after = values[(node + 2 * side) % n] - beside
+        if before <= rise <= after:
+            bound = here
+            if before < after:
+                bound = here + before * (after - rise) / (after - before)
+            value = max(value, bound)
+        if value < lowest:
+            lowest, place = value, node + 0.5 * side + u
+    return lowest, place
+
+
+@jit
+def _minimum_of_rows(
+    excess: Array, profile: Array, scale: Array, multiplier: Array, reach: int,
+    axis: Array, spectrum: Array, minimum: Array, place: Array,
+) -> None:  # fmt: skip
+    """Minimum over a line of <s, y>/<p, y> for every row, and where, in units of nodes.
+
+    `scale` is <p, y>. A parabola through each local minimum of the nodes estimates how low the
+    function falls there; polynomials through ten nodes take the lowest, and any other that might be
+    lower.
+    """
+    nodes = profile.size
+    values, power = np.empty(nodes), np.empty(STENCIL)
+    for row in range(excess.shape[0]):
+        strength = excess[row]
+        _filter(strength, multiplier, axis, spectrum, values)
+        # The weights keep to the least ratio; only the rounding of the transforms may not.
+        least = np.inf
+        for i in range(nodes):
+            least = min(least, multiplier[0] * strength[i] / profile[i])
+        for i in range(nodes):
+            values[i] = max(values[i] / scale[i], least)
+        best, lowest = ZERO - 1, np.inf
+        for i in range(nodes):
+            low = _estimates(values, i)[0]
+            if low < lowest:
+                best, lowest = i, low
+        value, where = values[0], 0.0
+        if best >= 0:  # not constant
+            value, where = _minimum_near(values, strength, profile, reach, best, power)
+        for i in range(nodes):
+            low, error = _estimates(values, i)
+            if i != best and low - error < value:
+                other, elsewhere = _minimum_near(values, strength, profile, reach, i, power)
+                if other < value:
+                    value, where = other, elsewhere
+        where %= nodes
+        minimum[row] = value
+        place[row] = where if where < nodes else 0.0  # a tiny negative place rounds to `nodes`

@@ -140,11 +140,7 @@ class LimitState:
         mean = float(np.mean(np.broadcast_to(profile, shape)))
         # The mean of the initial stress is itself random where it is a field: take its lowest.
         initial = float(np.mean(np.broadcast_to(least, shape)))
-        # The rounded weight of the local criterion integrates to a little more than one: it takes
-        # tau_p - tau_i for that much higher.
-        rounded = getattr(self.experiment.method, "weights", "exact") == "rounded"
-        slack = 1e-3 * (high - float(np.min(least))) if rounded else 0.0
-        return initial + lowest_load * mean, high + slack
+        return initial + lowest_load * mean, high
 
     def slip_chance(self, stress: float) -> float:
         """Return an upper bound of the probability that anything slips at a stress, Pa.

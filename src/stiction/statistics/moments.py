@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.criterion.local import check_law, check_window
-from stiction.criterion.windows import Weights, middle_aspect, windows_of
+from stiction.criterion.local import check_law
+from stiction.criterion.windows import windows_of
 from stiction.errors import InputError
 from stiction.model import checked
 from stiction.problem import Problem
@@ -43,9 +43,7 @@ class NucleationStatistics:
 
 
 @checked
-def nucleation_statistics(
-    problem: Problem, strength: RandomField, *, weights: Weights = "exact"
-) -> NucleationStatistics:
+def nucleation_statistics(problem: Problem, strength: RandomField) -> NucleationStatistics:
     """Compute the exact mean and variance of the nucleation stress.
 
     Parameters
@@ -54,8 +52,6 @@ def nucleation_statistics(
         With uniform weakening rate, load and initial stress.
     strength : RandomField
         Peak strength, Pa; or friction coefficients under a uniform normal pressure.
-    weights : {"exact", "rounded"}
-        As in `nucleation_stress`.
 
     Raises
     ------
@@ -83,11 +79,9 @@ def nucleation_statistics(
     True
     """
     scale, load, initial = stationary(problem, strength)
-    aspect = middle_aspect(problem) if problem.interface.is_plane else None
-    check_window(problem, weights, aspect)
     rate = problem.uniform_rate
     assert rate is not None
-    window = windows_of(problem, rate, weights, aspect)[0]
+    (window,) = windows_of(problem, rate, stretches=(1.0,))
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
     mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
     return NucleationStatistics(
