@@ -25,8 +25,6 @@ GROUPS = 256
 """Most groups of neighbouring sorted samples that stand for the sample, by their means."""
 REACH = 10.0
 STEP = 0.05
-MODE = 1.0
-"""Logarithm of the density of no standardised onset is above this: of a normal one it is -0.9."""
 ERRORS, SPREADS = 4.0, 6.0
 """Standard deviations of the load cell, and of v, over which is integrated."""
 
@@ -175,14 +173,12 @@ def log_likelihoods(
     error: float,
     densities: Densities,
     peaks: Array,
-    floor: float,
     out: Array,
 ) -> None:
     """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
 
     Bound, mean and spread are linear between nodes, and so is the logarithm of the
-    standardised density. A point whose sum would fall below `floor` even if all peaks to
-    come were at the mode is given up, and the rest of its row is -inf.
+    standardised density.
     """
     table = densities.table
     for i in range(index.shape[0]):
@@ -193,10 +189,6 @@ def log_likelihoods(
             _blend(densities.spread, near, share),
         )
         bounded, own = bound > -np.inf, error / stretch[i]
-        typical = spread * math.exp(mean) if bounded else spread
-        at_mode = MODE - math.log(stretch[i] * math.hypot(typical, own))
-        out[i] = -np.inf
-        so_far = 0.0
         for j in range(peaks.size):
             y = (peaks[j] - shift[i]) / stretch[i]
             value = -np.inf
@@ -207,6 +199,3 @@ def log_likelihoods(
                 value = _interpolated(table, near, share, (v - mean) / spread)
                 value -= math.log(spread) + (v if bounded else 0.0)
             out[i, j] = value - math.log(stretch[i])
-            so_far += out[i, j]
-            if so_far + (peaks.size - 1 - j) * at_mode < floor:
-                break

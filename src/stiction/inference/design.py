@@ -164,11 +164,11 @@ def _expected(
         likelihood = Likelihood(model, peaks)
 
         def given_what_is_known(
-            v: Array, floor: float, truth: Array = truth, likelihood: Likelihood = likelihood
+            v: Array, truth: Array = truth, likelihood: Likelihood = likelihood
         ) -> Array:
             u = np.tile(truth, (v.shape[0], 1))
             u[:, free] = v
-            return likelihood(u, floor)
+            return likelihood(u)
 
         box = model.low[free], model.high[free]
         # A posterior may fall between the points of a coarse grid.

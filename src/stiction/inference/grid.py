@@ -8,8 +8,8 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.progress import SILENT, Meter
 
-Function = Callable[[Array, float], Array]
-"""Logarithms at points (points, parameters); those below a floor may be -inf."""
+Function = Callable[[Array], Array]
+"""Logarithms at points (points, parameters)."""
 
 POINTS = 100_000
 """Points of a grid in all, about."""
@@ -18,10 +18,6 @@ ZOOMS = 6
 NEGLIGIBLE = 1e-6
 """Mass outside that is given up on either side of a parameter when the grid closes in."""
 BATCH = 5_000
-FIRST = 500
-"""Points from which the largest likelihood is estimated."""
-HOPELESS = 40.0
-"""Points so many nats less likely than another hold nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +73,11 @@ def _evaluated(function: Function, low: Array, high: Array, along: int, meter: M
     steps = (np.arange(along) + 0.5) / along
     mesh = np.stack(np.meshgrid(*([steps] * dimension), indexing="ij"), axis=-1)
     u = low + (high - low) * mesh.reshape(-1, dimension)
-    out = np.empty(u.shape[0])
-    top = float(function(u[:: max(1, u.shape[0] // FIRST)], -np.inf).max())
+    parts = []
     for start in range(0, u.shape[0], BATCH):
-        part = slice(start, start + BATCH)
-        out[part] = function(u[part], top - HOPELESS)
-        top = max(top, float(out[part].max()))
-        meter.advance(out[part].size)
-    return out.reshape((along,) * dimension)
+        parts.append(function(u[start : start + BATCH]))
+        meter.advance(parts[-1].size)
+    return np.concatenate(parts).reshape((along,) * dimension)
 
 
 def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:

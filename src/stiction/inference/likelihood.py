@@ -74,15 +74,13 @@ class Model(NamedTuple):
     low: Array  # corners, as u, between which onsets are simulated
     high: Array
 
-    def log_densities(
-        self, number: int, theta: Array, peaks: Array, floor: float = -np.inf
-    ) -> Array:
+    def log_densities(self, number: int, theta: Array, peaks: Array) -> Array:
         """Return logarithms of the density of peaks of specimen `number`, (points, peaks)."""
         used = self.specimens[number].densities
         index, weight = corners(self.axes, theta)
         shift, stretch = map(np.ascontiguousarray, self.scaling.of(theta))
         own, out = np.ascontiguousarray(peaks), np.empty((theta.shape[0], peaks.size))
-        log_likelihoods(index, weight, shift, stretch, self.error, used, own, floor, out)
+        log_likelihoods(index, weight, shift, stretch, self.error, used, own, out)
         return out
 
     def reach(self, number: int) -> tuple[float, float, str]:
@@ -184,22 +182,20 @@ class Likelihood(NamedTuple):
     model: Model
     peaks: tuple[Array, ...]
 
-    def parts(self, u: Array, floor: float = -np.inf) -> list[Array]:
+    def parts(self, u: Array) -> list[Array]:
         """Return logarithms of the likelihood of each test at points u, (points, tests) each."""
         theta, densities = self.model.prior.theta(u), self.model.log_densities
-        return [densities(i, theta, peaks, floor) for i, peaks in enumerate(self.peaks)]
+        return [densities(i, theta, peaks) for i, peaks in enumerate(self.peaks)]
 
-    def __call__(self, u: Array, floor: float = -np.inf) -> Array:
+    def __call__(self, u: Array) -> Array:
         """Return the logarithm of the likelihood at points u (points, parameters).
 
-        -inf outside the box that was simulated, and, for speed, where it is below `floor`.
+        -inf outside the box that was simulated.
         """
-        if len(self.peaks) > 1:
-            floor = -np.inf  # other specimens may make up for it
         inside = np.all((u >= self.model.low) & (u <= self.model.high), axis=1)
         result = np.full(u.shape[0], -np.inf)
         if inside.any():
-            result[inside] = np.concatenate(self.parts(u[inside], floor), axis=1).sum(axis=1)
+            result[inside] = np.concatenate(self.parts(u[inside]), axis=1).sum(axis=1)
         return result
 
     def without(self, batch: int) -> Self:
