@@ -184,15 +184,10 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and its standard deviation over the mean, both after truncation.
+        Mean of the field and its standard deviation over the mean, both after truncation. It
+        scatters less than an exponential distribution, between two bounds than a uniform one.
     low, high : float, optional
         0 and no upper bound if left out.
-
-    Raises
-    ------
-    InputError
-        If no truncated normal distribution has these moments: it scatters less than an
-        exponential distribution, and between two bounds less than a uniform one.
 
     Examples
     --------

@@ -22,17 +22,10 @@ HAIR = 1.0 + 1e-12
 class Modes:
     """The discrete spectrum on an interface: J modes, and the mean mode in front.
 
-    Attributes
-    ----------
-    interface : Interface
-    sigma : (J + 1,) array
-        Standard deviations; their squares sum to 1. The first is zero without the mean mode.
-    numbers : (dimensions, J + 1) array of int
-        Their wave vectors in units of 2 pi/length; of k and -k, one.
-    ranks : (J,) array of int
-        Places of modes 1..J in the order of draws, rising, whatever the spectrum leaves out.
-    has_mean : bool
-        Whether the mean mode is drawn.
+    `sigma`, (J + 1,), are standard deviations, whose squares sum to 1; the first is zero
+    without the mean mode. `numbers`, (dimensions, J + 1), are the wave vectors in units of
+    2 pi/length; of k and -k, one. `ranks`, (J,), are the places of modes 1..J in the order of
+    draws, rising, whatever the spectrum leaves out.
     """
 
     interface: Interface
@@ -50,11 +43,6 @@ class Modes:
     def dimension(self) -> int:
         """Number of standard normal draws a sample."""
         return 2 * self.ranks.size + int(self.has_mean)
-
-    @property
-    def highest(self) -> tuple[int, ...]:
-        """Largest wave number in each direction, in units of 2 pi/length."""
-        return tuple(int(most) for most in np.abs(self.numbers).max(axis=1))
 
     @property
     def unresolved(self) -> float:

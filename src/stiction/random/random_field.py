@@ -204,7 +204,7 @@ class RandomField:
         lost = modes.unresolved
         if lost > LOST:
             nodes = " x ".join(map(str, interface.shape))
-            enough = " x ".join(str(2 * most) for most in modes.highest)
+            enough = " x ".join(map(str, 2 * np.abs(modes.numbers).max(axis=1)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"

@@ -92,35 +92,32 @@ class RandomInterface:
     correlation : mapping, optional
         Correlation coefficients of the Gaussian fields of two properties, mode by mode:
         ``{("strength", "residual_strength"): 0.8}``, in a study file
-        ``correlation.strength.residual_strength = 0.8``. Pairs that are not named are
-        independent. With 1 and the same spectrum one field is a function of the other.
+        ``correlation.strength.residual_strength = 0.8``. Other pairs are independent.
     between : mapping, optional
-        Marginals of factors that differ from specimen to specimen and are constant along
-        each, by property: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. Positive, with
-        mean 1.
+        Marginals of positive factors with mean 1 that differ from specimen to specimen and
+        are constant along each: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``.
 
     Notes
     -----
     Correlated translation fields after Grigoriu (1995): the draws of a property are a
-    combination, by the Cholesky factor of the correlation matrix, of independent draws of its
-    own and of the properties before it in the list above. So a property keeps its draws
-    regardless of the other properties, unless it is correlated with one before it. Where spectra
-    differ, the correlation of the fields at a point is a little less than that of the modes.
+    combination, by the Cholesky factor of the correlation matrix, of draws of its own and of
+    the properties before it in the list above. So a property keeps its draws whatever else is
+    random, unless it is correlated with one before it. Where spectra differ, the correlation
+    of the fields at a point is a little less than that of the modes.
 
     Examples
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
     >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> marginal = st.Beta(alpha=2.0, beta=2.0, low=0.2e6, high=0.4e6)
-    >>> residual = st.RandomField(marginal, strength.spectrum)
+    >>> residual = st.RandomField(st.Lognormal(mean=0.3e6, cv=0.1), strength.spectrum)
     >>> random = st.RandomInterface(
     ...     strength=strength,
     ...     residual_strength=residual,
     ...     correlation={("strength", "residual_strength"): 0.8},
     ... )
-    >>> sorted(random.profiles(problem.interface, samples=2, seed=1))
-    ['residual_strength', 'strength']
+    >>> random.profiles(problem.interface, samples=2, seed=1)["residual_strength"].shape
+    (2, 256)
     """
 
     strength: RandomField

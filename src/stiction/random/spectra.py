@@ -30,8 +30,7 @@ from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
-ACCURACY, LARGEST_ERROR = 1e-12, 1e-6
-"""Error of integrals over wavenumbers that is aimed at, and that is accepted, of the power."""
+ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # of integrals: aimed at, and accepted
 
 
 class SpectralDensity(ABC):
@@ -68,7 +67,7 @@ def _integrate(
     edges: Array,
     order: int = 0,
     lag: float = 0.0,
-    power: float = math.inf,
+    power: float = 0.0,
 ) -> float:
     """Integrate g(k) k^order cos(k lag) from the first of `edges` to the last, piece by piece.
 
@@ -76,16 +75,14 @@ def _integrate(
     which errors are small: 1e-12 of it, and of each piece otherwise.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
-    options |= {"limit": 200, "epsrel": ACCURACY, "full_output": 1}
-    options["epsabs"] = ACCURACY * power if math.isfinite(power) else 0.0
+    options |= {"epsabs": ACCURACY * power, "epsrel": ACCURACY, "limit": 200, "full_output": 1}
 
     def density(k: float) -> float:
         return float(spectrum.density(np.array([k]))[0]) * k**order
 
     parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
     found, errors = np.array(parts).T
-    size = min(power, float(np.abs(found).sum()))
-    if not np.all(np.isfinite(found)) or errors.sum() > LARGEST_ERROR * size:
+    if not errors.sum() <= LARGEST_ERROR * (power or np.abs(found).sum()):
         raise InputError("function: its integral over wavenumbers does not converge")
     return float(found.sum())
 
@@ -208,8 +205,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     Notes
     -----
-    On an infinite line this is a Matern covariance of smoothness exponent - 1/2, and on a
-    plane the same with the density (k^2 + lambda^2)^-(exponent + 1/2).
+    On an infinite line or plane this is a Matern covariance of smoothness exponent - 1/2.
 
     Examples
     --------
@@ -294,16 +290,13 @@ def _refuse_to_write(function: Any) -> Any:
 
 @model
 class CustomSpectrum(SpectralDensity):
-    """User-defined spectrum: any g(k), up to a factor.
-
-    It exists in Python only: a study with a function cannot be written to a file.
+    """User-defined spectrum: any g(k), up to a factor. It exists in Python only.
 
     Parameters
     ----------
     function : callable
         g(k): takes an array of wavenumbers (rad/m), returns an array, not negative. On a
-        plane it is the density there, at wave vectors of length k; a line cut through the
-        plane then has another spectrum than g.
+        plane it is the density there, at wave vectors of length k.
     max_wavenumber : float
         Truncation, rad/m.
     """

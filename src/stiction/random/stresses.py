@@ -102,9 +102,8 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 def check_residual(problem: Problem, random: RandomInterface) -> None:
     """Warn of the share of the strength that does not exceed the residual strength.
 
-    A node whose strength does not exceed its residual strength does not weaken. A few of
-    those can be meant: an `AccuracyWarning` gives a share above one in a million. If they
-    are the rule, above a half, the interface does not weaken at all: an `InputError`.
+    There a node does not weaken: an `AccuracyWarning` gives a share above one in a million; a
+    share above a half is an `InputError`.
     """
     share = share_below_residual(problem, random)
     if share <= WORTH_SAYING:

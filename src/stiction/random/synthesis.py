@@ -59,10 +59,9 @@ def synthesise(
 ) -> None:
     """Fill `out`, (samples, rows, columns); a line is a plane of one row.
 
-    Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k. Of both,
-    those in the half of wave vectors that a real transform holds are added; in its first
-    and last column it holds both. Modes that the grid does not resolve are folded onto
-    those that it does, so the values at the nodes are exact whatever the grid.
+    Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k; those in
+    the half of wave vectors that a real transform holds are added. Modes that the grid does
+    not resolve are folded onto those that it does: values at the nodes are exact on any grid.
     """
     samples, rows, columns = out.shape
     half = columns // 2
