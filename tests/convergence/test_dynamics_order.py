@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.method import Rupture, make_run
 
 END = 40e-6
@@ -26,8 +26,8 @@ def rupture(nodes, steps):
     )
     state = run.start(0.0)
     run.advance(state, steps)
-    energy = radiated_energy(problem.friction, run.setting.nodes, run.medium.grid, state)
-    return state, energy
+    balance = energy_balance(problem.friction, run.setting.nodes, run.medium.grid, state)
+    return state, balance["radiated_energy"]
 
 
 def test_slip_and_radiated_energy_converge_with_second_order_in_time():

@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 from setups import make_problem
 
 import stiction as st
-from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import read_checkpoint, write_checkpoint
 from stiction.dynamics.simulate import simulate_rupture
@@ -158,7 +158,8 @@ def test_radiated_energy_is_steady_after_arrest():
     run.setting = run.setting._replace(thresholds=thresholds)
 
     def radiated():
-        return radiated_energy(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
+        found = energy_balance(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
+        return found["radiated_energy"]
 
     run.advance(state, 3000)
     middle = radiated()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.method import make_run
 from stiction.dynamics.save import open_rupture
 from stiction.dynamics.simulate import simulate_rupture
@@ -82,8 +82,8 @@ def ruptured(steps, end=2.4e-5):
     run = make_run(method, PROBLEM.friction, method.medium(PROBLEM), rows, 0)
     state = run.start(0.0)
     run.advance(state, steps)
-    energy = radiated_energy(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
-    return state.slip, energy
+    balance = energy_balance(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
+    return state.slip, balance["radiated_energy"]
 
 
 def test_slip_and_energy_converge_with_second_order_in_time():

@@ -1,9 +1,8 @@
 """Energies of a rupture: spent on breaking, stored in the solids, carried away by waves."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiction.dynamics.state import Floats, Grid, Nodes, State
+from stiction.dynamics.state import Floats, Grid, Nodes, Spectrum, State
 from stiction.friction.laws import FrictionLaw
 
 
@@ -13,23 +12,27 @@ def fracture_energy(friction: FrictionLaw, slip: Floats, nodes: Nodes) -> Floats
     return friction.dissipated(slip, drop, nodes.weakening)
 
 
-def strain_energy(slip_hat: NDArray[np.complex128], grid: Grid) -> float:
+def strain_energy(slip_hat: Spectrum, grid: Grid) -> float:
     """Return the static strain energy of a slip: sum over modes of K(k)|delta_k|^2/2; J/m or J."""
-    half = grid.transform.half
-    share = np.full(half, 2.0)  # each mode, and its conjugate that the transform leaves out
-    share[..., 0] = share[..., -1] = 1.0  # which these do not have
-    power = np.abs(slip_hat[1:]) ** 2
-    nodes = int(np.prod(grid.transform.shape))
-    energy = np.sum(share.ravel()[1:] * grid.stiffness[0, 1:] * power)
-    return float(0.5 * energy * grid.cell / nodes)
+    share = np.full(grid.transform.half, 2.0)  # a mode and its conjugate, which is left out
+    share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
+    power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(slip_hat[1:]) ** 2
+    return float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
 
 
-def radiated_energy(friction: FrictionLaw, nodes: Nodes, grid: Grid, state: State) -> float:
-    """Return the energy carried away by waves, J/m: work less friction less strain energy.
+def energy_balance(
+    friction: FrictionLaw, nodes: Nodes, grid: Grid, state: State
+) -> dict[str, float]:
+    """Return strain, fracture and radiated energy, J/m; on a plane J.
 
-    The stress equals the strength wherever there is slip rate, so that the work of friction follows
-    from the slip alone. On a plane J.
+    Waves carry away the work less friction less strain energy. The stress equals the strength
+    wherever there is slip rate, so that the work of friction follows from the slip alone.
     """
-    slip, work = state.slip, float(state.now["work"])
-    spent = fracture_energy(friction, slip, nodes) + nodes.residual * slip
-    return work - float(spent.sum()) * grid.cell - strain_energy(state.slip_hat, grid)
+    fracture = fracture_energy(friction, state.slip, nodes)
+    strain = strain_energy(state.slip_hat, grid)
+    spent = float((fracture + nodes.residual * state.slip).sum()) * grid.cell
+    return {
+        "strain_energy": strain,
+        "fracture_energy": float(fracture.sum()) * grid.cell,
+        "radiated_energy": float(state.now["work"]) - spent - strain,
+    }

@@ -26,11 +26,11 @@ from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
 from stiction.friction.laws import FrictionLaw
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
-from stiction.model import Count, Flag, Positive, _number, model
+from stiction.model import Count, Flag, Positive, Real, model
 from stiction.problem import Problem, Sample, steepest_rate
 from stiction.results import Variable, onset_variables
 
-Fraction = Annotated[float, BeforeValidator(_number), Field(gt=0, le=1, allow_inf_nan=False)]
+Fraction = Annotated[Real, Field(gt=0, le=1)]
 
 _SWITCH = 6.0  # explicit steps in the smallest implicit step
 _CALM_STEPS = 300
@@ -255,18 +255,10 @@ def make_run(
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in every))
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
-    # Half a nucleation length: of a line, or on a plane along x times along y.
-    interface = medium.interface
-    moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
-    half = np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli])
-    weakens = finite & (critical > 0.0)
-    loads = (strength[weakens] - initial[weakens]) / rows.load_profile[weakens]
-    weakest = round(min(max(half / interface.cell, 1.0), loads.size))
-    least = float(np.partition(loads, weakest - 1)[:weakest].mean())
     history = method.load
     if history is None:
         history = np.array([0.0, 1.0]), np.array([0.0, method.loading_rate])
-    scale = stress_scale(nodes)
+    scale_loads, scales = stress_scale(nodes)
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
@@ -275,12 +267,25 @@ def make_run(
         load_times=history[0],
         load_values=history[1],
         turning_times=turning_times(history),
-        scale_loads=scale[0],
-        scales=scale[1],
+        scale_loads=scale_loads,
+        scales=scales,
         thresholds=_thresholds(method, friction, medium, nodes),
         stations=np.empty(0, dtype=np.int64) if stations is None else stations,
     )
+    least = _least_load(medium, nodes, steepest)
     return Run(medium, friction, setting, method.stop, steepest, least)
+
+
+def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
+    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
+    interface = medium.interface
+    moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
+    # Of a line, or on a plane along x times along y.
+    half = float(np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli]))
+    weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
+    loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
+    weakest = round(min(max(half / interface.cell, 1.0), loads.size))
+    return float(np.partition(loads, weakest - 1)[:weakest].mean())
 
 
 def _thresholds(
@@ -292,11 +297,11 @@ def _thresholds(
     of half its length does when the load alone drives it, or nothing faster than before.
     """
     finite = np.isfinite(nodes.strength)
-    breakable = int(np.count_nonzero(finite))
     frequency = medium.grid.frequency
     crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
     typical = float(np.median((nodes.strength - nodes.residual)[finite]))
     arrival = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
+    breakable = int(np.count_nonzero(finite))
     return Thresholds(
         slid_stop=np.inf if method.stop == "time" else float(breakable),
         event_stop=method.stop == "onset",

@@ -12,14 +12,14 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.dynamics.energies import fracture_energy, strain_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import RECORD, Floats, State
 from stiction.dynamics.summary import per_area
 from stiction.errors import InputError, StoreError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface
-from stiction.model import Count, FilePath, Names, Text, checked, model, real_array
+from stiction.model import Count, FilePath, Names, Real, Text, checked, model
 from stiction.results import Variable, along, coordinate, to_dataset
 
 if TYPE_CHECKING:
@@ -77,17 +77,9 @@ TIME = Variable("s", "time from zero load", ("time",))
 _WATCHED = ("time", "load", "mean_stress", "work")
 
 
-def _place(value: Any) -> tuple[float, ...]:
-    try:
-        place = real_array(value).ravel()
-    except TypeError:
-        place = np.empty(0)
-    if place.size not in (1, 2) or not np.all(np.isfinite(place)):
-        raise ValueError("must be a place x or (x, y) in m")
-    return tuple(place.tolist())
-
-
-Place = Annotated[tuple[float, ...], BeforeValidator(_place)]
+Place = Annotated[
+    tuple[Real, ...], BeforeValidator(lambda place: np.atleast_1d(place).tolist())
+]
 
 
 @model
@@ -131,20 +123,18 @@ class Save:
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
         """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
-        wanted = "a pair (x, y)" if interface.is_plane else "a number x"
-        reach = " x ".join(f"{length:g}" for length in interface.lengths)
-        problems, numbers = [], []
+        lengths, problems, numbers = np.array(interface.lengths), [], []
         for name, place in self.stations.items():
-            inside = [0.0 <= x <= end for x, end in zip(place, interface.lengths, strict=False)]
-            if len(place) != len(interface.shape) or not all(inside):
+            if len(place) == lengths.size and np.all((place >= 0.0) & (place <= lengths)):
+                steps = np.round(np.array(place) / interface.spacings).astype(int)
+                index = tuple(steps % interface.shape)
+                numbers.append(int(np.ravel_multi_index(index, interface.shape)))
+            else:
+                reach = " x ".join(f"{length:g}" for length in lengths)
                 problems.append(
-                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; must be"
-                    f" {wanted} in m, from the first node"
+                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; give"
+                    f" {' and '.join(interface.dims)} in m, from the first node"
                 )
-                continue
-            cells = zip(place, interface.spacings, interface.shape, strict=True)
-            index = tuple(round(x / spacing) % n for x, spacing, n in cells)
-            numbers.append(int(np.ravel_multi_index(index, interface.shape)))
         if problems:
             raise InputError(problems)
         return np.array(numbers, dtype=np.int64)
@@ -173,22 +163,16 @@ class Recorder:
 
     def add(self, state: State) -> None:
         """Keep a frame of the state as it is now."""
-        run, nodes, now = self.run, self.run.setting.nodes, state.now
-        medium, cell = run.medium, run.medium.interface.cell
-        fracture = float(fracture_energy(run.friction, state.slip, nodes).sum()) * cell
-        with np.errstate(over="ignore"):  # just before a run becomes non-finite
-            strain = strain_energy(state.slip_hat, medium.grid)
-        friction = fracture + float((nodes.residual * state.slip).sum()) * cell
+        run, now, medium = self.run, state.now, self.run.medium
         frame: dict[str, Any] = {name: float(now[name]) for name in _WATCHED}
         frame |= {
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
             "weakened_fraction": float(now["slid"]) / state.slip.size,
-            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
-            "strain_energy": strain,
-            "fracture_energy": fracture,
-            "radiated_energy": frame["work"] - friction - strain,
+            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.grid.cell,
         }
+        with np.errstate(over="ignore"):  # just before a run becomes non-finite
+            frame |= energy_balance(run.friction, run.setting.nodes, medium.grid, state)
         fields = {
             "slip": state.slip,
             "slip_rate": state.rate,
@@ -256,22 +240,17 @@ class Recorder:
         """What a folder depends on besides the run."""
         return repr([self.save.fields, self.save.stations])
 
-    def flush(self, state: State, *, force: bool = False, interrupted: bool = False) -> None:
-        """Write what was gathered, if there is enough or by force, and then the state.
-
-        Not that of an interrupted run, which steps may have left in the middle of anything.
-        """
+    def flush(self, state: State, *, force: bool = False) -> None:
+        """Write what was gathered, if there is enough or by force, and then the state."""
         folder = self.save.to
         steps = sum(record.size for record in self._steps) // len(RECORD)
         full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
         if folder is None or not (full or (force and (self._frames or steps))):
             return
         path = folder / f"frames-{state.steps:012d}.nc"
-        part = self.take()
         try:
-            write_whole(path, lambda aside: part.to_netcdf(aside, engine="netcdf4"))
-            if not interrupted:
-                write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
+            _write(path, self.take())
+            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
         except StoreError as error:
             raise StoreError(
                 f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
@@ -282,9 +261,11 @@ class Recorder:
         """Write the variables of the whole run beside its frames."""
         if self.save.to is not None:
             whole = dataset.drop_dims(["time", "step"], errors="ignore")
-            write_whole(
-                self.save.to / _SUMMARY, lambda aside: whole.to_netcdf(aside, engine="netcdf4")
-            )
+            _write(self.save.to / _SUMMARY, whole)
+
+
+def _write(path: Path, dataset: xr.Dataset) -> None:
+    write_whole(path, lambda aside: dataset.to_netcdf(aside, engine="netcdf4"))
 
 
 def _digest(run: Run, others: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,15 +16,15 @@ from stiction.dynamics.checks import (
 )
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.method import Rupture, make_run
-from stiction.dynamics.save import Recorder, Save, open_rupture
+from stiction.dynamics.save import SCALARS, Recorder, Save, open_rupture
 from stiction.dynamics.state import State
 from stiction.dynamics.summary import front_speed, summary
-from stiction.errors import InputError, StoreError, warn_accuracy
+from stiction.errors import InputError, warn_accuracy
 from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.progress import Meter
-from stiction.results import DIRECTION, Variable, along, coordinate
+from stiction.results import Variable, along, to_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,14 +112,8 @@ def simulate_rupture(
         return with_gaps(problem, open_rupture(save.to, fields=()), measured)
     if state.steps == 0:
         recorder.add(state)
-    try:
-        with Meter("rupture", show=progress, unit="steps") as meter:
-            stopped = _follow(run, state, recorder, method.max_steps, meter)
-    except BaseException:
-        # Interrupted or out of disk: what was computed is worth keeping.
-        with suppress(StoreError, OSError):  # the first error is already on its way
-            recorder.flush(state, force=True, interrupted=True)
-        raise
+    with Meter("rupture", show=progress, unit="steps") as meter:
+        stopped = _follow(run, state, recorder, method.max_steps, meter)
     recorder.attributes["stopped"] = stopped
     warn_if_unresolved(problem, run, state)
     recorder.flush(state, force=True)
@@ -170,24 +163,16 @@ def _complete(
 ) -> xr.Dataset:
     """Add the variables of the whole run."""
     interface = problem.interface
+    variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
+    for name, variable in method.variables(problem).items():
+        variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     found: dict[str, Any] = {
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
         "front_speed": front_speed(problem, run, state),
     }
-    variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
-    for name, variable in method.variables(problem).items():
-        variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         found |= summary(problem, run, state)
-    for name, value in found.items():
-        variable = variables[name]
-        # Energies and moment are already there over 'time'; their last value is the total.
-        if name not in dataset or "time" not in dataset[name].dims:
-            label = {"units": variable.units, "long_name": variable.long_name}
-            dataset[name] = (variable.dims, value, label)
-    if interface.is_plane:
-        names, what = coordinate(interface, DIRECTION)
-        dataset = dataset.assign_coords({DIRECTION: (DIRECTION, names)})
-        dataset[DIRECTION].attrs["long_name"] = what.long_name
-    return dataset
+    # Energies and moment are already there over 'time'; their last value is the total.
+    new = {name: value for name, value in found.items() if name not in SCALARS}
+    return dataset.merge(to_dataset(new, variables, {}, {}, interface))

@@ -13,7 +13,7 @@ what is wrong with the state and, as a stress, by how much the onset can be misp
 
 import numpy as np
 
-from stiction.dynamics.energies import radiated_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.memory import grown_memory
 from stiction.dynamics.state import State
@@ -105,6 +105,6 @@ def _at(
     now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
     now["local_radiated"] = now["radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
-    now["work"] -= radiated_energy(run.friction, nodes, grid, state)
+    now["work"] -= energy_balance(run.friction, nodes, grid, state)["radiated_energy"]
     now["start_error"] = missed.max(initial=0.0)
     return state

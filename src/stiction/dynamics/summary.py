@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiction.dynamics.checks import resolves_steps
-from stiction.dynamics.energies import fracture_energy, radiated_energy
+from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import Floats, State
 from stiction.interface import Interface
@@ -54,21 +54,18 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return found
 
 
+def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
+    """Return the lengths, m, of which speeds are means, in units of the shortest h_n there."""
+    interface, nucleation = problem.interface, problem.nucleation_lengths(run.steepest_rate)
+    windows = zip(nucleation, interface.spacings, interface.lengths, strict=True)
+    return [min(max(lengths * one, 8.0 * spacing), 0.25 * end) for one, spacing, end in windows]
+
+
 def _arrival(run: Run, state: State) -> Floats:
     """When the front arrived, s, of the interface's shape; nan where times are too coarse."""
     arrival = state.arrival.reshape(run.medium.interface.shape)
     resolved = resolves_steps(run, float(state.now["time"]))
     return arrival if resolved else np.full_like(arrival, np.nan)
-
-
-def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
-    """Return the lengths, m, of which speeds are means, in units of the shortest h_n there."""
-    interface = problem.interface
-    windows = zip(
-        problem.nucleation_lengths(run.steepest_rate), interface.spacings, interface.lengths,
-        strict=True,
-    )  # fmt: skip
-    return [min(max(lengths * one, 8.0 * spacing), 0.25 * end) for one, spacing, end in windows]
 
 
 def front_speed(problem: Problem, run: Run, state: State) -> Floats:
@@ -77,73 +74,74 @@ def front_speed(problem: Problem, run: Run, state: State) -> Floats:
     return rupture_speed(_arrival(run, state), problem.interface.spacings, windows)
 
 
-def _axis_speeds(problem: Problem, run: Run, state: State, lengths: float) -> list[Floats]:
-    """Apparent speeds of the front along each axis, on the lines through where it began."""
+def _axis_speeds(
+    problem: Problem,
+    run: Run,
+    state: State,
+    lengths: float,
+    statistic: Callable[[Floats], Any],
+) -> list[float]:
+    """A statistic of the front's speed along each axis, on the lines through where it began."""
     interface, arrival = problem.interface, _arrival(run, state)
     began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
     windows = _windows(problem, run, lengths)
     found = []
     for axis, (spacing, window) in enumerate(zip(interface.spacings, windows, strict=True)):
         through = tuple(slice(None) if i == axis else node for i, node in enumerate(began))
-        found.append(rupture_speed(arrival[through], (spacing,), [window]))
+        speeds = rupture_speed(arrival[through], (spacing,), [window])
+        speeds = speeds[np.isfinite(speeds)]
+        found.append(float(statistic(speeds)) if speeds.size else np.nan)
     return found
 
 
-def _of_finite(statistic: Callable[[Floats], Any], values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(statistic(finite)) if finite.size else np.nan
+def _critical_load(run: Run, now: Any) -> float:
+    """Return the load that carries the largest mean stress.
 
-
-def _per_direction(values: list[float]) -> Any:
-    """A number on a line, one along x and one along y on a plane."""
-    return values[0] if len(values) == 1 else np.array(values)
+    It is nan where nothing became unstable, or where the largest mean stress is that of an
+    overstressed start: no load carries it.
+    """
+    nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
+    load = (float(now["peak_stress"]) - run.setting.mean_initial) / run.setting.mean_profile
+    began = now["start_load"] * nodes.profile + nodes.initial
+    overstressed = bool(np.any(began - nodes.strength > margin))
+    carried = not overstressed or load > now["start_load"] + margin
+    unstable = max(now["first_stress"], now["kinetic_stress"]) > -np.inf
+    return load if carried and unstable else np.nan
 
 
 def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
-    """Return the scalars of a finished run.
-
-    The critical load is nan where nothing became unstable, or where the largest mean stress is that
-    of an overstressed start: no load carries it.
-    """
-    medium, now, setting = run.medium, state.now, run.setting
+    """Return the scalars of a finished run."""
+    medium, interface, now = run.medium, run.medium.interface, state.now
     peak, first, kinetic = (
         float(now[name]) for name in ("peak_stress", "first_stress", "kinetic_stress")
     )
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
-    far, near = (_axis_speeds(problem, run, state, lengths) for lengths in (2.0, 0.5))
-    dissipated = fracture_energy(run.friction, state.slip, setting.nodes)
-    interface, cell = medium.interface, medium.interface.cell
     node = np.unravel_index(int(now["peak_node"]), interface.shape)
-    load = (peak - setting.mean_initial) / setting.mean_profile
-    nodes, margin = setting.nodes, 1e-6 * now["scale"]
-    began = now["start_load"] * nodes.profile + nodes.initial
-    overstressed = bool(np.any(began - nodes.strength > margin))
-    carried = not overstressed or load > now["start_load"] + margin
-    unstable = np.isfinite(first) or np.isfinite(kinetic)
-    return {
-        "critical_load": load if carried and unstable else np.nan,
+    spent = energy_balance(run.friction, run.setting.nodes, medium.grid, state)
+    found: dict[str, Any] = {
+        "critical_load": _critical_load(run, now),
         "critical_stress": peak,
         "first_instability": first if np.isfinite(first) else peak,
-        "critical_position": _per_direction(
-            [i * spacing for i, spacing in zip(node, interface.spacings, strict=True)]
-        ),
+        "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
         "applied_load": float(now["peak_load"]),
         "onset_time": float(now["peak_time"]),
         "kinetic_stress": kinetic,
         "stress_drop": peak - kinetic,
-        "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * cell,
-        "radiated_energy": radiated_energy(run.friction, setting.nodes, medium.grid, state),
-        "fracture_energy": float(dissipated.sum()) * cell,
+        "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * interface.cell,
+        "radiated_energy": spent["radiated_energy"],
+        "fracture_energy": spent["fracture_energy"],
         "arrested_events": int(now["arrested"]),
-        "rupture_speed": _per_direction([_of_finite(np.max, speeds) for speeds in far]),
-        "median_rupture_speed": _per_direction(
-            [_of_finite(np.median, speeds) for speeds in near]
-        ),
+        "rupture_speed": _axis_speeds(problem, run, state, 2.0, np.max),
+        "median_rupture_speed": _axis_speeds(problem, run, state, 0.5, np.median),
         "start_load": float(now["start_load"]),
         "start_error": float(now["start_error"]),
         "implicit_steps": int(now["implicit_steps"]),
         "explicit_steps": int(now["explicit_steps"]),
     }
+    for name in ("critical_position", "rupture_speed", "median_rupture_speed"):
+        # A number on a line; one along x and one along y on a plane.
+        found[name] = np.array(found[name]) if interface.is_plane else found[name][0]
+    return found
 
 
 def rupture_speed(
