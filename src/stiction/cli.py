@@ -456,9 +456,9 @@ def rupture(
     """Simulate one interface from its first slip to global sliding, or as its study stops it.
 
     The strength is a sample of the study (of a sweep, at its first point) or a profile of your
-    own. The command writes `rupture.nc` (slip, slip rate and stress over time and x) and, as PNG
-    and PDF, `rupture` (slip rate in space and time) and `front` (speed of the rupture front). The
-    loading rate is that of the study's method `rupture`, else 2e7 Pa/s.
+    own. The command writes `rupture.nc` (slip, slip rate and stress over time and x) and a figure
+    of the slip rate in space and time (PNG and PDF). The loading rate is that of the study's
+    method `rupture`, else 2e7 Pa/s.
     """
     from stiction import plot
     from stiction.dynamics.method import Rupture
@@ -483,8 +483,7 @@ def rupture(
     write_result(result, out / "rupture.nc")
     echo(_summary(result))
     with Meter("drawing the figures"):
-        for draw in (plot.rupture, plot.front):
-            _save_figure(draw(result, problem=problem), out / draw.__name__)
+        _save_figure(plot.rupture(result, problem=problem), out / "rupture")
     if film:
         echo(f"film: {plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")

@@ -217,7 +217,7 @@ def test_rupture_writes_result_figures_and_film(command, study, tmp_path):
     assert code == 0
     assert "critical stress" in text
     assert "ended by: sliding" in text
-    for name in ("rupture.png", "rupture.pdf", "front.png", "front.pdf", "rupture.gif"):
+    for name in ("rupture.png", "rupture.pdf", "rupture.gif"):
         assert (tmp_path / "rupture" / name).stat().st_size > 5000, name
     loaded = st.Study.from_toml(study)
     tau_p = loaded.random.strength.sample(loaded.problem.interface, samples=1, seed=3, first=1)

@@ -63,7 +63,7 @@ def test_the_command_draws_figures_and_a_film(path, tmp_path, monkeypatch):
     first = np.asarray(film.convert("RGB")).astype(int)
     film.seek(film.n_frames - 1)
     assert np.abs(np.asarray(film.convert("RGB")) - first).max() > 50
-    for name in ("rupture.png", "front.png"):
+    for name in ("rupture.png",):
         assert Image.open(tmp_path / name).size[0] > 500
     with xr.open_dataset(tmp_path / "rupture.nc") as run:
         assert run.slip_rate.dims == ("time", "x", "y")

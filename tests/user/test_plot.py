@@ -128,10 +128,9 @@ def test_path(system):
     refuses(words, lambda: st.plot.equilibrium_path(path.isel(load=[2])))
 
 
-def test_a_rupture_and_its_front(system, run, tmp_path):
+def test_a_rupture(system, run, tmp_path):
     onset = st.plot.rupture(run).lines[0].get_xydata()[0]
     assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])
-    assert {text.get_text() for text in st.plot.front(run).texts} == {"$c_R$", "$c_s$", "$c_d$"}
     assert st.plot.rupture(run.drop_attrs(), problem=system[0]).lines
     at_once = run.assign(onset_time=run.onset_time * 0.0)  # it begins with the run
     st.plot.rupture(at_once).figure.savefig(tmp_path / "rupture.png")

@@ -2,7 +2,7 @@
 A rupture on a plane
 ====================
 
-Slip rate at four times, and arrival times.
+The front at equal intervals of time, on a map of the strength.
 """
 
 import stiction as st
@@ -20,7 +20,3 @@ run = st.simulate_rupture(
     problem, tau_p, method=st.Rupture(loading_rate=2e7), save=st.Save(every=4)
 )
 st.plot.rupture(run)
-
-# %%
-
-st.plot.front(run)

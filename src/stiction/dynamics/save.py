@@ -123,10 +123,11 @@ class Save:
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
         """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
-        lengths, problems, numbers = np.array(interface.lengths), [], []
+        lengths, problems, numbers = interface.lengths, [], []
         for name, place in self.stations.items():
-            if len(place) == lengths.size and np.all((place >= 0.0) & (place <= lengths)):
-                steps = np.round(np.array(place) / interface.spacings).astype(int)
+            at = np.array(place)
+            if at.size == len(lengths) and np.all((at >= 0.0) & (at <= lengths)):
+                steps = np.round(at / interface.spacings).astype(int)
                 index = tuple(steps % interface.shape)
                 numbers.append(int(np.ravel_multi_index(index, interface.shape)))
             else:

@@ -1,8 +1,10 @@
-"""Plots of results: each function draws on axes (given as ``ax=``, or new ones) and returns them.
+"""Plots of results.
+
+A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several panels
+(`fit`, `posterior`) returns a figure. `film` writes a file and returns its path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
-pressure, friction coefficients are drawn too. `fit` and `posterior` have several panels and
-return a figure; `film` writes a file.
+pressure, friction coefficients are drawn too.
 """
 
 from stiction.plot.distributions import monte_carlo, quantiles
@@ -11,7 +13,7 @@ from stiction.plot.fields import field
 from stiction.plot.films import film
 from stiction.plot.fits import fit, posterior
 from stiction.plot.onsets import equilibrium_path, onset
-from stiction.plot.ruptures import front, rupture
+from stiction.plot.ruptures import rupture
 from stiction.plot.style import paper_style
 
 __all__ = [
@@ -20,7 +22,6 @@ __all__ = [
     "field",
     "film",
     "fit",
-    "front",
     "monte_carlo",
     "onset",
     "paper_style",

@@ -59,21 +59,21 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
     """
     results = named(result)
     quantity = shown_quantity(next(iter(results.values())), quantity)
+    curves: list[tuple[str | None, xr.DataArray]] = []
+    along: list[str] = []
+    for name, one in results.items():
+        need(one, quantity)
+        variable = one[quantity]
+        along = _swept(variable)
+        if len(along) > 1:
+            raise InputError(
+                f"result: is swept over {', '.join(along)}; choose steps of all but one with"
+                f" result.isel({along[0]}=0)"
+            )
+        curves += _steps(variable, along[0]) if along else [(name, variable)]
+    single = isinstance(result, xr.Dataset) and not along
+    factor, unit, text = scaled(*(variable for _, variable in curves))
     with on_axes(ax) as axes:
-        along: list[str] = []
-        curves: list[tuple[str | None, xr.DataArray]] = []
-        for name, one in results.items():
-            need(one, quantity)
-            variable = one[quantity]
-            along = _swept(variable)
-            if len(along) > 1:
-                raise InputError(
-                    f"result: is swept over {', '.join(along)}; choose steps of all but one with"
-                    f" result.isel({along[0]}=0)"
-                )
-            curves += _steps(variable, along[0]) if along else [(name, variable)]
-        single = isinstance(result, xr.Dataset) and not along
-        factor, unit, text = scaled(*(variable for _, variable in curves))
         for number, (label, variable) in enumerate(curves, len(axes.lines) * single):
             _draw_values(axes, variable, factor, None if single else label, number)
         axes.set_xlabel(text)
@@ -144,12 +144,14 @@ def quantiles(
     along = along or dims[0]
     within = next((dim for dim in dims if dim != along), None)
     curves = [(None, variable)] if within is None else _steps(variable, within)
+    factor, _, text = scaled(variable)
+    scale, _, name = scaled(variable[along])
     place = variable[along].values
-    named_steps = place.dtype.kind not in "if" or np.unique(place).size < place.size
-    place = np.arange(1.0 * place.size) if named_steps else place * scaled(variable[along])[0]
+    by_name = place.dtype.kind not in "if" or np.unique(place).size < place.size
+    place = np.arange(1.0 * place.size) if by_name else place * scale
     with on_axes(ax, height=3.2) as axes:
         for number, (label, part) in enumerate(curves):
-            values, errors = _quantiles(part, scaled(variable)[0], along)
+            values, errors = _quantiles(part, factor, along)
             style: dict[str, Any] = {"color": color(number), "linewidth": 0}
             if label is None:
                 axes.fill_between(place, values[0], values[4], alpha=0.12, **style)
@@ -157,16 +159,13 @@ def quantiles(
             axes.fill_between(place, values[1], values[3], alpha=pale, **style)
             style = {"capsize": 2, "label": label, **series(number, marker=True)}
             axes.errorbar(place, values[2], yerr=errors, **style)
-        axes.set_xlabel(scaled(variable[along])[2])
-        axes.set_ylabel(scaled(variable)[2])
-        if named_steps:
-            names = [_step_text(variable[along], step) for step in range(place.size)]
-            axes.set_xticks(place, names)
-        elif _is_geometric(place):
+        axes.set_xlabel(name)
+        axes.set_ylabel(text)
+        if not by_name and place.min() > 0.0 and place.max() >= 4.0 * place.min():
             axes.set_xscale("log")
-            if place.size <= 8:  # powers of ten would not name the steps
-                axes.set_xticks(place, [f"{value:.3g}" for value in place])
-                axes.minorticks_off()
+        if by_name or place.size <= 8:  # powers of ten would not name the steps
+            axes.set_xticks(place, [_step_text(variable[along], i) for i in range(place.size)])
+            axes.minorticks_off()
         if within is not None:
             axes.legend(title=scaled(variable[within])[2])
     return axes
@@ -187,11 +186,6 @@ def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.Data
     ]
 
 
-def _finite(values: Any) -> NDArray[np.float64]:
-    array = np.asarray(values, dtype=np.float64).ravel()
-    return array[np.isfinite(array)]
-
-
 def _quantiles(
     part: xr.DataArray, factor: float, along: str
 ) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -208,13 +202,9 @@ def _quantiles(
     return found, errors
 
 
-def _is_geometric(place: NDArray[np.float64]) -> bool:
-    """Whether the steps are more nearly geometric than arithmetic."""
-    ordered = np.sort(place)
-    if ordered.size < 3 or ordered[0] <= 0.0:
-        return False
-    linear, log = np.diff(ordered), np.diff(np.log(ordered))
-    return bool(np.std(log) / np.mean(log) < np.std(linear) / np.mean(linear))
+def _finite(values: Any) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64).ravel()
+    return array[np.isfinite(array)]
 
 
 def _step_text(coordinate: xr.DataArray, step: int) -> str:

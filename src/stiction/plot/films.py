@@ -1,6 +1,5 @@
 """Films of ruptures."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,8 @@ from stiction.plot.ruptures import (
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
 from stiction.progress import Meter, Show
 
-Frames = tuple[Figure, list[Any], Callable[[int], None]]
-"""A figure, the artists that move in it, and a function that shows a frame."""
+Moving = list[tuple[Any, str, Any]]
+"""What moves in a figure: an artist, the name of its data, and these for each frame of the run."""
 
 
 def film(
@@ -73,19 +72,19 @@ def film(
     shown = np.unique(np.linspace(0, run.sizes["time"] - 1, frames).round().astype(int))
     images, still = [], Image.Dither.NONE  # with dithering, parts at rest would flicker
     with paper_style(), Meter("film", shown.size, progress, unit="frames") as meter:
-        figure, moving, show = (_plane_film if "y" in run.dims else _line_film)(run)
+        figure, moving = (_plane_film if "y" in run.dims else _line_film)(run)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         figure.set_layout_engine("none")  # the panels must not move between frames
-        for part in moving:  # only these are drawn for each frame: 40 times as fast
-            part.set_animated(True)
+        for artist, _, _ in moving:  # only these are drawn for each frame: 40 times as fast
+            artist.set_animated(True)
         canvas.draw()
         background = canvas.copy_from_bbox(figure.bbox)
         for i in shown:
-            show(i)
             canvas.restore_region(background)
-            for part in moving:
-                figure.draw_artist(part)
+            for artist, name, values in moving:
+                artist.set(**{name: values[i]})
+                figure.draw_artist(artist)
             frame = Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
             images.append(frame.quantize(128, Image.Quantize.FASTOCTREE, dither=still))
             meter.advance()
@@ -95,25 +94,21 @@ def film(
     return target
 
 
-def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, Callable[[int], None]]:
-    """Return a line of text above axes with time and mean stress, and how to set it."""
+def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
+    """Return a line of text above axes, with time and mean stress."""
     since, _ = since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)
     stress, stress_unit = unit_for("Pa", run["mean_stress"].values)
     mean = (run["mean_stress"].values * stress).round(3) + 0.0  # no minus before a zero
-    text = axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET)
-
-    def show(i: int) -> None:
-        text.set_text(
-            f"{factor * since[i]:,.1f} {unit} since the onset,"
-            f"  mean stress {mean[i]:.3f} {stress_unit}"
-        )
-
-    return text, show
+    texts = [
+        f"{time:,.1f} {unit} since the onset,  mean stress {one:.3f} {stress_unit}"
+        for time, one in zip(factor * since, mean, strict=True)
+    ]
+    return axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET), "text", texts
 
 
-def _line_film(run: xr.Dataset) -> Frames:
+def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     length, unit = unit_for("m", run["x"].values)
     x = run["x"].values * length
     factor, stress_unit = unit_for("Pa", finite_strength(run))
@@ -129,40 +124,26 @@ def _line_film(run: xr.Dataset) -> Frames:
     margin = 0.06 * (highest - min(np.nanmin(strength), stress.min()))
     above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
     above.legend(loc="upper right", ncols=2)
-    (moving,) = below.semilogy(x, rate[0], color=ACCENT)
+    (slip,) = below.semilogy(x, rate[0], color=ACCENT)
     below.set_ylim(10.0**-DECADES * top, 3.0 * top)
     below.set_xlim(0.0, x[-1] + x[1] - x[0])
     below.set_xlabel(f"position $x$ ({unit})")
     below.set_ylabel("slip rate (m/s)")
-    clock, tick = _clock(above, run)
-
-    def show(i: int) -> None:
-        line.set_ydata(stress[i])
-        moving.set_ydata(rate[i])
-        tick(i)
-
-    return figure, [line, moving, clock], show
+    return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(above, run)]
 
 
-def _plane_film(run: xr.Dataset) -> Frames:
+def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     interface = problem_of(run).interface
-    rate = run["slip_rate"].values
-    factor, unit = unit_for("Pa", run["shear_stress"].values)
+    rate, factor, unit = run["slip_rate"].values, *unit_for("Pa", run["shear_stress"].values)
     stress = run["shear_stress"].values * factor
     norm = rate_scale(rate, 4.0)
+    rate = masked(rate, norm)
     low, high = np.quantile(stress, [0.001, 0.999])
     figure = new_figure(PAGE * 1.15, 3.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    slow = masked(rate[0], norm)
-    slip = maps.image(left, interface, slow, "slip rate (m/s)", norm=norm, cmap=COLORS)
+    slip = maps.image(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=COLORS)
     text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}
     load = maps.image(right, interface, stress[0], text, cmap="cividis", **ends)
     right.label_outer()
-    clock, tick = _clock(left, run)
-
-    def show(i: int) -> None:
-        slip.set_data(masked(rate[i], norm).T)
-        load.set_data(stress[i].T)
-        tick(i)
-
-    return figure, [slip, load, clock], show
+    moving = [(slip, "data", rate.swapaxes(1, 2)), (load, "data", stress.swapaxes(1, 2))]
+    return figure, [*moving, _clock(left, run)]

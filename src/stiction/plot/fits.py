@@ -83,8 +83,8 @@ def _histogram(axes: Axes, found: FieldFit) -> None:
     spread = [one.marginal.distribution.pdf(at) for one in found.repetitions[:SHOWN]]
     _band(axes, at * factor, np.array(spread) / factor)
     noisy = found._estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
-    name = "fitted, without the noise" if noisy else "fitted"
     density = found.field.marginal.distribution.pdf(at) / factor
+    name = "fitted, without the noise" if noisy else "fitted"
     axes.plot(at * factor, density, color=color(1), label=name)
     # A density that is infinite at a bound must not set the scale of the panel.
     axes.set_ylim(0.0, 1.6 * np.max(counts))
@@ -98,10 +98,10 @@ def _quantiles(axes: Axes, found: FieldFit) -> None:
     values = estimate.setting.marginal.quiet(np.concatenate(found._rows), estimate.model.noise)
     factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
     share = (np.arange(200) + 0.5) / 200
-    expected = found.field.marginal.distribution.ppf(share) * factor
-    spread = [
-        one.marginal.distribution.ppf(share) * factor for one in found.repetitions[:SHOWN]
-    ]
+    expected, *spread = (
+        one.marginal.distribution.ppf(share) * factor
+        for one in (found.field, *found.repetitions[:SHOWN])
+    )
     _compare(axes, expected, np.quantile(values, share) * factor, expected, spread)
     axes.set_xlabel(with_unit("quantile of the fit", unit))
     axes.set_ylabel(with_unit("quantile of the data", unit))
@@ -139,8 +139,7 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     if model.noise**2 > 1e-6 * fitted.max():
         level = factor * model.noise**2
         axes.axhline(level, label="noise", color=ACCENT, linewidth=0.8, linestyle="--")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     axes.set_ylim(bottom=0.1 * factor * min(measured.min(), fitted.min()))
     dimension = "m" if len(one.window.shape) == 1 else "m²"
     axes.set_xlabel("wavenumber (rad/m)")
@@ -186,33 +185,30 @@ def posterior(found: Posterior) -> Figure:
         before.append(values * factor)
         after.append(found.draws[name].ravel() * factor)
         labels.append(with_unit(name, unit))
+    ends = [np.quantile(values, [0.002, 0.998]) for values in before]
     with paper_style():
         figure = new_figure(size + 3.2, size)
         parts: Any = figure.subfigures(1, 2, width_ratios=[size, 3.2])
-        left, right = parts
-        panels = left.subplots(count, count, squeeze=False)
+        panels = parts[0].subplots(count, count, squeeze=False)
         for i, j in np.ndindex(count, count):
             axes = panels[i, j]
             if j > i:
                 axes.set_axis_off()
             elif i == j:
-                _draw_marginal(axes, before[i], after[i])
+                _draw_marginal(axes, before[i], after[i], ends[i])
                 text = f"{found.information[names[i]]:.2f} nats"
                 axes.set_title(text, fontsize=8, loc="left")
             else:
                 step = max(1, after[i].size // 1500)
                 style = {"color": INK, "markersize": 1.5, "alpha": 0.35}
                 axes.plot(after[j][::step], after[i][::step], ".", **style)
-                axes.set_xlim(*np.quantile(before[j], [0.002, 0.998]))
-                axes.set_ylim(*np.quantile(before[i], [0.002, 0.998]))
-                for name, values in (("x", before[j]), ("y", before[i])):
-                    if _is_wide(values):
-                        _make_logarithmic(axes, name)
+                _make_scale(axes, "y", ends[i])
+            _make_scale(axes, "x", ends[j])
             axes.tick_params(labelbottom=i == count - 1, labelleft=j == 0 < i)
             axes.set_xlabel(labels[j] if i == count - 1 else "")
             axes.set_ylabel(labels[i] if j == 0 < i else "")
         panels[0, 0].legend()
-        _draw_peaks(right, found)
+        _draw_peaks(parts[1], found)
     return figure
 
 
@@ -227,48 +223,46 @@ def _unit_of(name: str, values: Array) -> tuple[float, str]:
     return 1.0, ""
 
 
-def _is_wide(values: Array) -> bool:
-    low, high = np.quantile(values, [0.002, 0.998])
-    return bool(low > 0.0 and high > 6.0 * low)
+def _is_wide(ends: Array) -> bool:
+    return bool(ends[1] > 6.0 * ends[0] > 0.0)
 
 
-def _draw_marginal(axes: Axes, before: Array, after: Array) -> None:
-    low, high = np.quantile(before, [0.002, 0.998])
-    bins: Any = (np.geomspace if _is_wide(before) else np.linspace)(low, high, 46)
+def _draw_marginal(axes: Axes, before: Array, after: Array, ends: Array) -> None:
+    low, high = ends.tolist()
+    bins: Any = (np.geomspace if _is_wide(ends) else np.linspace)(low, high, 46)
     prior: Any = {"color": PALE, "histtype": "stepfilled", "label": "prior"}
     own: Any = {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2}
     for values, style in ((before, prior), (after, own)):
         axes.hist(values, bins=bins, weights=np.full(values.size, 1.0 / values.size), **style)
     axes.set_yticks([])
-    if _is_wide(before):
-        _make_logarithmic(axes, "x")
 
 
-def _make_logarithmic(axes: Axes, name: str) -> None:
-    """Make an axis logarithmic with plain numbers at 1, 2, 5, 10, ..."""
-    getattr(axes, f"set_{name}scale")("log")
-    axis = getattr(axes, f"{name}axis")
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(ScalarFormatter())
-    axis.set_minor_formatter(NullFormatter())
+def _make_scale(axes: Axes, name: str, ends: Array) -> None:
+    """Show an axis between two ends; logarithmic, with plain numbers, if they lie far apart."""
+    axes.set(**{f"{name}lim": ends})
+    if _is_wide(ends):
+        axes.set(**{f"{name}scale": "log"})
+        axis = axes.xaxis if name == "x" else axes.yaxis
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(ScalarFormatter())
+        axis.set_minor_formatter(NullFormatter())
 
 
 def _draw_peaks(figure: Any, found: Posterior) -> None:
     """Draw the distribution functions of the measured and predicted peaks."""
     peaks, error = found.peaks, found.likelihood.model.error
     panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
-    for axes, length, values, more in zip(
-        panels, peaks.lengths, peaks.values, found.predicted, strict=True
-    ):
+    levels = np.linspace(0.002, 0.998, 250)
+    rows = zip(panels, peaks.lengths, peaks.values, found.predicted, strict=True)
+    for axes, length, values, more in rows:
         factor, unit = unit_for("1" if peaks.coefficients else "Pa", values)
         ordered = np.sort(values) * factor
         steps = (np.arange(ordered.size) + 0.5) / ordered.size
-        levels = np.linspace(0.002, 0.998, 250)
         axes.plot(np.quantile(more, levels) * factor, levels, color=INK, label="predicted")
-        axes.plot(ordered, steps, "o", color=ACCENT, markersize=3.5, label="measured")
-        if error > 0.0:
-            style = {"fmt": "none", "ecolor": ACCENT, "elinewidth": 0.6, "alpha": 0.6}
-            axes.errorbar(ordered, steps, xerr=error * factor, **style)
+        axes.errorbar(
+            ordered, steps, xerr=error * factor or None, fmt="o", color=ACCENT, markersize=3.5,
+            elinewidth=0.6, label="measured",
+        )  # fmt: skip
         name = "coefficient of friction" if peaks.coefficients else "peak"
         axes.set_xlabel(with_unit(name, unit))
         axes.set_ylabel("share of tests")

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import matplotlib
@@ -27,7 +28,7 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.fields import finish_line, places, rows_of
-from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, marker, series
+from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, marker, series
 from stiction.problem import Problem
 from stiction.profiles.placing import IN_GAP, MEASURED
 
@@ -117,34 +118,23 @@ def _draw_line(
     interface = problem.interface
     x = places(interface)
     factor, unit = unit_for("Pa", tau_p)
-    length, length_unit = unit_for("m", interface.lengths)
     found = next(iter(results.values()))
-    missing = np.zeros(x.size, dtype=bool)
+    measured = tau_p * factor
     if MEASURED in found.coords:
         missing = ~found[MEASURED].values.reshape(-1)
-    measured = np.where(missing, np.nan, tau_p)
-    if missing.any():
-        axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
+        axes.plot(x, measured, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
         beside = np.roll(missing, 1) | np.roll(missing, -1)
         axes.fill_between(
             x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
             facecolor=PALE, alpha=0.6, linewidth=0.0, zorder=0.0, label="not measured, filled in",
         )  # fmt: skip
-    axes.plot(x, measured * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-    try:
+        measured = np.where(missing, np.nan, measured)
+    axes.plot(x, measured, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
+    with suppress(InputError):  # no single nucleation length: the strength alone is drawn
         averaged = nucleation_stress(problem, tau_p)
         axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
-    except InputError:  # no single nucleation length: the strength alone is drawn
-        pass
     for number, (name, result) in enumerate(results.items()):
-        place = float(result["critical_position"][0]) * length
-        remark = " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
-        axes.plot(
-            place, float(result["critical_load"][0]) * factor, linestyle="none",
-            marker=marker(number), markersize=7.0 - number, markeredgecolor=color(number + 1),
-            markerfacecolor="none" if number else color(number + 1), markeredgewidth=1.2,
-            label=f"{_label(name, result)} at {place:.2f} {length_unit}{remark}",
-        )  # fmt: skip
+        _mark(axes, interface, number, name, result, factor)
     finish_line(axes, interface, with_unit("shear stress", unit))
     axes.margins(y=0.08)
     add_friction_scale(axes, problem, "y", factor)
@@ -156,42 +146,51 @@ def _draw_plane(
     exact = next((one for one in results.values() if {"slip", "sensitivity"} <= set(one)), None)
     interface = problem.interface
     factor, unit = unit_for("Pa", tau_p)
-    length, length_unit = unit_for("m", interface.lengths)
     shades = maps.GREYS if exact is not None else "cividis"
     maps.image(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", cmap=shades)
     if exact is not None:
         inside, _ = critical_patch(exact["sensitivity"].values[0], interface.spacings)
-        maps.outline(axes, interface, exact["slip"].values[0] > 0.0, color(1), 0.9)
-        maps.outline(axes, interface, inside, ACCENT, 1.6)
-        axes.plot([], [], color=color(1), linewidth=0.9, label="slips at the first instability")
-        axes.plot([], [], color=ACCENT, linewidth=1.6, label="critical patch")
+        sliding = exact["slip"].values[0] > 0.0
+        for mask, ink, width, text in (
+            (sliding, color(1), 0.9, "slips at the first instability"),
+            (inside, ACCENT, 1.6, "critical patch"),
+        ):
+            maps.outline(axes, interface, mask, ink, width)
+            axes.plot([], [], color=ink, linewidth=width, label=text)
     for number, (name, result) in enumerate(results.items()):
-        x, y = result["critical_position"].values[0] * length
-        axes.plot(
-            x, y, linestyle="none", marker=marker(number), markersize=6.0 - number,
-            markerfacecolor="white", markeredgecolor=INK, markeredgewidth=1.1,
-            label=f"{_label(name, result)} at ({x:.2f}, {y:.2f}) {length_unit}",
-        )  # fmt: skip
+        _mark(axes, interface, number, name, result, factor)
         if exact is None and "critical_aspect" in result:
-            _ellipse(axes, interface, x, y, result["critical_patch_extent"].values[0] * length)
+            _ellipse(axes, interface, result)
     maps.keep_edges(axes, interface)
 
 
-def _label(name: str, result: xr.Dataset) -> str:
+def _mark(
+    axes: Axes, interface: Interface, number: int, name: str, result: xr.Dataset, factor: float
+) -> None:
+    """Mark the position of an onset, on a line at its load in the unit of that factor."""
+    length, length_unit = unit_for("m", interface.lengths)
+    place = np.atleast_1d(result["critical_position"].values[0]) * length
     load = float(result["critical_load"][0])
-    factor, unit = unit_for("Pa", load)
-    text = f"{_NAMES.get(name, name)}: {load * factor:.4f} {unit}"
+    own, unit = unit_for("Pa", load)
+    text = f"{_NAMES.get(name, name)}: {load * own:.4f} {unit}"
     if "friction_coefficient" in result:
         text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
-    return text
+    text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
+    text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
+    axes.plot(
+        *(place if interface.is_plane else (*place, load * factor)), linestyle="none",
+        marker=marker(number), markersize=7.5 - number, color=color(number + 1),
+        markeredgecolor="white", markeredgewidth=0.8, label=text,
+    )  # fmt: skip
 
 
-def _ellipse(axes: Axes, interface: Interface, x: float, y: float, extent: Array) -> None:
+def _ellipse(axes: Axes, interface: Interface, result: xr.Dataset) -> None:
     factor, _ = unit_for("m", interface.lengths)
-    lengths = [length * factor for length in interface.lengths]
-    for i, j in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
-        place = (x + i * lengths[0], y + j * lengths[1])
-        axes.add_patch(Ellipse(place, *extent, fill=False, edgecolor="white", linewidth=0.9))
+    extent = result["critical_patch_extent"].values[0] * factor
+    for shift in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
+        moved = result["critical_position"].values[0] + np.multiply(shift, interface.lengths)
+        ellipse = Ellipse(moved * factor, *extent, fill=False, edgecolor="white", linewidth=0.9)
+        axes.add_patch(ellipse)
 
 
 def equilibrium_path(

@@ -1,4 +1,4 @@
-"""One rupture: slip rate in space and time, and the speed of its front."""
+"""One rupture: slip rate in space and time, and the advance of its front on a plane."""
 
 from typing import Any
 
@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
 from stiction.plot import maps
-from stiction.plot.axes import need, node_of, on_axes, problem_of, unit_for, with_unit
-from stiction.plot.fields import finish_line, places
-from stiction.plot.style import ACCENT, INK, PAGE, series
+from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.fields import finish_line
+from stiction.plot.style import ACCENT, INK, PAGE
 from stiction.problem import Problem
 
 Array = NDArray[np.float64]
@@ -58,64 +58,7 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
         return axes
     need(run, "slip_rate", hint=KEEP)
     with on_axes(ax, width=PAGE, height=3.4) as axes:
-        mesh, text = _draw_space_time(axes, run, problem)
-        finish_line(axes, problem.interface, text)
-        axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
-    return axes
-
-
-def front(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the apparent speed of the rupture front against the wave speeds.
-
-    Patches that grow ahead of the front can make it look faster than c_d.
-
-    Parameters
-    ----------
-    run : Dataset
-        From `simulate_rupture`.
-    problem : Problem, optional
-        Needed only if the run does not hold it.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        On a plane along x and along y through the critical position.
-
-    Raises
-    ------
-    InputError
-        If the front was not recorded.
-    """
-    need(run, "front_speed", "critical_position")
-    problem = problem_of(run, problem)
-    interface, solid = problem.interface, problem.solid
-    factor, unit = unit_for("m", interface.lengths)
-    speed = run["front_speed"].values
-    with on_axes(ax) as axes:
-        if interface.is_plane:
-            i, j = node_of(run["critical_position"], interface)
-            lines = {"x": speed[:, j], "y": speed[i, :]}
-            for number, (dim, values) in enumerate(lines.items()):
-                place = interface.coordinates[dim] * factor
-                style: dict[str, Any] = {"markersize": 2.5, "color": (INK, ACCENT)[number]}
-                axes.plot(place, values, ".", label=f"along ${dim}$", **style)
-            axes.legend()
-        else:
-            axes.plot(places(interface), speed, ".", color=INK, markersize=2)
-        waves = [("$c_R$", solid.rayleigh_wave_speed), ("$c_s$", solid.shear_wave_speed)]
-        if problem.mode == "II":
-            waves.append(("$c_d$", solid.dilatational_wave_speed))
-        sides = ("top", "bottom", "center")  # c_R and c_s lie close together
-        for i, (name, value) in enumerate(waves):
-            axes.axhline(value, linewidth=0.9, **series(i + 1))
-            transform = axes.get_yaxis_transform()
-            axes.text(1.01, value, name, transform=transform, va=sides[i], color=INK)
-        axes.set_ylim(0.0, 1.6 * waves[-1][1])
-        axes.set_xlim(0.0, max(interface.lengths) * factor)
-        axes.set_xlabel(f"position ({unit})")
-        axes.set_ylabel("front speed (m/s)")
+        _draw_space_time(axes, run, problem)
     return axes
 
 
@@ -133,18 +76,17 @@ def rate_scale(rate: Array, decades: float) -> LogNorm:
     return LogNorm(top * 10.0**-decades, top)
 
 
-def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> tuple[Any, str]:
-    """Draw slip rate and the onset; return the mesh and the label of the time."""
-    since, name = since_onset(run)
-    rate = run["slip_rate"].values
+def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
+    """Draw slip rate and the onset."""
+    interface = problem.interface
+    (since, name), rate = since_onset(run), run["slip_rate"].values
     norm = rate_scale(rate, DECADES)
-    near = since >= -BEFORE * problem.interface.extent / problem.solid.shear_wave_speed
+    near = since >= -BEFORE * interface.extent / problem.solid.shear_wave_speed
     if near.sum() > 2:
         since, rate = since[near], rate[near]
     factor, unit = unit_for("s", since)
-    length, _ = unit_for("m", problem.interface.lengths)
-    x, spacing = problem.interface.x, problem.interface.spacing
-    along = np.append(x, x[-1] + spacing) - 0.5 * spacing
+    length, _ = unit_for("m", interface.lengths)
+    along = (np.arange(interface.size + 1) - 0.5) * interface.spacing
     edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
         along * length, edges * factor, masked(rate, norm), norm=norm,
@@ -153,7 +95,8 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> tuple[Any
     if name != "time":
         place = float(run["critical_position"]) * length
         axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
-    return mesh, with_unit(name, unit)
+    finish_line(axes, interface, with_unit(name, unit))
+    axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
 
 
 def masked(rate: Array, norm: LogNorm) -> Any:
@@ -169,17 +112,16 @@ def finite_strength(run: xr.Dataset) -> Array:
 
 def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     """Draw the front at equal intervals of time on a map of the strength."""
-    interface = problem.interface
-    strength = finite_strength(run)
+    interface, strength = problem.interface, finite_strength(run)
     factor, unit = unit_for("Pa", strength)
     maps.image(axes, interface, strength * factor, rf"strength $\tau_p$ ({unit})", cmap="Greys")
     since = run["arrival_time"].values - float(run["onset_time"])
     scale, time_unit = unit_for("s", since)
-    later = since[np.isfinite(since) & (since > 0.0)]
+    latest = scale * float(np.nanmax(since, initial=0.0))
     length, _ = unit_for("m", interface.lengths)
-    if later.size and np.ptp(later) > 0.0:
+    if latest > 0.0:
         x, y = (length * place for place in interface.coordinates.values())
-        levels = np.linspace(0.0, scale * float(later.max()), 10)[1:-1]
+        levels = np.linspace(0.0, latest, 10)[1:-1]
         lines = axes.contour(
             x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9
         )
