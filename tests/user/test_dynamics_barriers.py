@@ -5,38 +5,35 @@ import warnings
 
 import numpy as np
 import pytest
+from ruptures import simulate, wavy_line
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
 from stiction.dynamics.diagnostics import stress_scale
-from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import Nodes
 
-NODES, LENGTH = 256, 0.05
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
-PROBLEM = st.Problem(
-    SOLID, st.Interface(length=LENGTH, nodes=NODES), st.LinearWeakening(weakening_rate=0.5e12)
-)
+NODES = 256
+PROBLEM, TAU_P = wavy_line(NODES, rate=0.5e12)
 X = np.arange(NODES) / NODES
-TAU_P = 1e6 - 2e5 * np.cos(2 * np.pi * X) + 5e4 * np.sin(10 * np.pi * X)
 METHOD = st.Rupture(loading_rate=1e7)
 
 
-def barred(height, problem=PROBLEM):
+@pytest.fixture(scope="module")
+def overstressed():
+    """The problem with an initial stress above the strength in one patch."""
+    initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
+    return dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
+
+
+def barred(height):
     """The profile with a barrier around x = L/2, far from its weakest place."""
     return np.where(np.abs(X - 0.5) < 0.15, height, TAU_P)
-
-
-def simulate(tau_p, problem=PROBLEM, save=None, **method):
-    options = {} if "load" in method else {"loading_rate": 1e7}
-    method = st.Rupture(**(options | method))
-    return simulate_rupture(problem, tau_p, method=method, save=save or st.Save(["slip"]))
 
 
 @pytest.mark.parametrize("height", [1e12, np.inf])
 def test_a_barrier_does_not_blind_the_onset(height):
     expected = st.onset(PROBLEM, barred(1e7), method=st.Equilibrium())
-    run = simulate(barred(height), stop="onset")
+    run = simulate(PROBLEM, barred(height), stop="onset")
     assert run.attrs["stopped"] == "onset"
     # Inertia at 1e7 Pa/s: some 1e-4; with tolerances of the mean strength it was 10 times too high.
     exact = float(expected.first_instability[0])
@@ -65,7 +62,7 @@ def test_the_stress_scale_is_the_mean_drop_where_strengths_are_alike_and_grows_w
 
 def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
     tau_p = barred(np.inf)
-    run = simulate(tau_p, save=st.Save(["slip", "slip_rate", "shear_stress", "strength"]))
+    run = simulate(PROBLEM, tau_p, st.Save(["slip", "slip_rate", "shear_stress", "strength"]))
     locked = np.isinf(tau_p)
     assert run.attrs["stopped"] == "sliding"
     assert np.all(run["slip"].values[:, locked] == 0.0)
@@ -73,7 +70,7 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
     for name in METHOD.variables(PROBLEM):
         assert np.all(np.isfinite(run[name])), name
     with pytest.raises(InputError, match="strength: must be finite and above residual"):
-        simulate(np.full(NODES, np.inf))
+        simulate(PROBLEM, np.full(NODES, np.inf))
     # Methods without waves say what they take.
     with pytest.raises(InputError, match="strength: must be finite; entry"):
         st.onset(PROBLEM, tau_p, method=st.LocalCriterion())
@@ -83,10 +80,10 @@ def test_an_infinite_barrier_ends_with_all_that_can_break_and_never_slips():
 def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(height):
     friction = st.LinearWeakening(critical_slip=4e-6)
     problem = dataclasses.replace(PROBLEM, friction=friction)
-    run = simulate(barred(height), problem, stop="onset")
+    run = simulate(problem, barred(height), stop="onset")
     assert run.attrs["stopped"] == "onset"
     # The same where the barrier is weak enough to have passed before.
-    same = simulate(barred(4e6), problem, stop="onset")
+    same = simulate(problem, barred(4e6), stop="onset")
     assert float(run["critical_stress"]) == pytest.approx(
         float(same["critical_stress"]), rel=1e-4
     )
@@ -94,7 +91,7 @@ def test_a_barrier_with_a_uniform_critical_slip_is_no_matter_of_resolution(heigh
 
 def arrested(nodes):
     """A weak half that breaks and is stopped by a strong one, in which waves go round."""
-    problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=LENGTH, nodes=nodes))
+    problem = dataclasses.replace(PROBLEM, interface=st.Interface(length=0.05, nodes=nodes))
     return problem, np.where(np.abs(np.arange(nodes) / nodes - 0.4) < 0.25, 0.8e6, 6e6)
 
 
@@ -105,23 +102,21 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
     slips = []
     for implicit in (True, False):
         method = {"loading_rate": 1e8, "implicit": implicit, "stop": "time", "end_time": end}
-        run = simulate(tau_p, problem, save=st.Save(["slip"], every=500), **method)
+        run = simulate(problem, tau_p, st.Save(["slip"], every=500), **method)
         slips.append(float(run["mean_slip"][-1]))
     # What creep by implicit steps may put wrong before the event: 2e-4 at 1e8 Pa/s.
     assert slips[0] == pytest.approx(slips[1], rel=4e-4)
 
 
-def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps():
-    initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
-    problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
-    runs = [simulate(TAU_P, problem, implicit=implicit) for implicit in (True, False)]
+def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps(overstressed):
+    runs = [simulate(overstressed, TAU_P, implicit=implicit) for implicit in (True, False)]
     assert runs[0].attrs["stopped"] == "sliding"
     arrival = [run["arrival_time"].values for run in runs]
     assert np.nanmin(arrival[0]) < 1e-5
     # The same steps: implicit ones came first and were early by a step or two.
     np.testing.assert_array_equal(*arrival)
     with pytest.raises(InputError, match=r"above initial_stress .*only st\.Rupture\(\)"):
-        st.onset(problem, TAU_P, method=st.LocalCriterion())
+        st.onset(overstressed, TAU_P, method=st.LocalCriterion())
 
 
 @pytest.mark.parametrize("stop", ["onset", "rest"])
@@ -146,40 +141,38 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
     assert later <= unknown <= later | {"rupture_speed", "median_rupture_speed"}
     assert int(one.arrested_events[0]) >= 1
     assert float(one.radiated_energy[0]) > 0.0
-    run = simulate(tau_p, problem, stop=stop)
+    run = simulate(problem, tau_p, stop=stop)
     assert run.attrs["stopped"] == "rest"
     assert float(run["top_slip_rate"][-1]) < 1e-3
 
 
-def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
+def test_no_load_is_critical_where_a_patch_breaks_at_the_start(overstressed):
     """The mean stress is never above that at the start, which no load has raised."""
-    initial = np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6)
-    problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
     held = {"load": ([0.0, 1.0], [0.0, 0.0]), "stop": "time", "end_time": 5e-5}
-    run = simulate(TAU_P, problem, **held)
+    run = simulate(overstressed, TAU_P, **held)
     assert np.isnan(float(run["critical_load"]))
-    assert float(run["critical_stress"]) <= initial.mean() * (1.0 + 1e-12)
-    # Nor where nothing becomes unstable.
-    run = simulate(
-        TAU_P, load=([0.0, 0.1, 0.2], [0.0, 7.6e5, 7.6e5]), stop="time", end_time=0.3
+    assert float(run["critical_stress"]) <= overstressed.load.initial_stress.mean() * (
+        1.0 + 1e-12
     )
+    # Nor where nothing becomes unstable.
+    load = ([0.0, 0.1, 0.2], [0.0, 7.6e5, 7.6e5])
+    run = simulate(PROBLEM, TAU_P, load=load, stop="time", end_time=0.3)
     assert np.isnan(float(run["critical_load"]))
 
 
 def test_a_stress_below_minus_the_strength_is_said():
-    low = ([0.0, 0.08, 0.2, 0.3], [0.0, 7.62e5, -2e6, 2e6])
-    with pytest.warns(AccuracyWarning, match="would slip in reverse"):
-        simulate(TAU_P, load=low)
-    with pytest.warns(AccuracyWarning, match="would slip in reverse"):
-        simulate(TAU_P, load=([0.0, 0.3], [-2e6, 2e6]), stop="onset")
-    behind = dataclasses.replace(
-        PROBLEM, load=st.Load(initial_stress=np.where(X > 0.9, -2e6, 0.0))
-    )
-    with pytest.warns(AccuracyWarning, match="would slip in reverse"):
-        st.onset(behind, TAU_P, method=dataclasses.replace(METHOD, stop="onset"))
+    falls = ([0.0, 0.08, 0.2, 0.3], [0.0, 7.62e5, -2e6, 2e6])
+    behind = st.Load(initial_stress=np.where(X > 0.9, -2e6, 0.0))
+    for problem, options in (
+        (PROBLEM, {"load": falls}),
+        (PROBLEM, {"load": ([0.0, 0.3], [-2e6, 2e6]), "stop": "onset"}),
+        (dataclasses.replace(PROBLEM, load=behind), {"stop": "onset"}),
+    ):
+        with pytest.warns(AccuracyWarning, match="would slip in reverse"):
+            simulate(problem, TAU_P, **options)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        simulate(TAU_P)
+        simulate(PROBLEM, TAU_P)
 
 
 def test_loose_kernels_that_make_waves_grow_are_refused():
@@ -196,7 +189,7 @@ def test_loose_kernels_that_make_waves_grow_are_refused():
     ("plane", "ratio"), [("stress", 0.4999), ("stress", -0.6), ("strain", -0.6)]
 )
 def test_poisson_ratios_that_waves_allow(plane, ratio):
-    solid = dataclasses.replace(SOLID, poisson_ratio=ratio, plane=plane)
+    solid = dataclasses.replace(PROBLEM.solid, poisson_ratio=ratio, plane=plane)
     friction = st.LinearWeakening(weakening_rate=0.5e12 * solid.effective_modulus() / 1.33e9)
     problem = dataclasses.replace(PROBLEM, solid=solid, friction=friction)
     exact = float(st.onset(problem, TAU_P, method=st.Equilibrium()).critical_stress[0])

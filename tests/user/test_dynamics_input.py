@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
+from ruptures import STRESS, wavy_line
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
@@ -19,25 +20,23 @@ from stiction.elasticity.exponential_sum import kernel_sum, stored_kernel
 from stiction.errors import StoreError
 from stiction.files import read_arrays
 
-SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES = 128
 
 
-def make_problem(solid=SOLID, nodes=NODES):
-    friction = st.LinearWeakening(weakening_rate=0.2e12)
-    return st.Problem(solid, st.Interface(length=0.05, nodes=nodes), friction)
+def make_problem(nodes=NODES):
+    return wavy_line(nodes)[0]
 
 
 def profile(nodes=NODES):
-    x = np.arange(nodes) / nodes
-    return 1e6 - 2e5 * np.cos(2 * np.pi * x) + 5e4 * np.sin(10 * np.pi * x)
+    return wavy_line(nodes)[1]
 
 
 METHOD = Rupture(loading_rate=1e8)
 
 
 def simulate(save=None, **options):
-    return run(save=save, **options)
+    given = {"problem": make_problem(), "profiles": profile(), "method": METHOD}
+    return simulate_rupture(save=save, **given | options)
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +80,6 @@ RUN_MISTAKES = {
 }
 
 
-def run(**options):
-    given = {"problem": make_problem(), "profiles": profile(), "method": METHOD}
-    return simulate_rupture(**given | options)
-
-
 @pytest.mark.parametrize(
     ("call", "words", "options"),
     [
@@ -93,7 +87,7 @@ def run(**options):
         for call, table in (
             (Rupture, METHOD_MISTAKES),
             (st.Save, SAVE_MISTAKES),
-            (run, RUN_MISTAKES),
+            (simulate, RUN_MISTAKES),
         )
         for words, options in table.items()
     ],
@@ -107,14 +101,14 @@ def test_a_weakening_rate_next_to_nothing_is_refused():
     """A denormal rate: no critical slip can be a number then."""
     friction = st.LinearWeakening(weakening_rate=5e-324)
     problem = dataclasses.replace(make_problem(), friction=friction)
-    refuses("infinitely much slip", lambda: run(problem=problem))
+    refuses("infinitely much slip", lambda: simulate(problem=problem))
 
 
 def test_unstable_time_step_is_refused_with_the_limit():
     problem = make_problem()
     limit = METHOD.medium(problem).largest_step
     # 0.42 dx/c_s at this solid; the limit is found by bisection to 0.1 %.
-    expected = 0.416 * problem.interface.spacing / SOLID.shear_wave_speed
+    expected = 0.416 * problem.interface.spacing / STRESS.shear_wave_speed
     assert limit == pytest.approx(expected, rel=5e-3)
     with pytest.raises(InputError, match=f"stability limit {limit:.6g} s"):
         Rupture(loading_rate=1e7, time_step=1.01 * limit).prepare(problem)

@@ -1,32 +1,21 @@
 """Loads that fall, rest or run at extreme rates."""
 
+import dataclasses
+import functools
 import warnings
 
 import numpy as np
 import pytest
+import ruptures
 
 import stiction as st
 from stiction import AccuracyWarning, InputError
 from stiction.dynamics import diagnostics
-from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import DIAGNOSTICS
 
-NODES = 128
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress"),
-    st.Interface(length=0.05, nodes=NODES),
-    st.LinearWeakening(weakening_rate=0.2e12),
-)
-X = np.arange(NODES) / NODES
-TAU_P = 1e6 - 2e5 * np.cos(2 * np.pi * X) + 5e4 * np.sin(10 * np.pi * X)
-# First slip at 0.759 MPa, onset at 0.7885 MPa.
+PROBLEM, TAU_P = ruptures.wavy_line()
 DETOUR = ([0.0, 0.1, 0.2, 0.3], [0.0, 7.75e5, 7.0e5, 9e5])
-
-
-def simulate(**method):
-    options = {} if "load" in method else {"loading_rate": 1e7}
-    method = st.Rupture(**(options | method))
-    return simulate_rupture(PROBLEM, TAU_P, method=method, save=st.Save(["slip"]))
+simulate = functools.partial(ruptures.simulate, PROBLEM, TAU_P)
 
 
 @pytest.fixture(scope="module")
@@ -63,15 +52,12 @@ def test_a_load_held_above_the_strength_from_the_start_breaks_it():
 
 
 def test_kinetic_stress_is_that_of_the_first_global_sliding():
-    problem = st.Problem(
-        PROBLEM.solid,
-        PROBLEM.interface,
-        st.LinearWeakening(weakening_rate=0.2e12, residual_strength=3e5),
-    )
+    friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=3e5)
+    problem = dataclasses.replace(PROBLEM, friction=friction)
     load = ([0.0, 0.12, 0.1201, 0.1203, 0.121], [0.0, 1.2e6, 1.2e6, 1e5, 1e5])
     # Slides at its residual strength, is unloaded, and stands still at 0.1 MPa.
-    method = st.Rupture(load=load, stop="time", end_time=0.1206)
-    run = simulate_rupture(problem, TAU_P + 3e5, method=method, save=st.Save(every=100))
+    options = {"load": load, "stop": "time", "end_time": 0.1206}
+    run = ruptures.simulate(problem, TAU_P + 3e5, st.Save(every=100), **options)
     assert float(run["mean_stress"][-1]) == pytest.approx(1e5)
     # All at the residual strength; a node that sticks for a moment may carry a little less.
     assert float(run["kinetic_stress"]) == pytest.approx(3e5, rel=1e-3)

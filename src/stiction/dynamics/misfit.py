@@ -112,13 +112,10 @@ def _best_shift(
 def _checked(record: Any) -> tuple[Array, Array, Array, str]:
     """Return times, values (times, gauges) and places of a record, SI, and its quantity."""
     kind = str(getattr(record, "name", None))
-    if kind not in UNITS:
-        names = ", ".join(UNITS)
-        raise InputError(f"measured: must be a DataArray named one of {names}, got {kind!r}")
-    if "time" not in record.dims or "x" not in record.coords:
+    if kind not in UNITS or "time" not in record.dims or "x" not in record.coords:
         raise InputError(
-            "measured: must have a dimension 'time' with coordinates (s) and a coordinate 'x' (m),"
-            f" got dimensions {', '.join(map(str, record.dims))}"
+            f"measured: must be a DataArray named one of {', '.join(UNITS)}, over a dimension"
+            " 'time' (s) with coordinates, and with a coordinate 'x' (m)"
         )
     if "x" not in record.dims:
         record = record.expand_dims("x")
@@ -129,10 +126,10 @@ def _checked(record: Any) -> tuple[Array, Array, Array, str]:
         return scale * np.asarray(part.values, dtype=np.float64)
 
     times, values = si(record["time"], "s"), si(record, UNITS[kind])
-    if times.size < FEWEST:
-        raise InputError(f"measured: has {times.size} times, at least {FEWEST} are needed")
-    if not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
-        raise InputError("measured: its times must be finite and rising")
+    if times.size < FEWEST or not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
+        raise InputError(
+            f"measured: needs at least {FEWEST} times, finite and rising; got {times.size}"
+        )
     if np.isinf(values).any() or not np.isfinite(values).any(axis=0).all():
         raise InputError("measured: every gauge needs finite values, and NaN in its gaps")
     return times, values, si(record["x"], "m"), kind
@@ -145,7 +142,7 @@ def _at_gauges(run: xr.Dataset, kind: str, places: Array) -> tuple[Array, Array]
     x = np.asarray(run["x"].values, dtype=np.float64)
     spacing = x[1] - x[0]
     length = x.size * spacing
-    outside = places[(places < 0.0) | (places > length)]
+    outside = places[~((places >= 0.0) & (places <= length))]
     if outside.size:
         raise InputError(
             f"measured: a gauge at x = {outside[0]:g} m is not on the interface, 0 to {length:g} m;"

@@ -115,7 +115,7 @@ def failure_probability(
         the local criterion, some samples near the stress are also solved by equilibrium,
         and both probabilities are given if they differ by more than their error.
     UnitWarning
-        If the stress is below a hundredth of the mean strength.
+        If the stress is below a fiftieth or above fifty times of the mean strength.
 
     Examples
     --------
@@ -146,11 +146,21 @@ def failure_probability(
             UnitWarning,
         )
     with state.meter:
-        if low < stress < high and state.slip_chance(stress) > NEGLIGIBLE:
-            slow = too_slow(experiment, max_evaluations)
-            found = _sampled(state, stress, algorithm, slow, target_cv, budget, confidence)
-        else:
+        if not (low < stress < high and state.slip_chance(stress) > NEGLIGIBLE):
             found = _certain(state, stress)
+        else:
+            slow = too_slow(experiment, max_evaluations)
+            chosen, reason, pilot = _choice(state, stress, algorithm, slow, budget)
+            if chosen == "plain":
+                begun = 0 if pilot is None else pilot[1].size
+                found = _by_counting(state, stress, target_cv, budget, begun, confidence)
+                found["reason"] = reason
+            else:
+                tail = sample_tail(
+                    state, algorithm=chosen, target_cv=target_cv, budget=budget,
+                    stress=stress, reason=reason, pilot=pilot,
+                )  # fmt: skip
+                found = _by_tail(state, stress, tail, target_cv, confidence)
     return FailureProbability.of(state, stress=stress, confidence=confidence, **found)
 
 
@@ -169,57 +179,48 @@ def _certain(state: LimitState, stress: float) -> dict[str, Any]:
     return found | {"algorithm": "exact", "reason": reason}
 
 
-def _sampled(
-    state: LimitState,
-    stress: float,
-    algorithm: str,
-    slow: str | None,
-    target_cv: float,
-    budget: int,
-    confidence: float,
-) -> dict[str, Any]:
-    """Choose the algorithm, and return the attributes of an answer by sampling."""
-    reason, pilot = "as requested", None
-    start, least = 0, min(PILOT, max(budget // 5, 50))
-    if algorithm == "auto" and slow is not None:
-        algorithm, reason = "plain", slow
-    elif algorithm == "auto":
-        # The samples by which the algorithm is chosen do not enter its estimate: counting is
-        # chosen where they happen to hold many failures.
-        start, draws = least, state.draws(state.experiment.seed, 0, least)
-        pilot = draws, state(draws)
-        failures = int(np.sum(pilot[1] < stress))
-        reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
-        often = failures >= FREQUENT * least
-        algorithm = "plain" if often else algorithm
-        reason += "frequent enough to count" if often else "rare"
-    if algorithm == "plain":
-        found = _by_counting(state, stress, target_cv, least, budget, start, confidence)
-        return found | {"algorithm": algorithm, "reason": reason}
-    tail = sample_tail(
-        state, algorithm=algorithm, target_cv=target_cv, budget=budget, stress=stress,
-        reason=reason, pilot=pilot,
-    )  # fmt: skip
-    return _by_tail(state, stress, tail, target_cv, confidence)
+def _fewest(budget: int) -> int:
+    """Return how many plain samples are solved at least."""
+    return min(PILOT, max(budget // 5, 50))
+
+
+def _choice(
+    state: LimitState, stress: float, algorithm: str, slow: str | None, budget: int
+) -> tuple[str, str, tuple[Array, Array] | None]:
+    """Return the algorithm, the reason, and the draws and stresses of the samples that it took.
+
+    They do not enter the estimate of a count, which is chosen where they hold many failures.
+    """
+    if algorithm != "auto":
+        return algorithm, "as requested", None
+    if slow is not None:
+        return "plain", slow, None
+    draws = state.draws(state.experiment.seed, 0, _fewest(budget))
+    stresses = state(draws)
+    count, failures = stresses.size, int(np.sum(stresses < stress))
+    reason = f"{failures} failure{'s' * (failures != 1)} of {count} plain samples: "
+    if failures >= FREQUENT * count:
+        return "plain", f"{reason}frequent enough to count", (draws, stresses)
+    return "auto", f"{reason}rare", (draws, stresses)
 
 
 def _by_counting(
     state: LimitState,
     stress: float,
     target_cv: float,
-    least: int,
     budget: int,
     start: int,
     confidence: float,
 ) -> dict[str, Any]:
     """Return the attributes of an answer by plain Monte Carlo from sample `start` on."""
+    seed = state.experiment.seed
 
     def drawn(numbers: Any) -> Array:
-        rows = [state.draws(state.experiment.seed, start + int(one), 1) for one in numbers]
+        rows = [state.draws(seed, start + int(one), 1) for one in numbers]
         return np.concatenate([np.empty((0, state.dimension)), *rows])
 
     count, stresses = count_failures(
-        state, state.experiment.seed, stress, target_cv=target_cv, least=least,
+        state, seed, stress, target_cv=target_cv, least=_fewest(budget),
         max_evaluations=budget - start, start=start,
     )  # fmt: skip
     failed = np.flatnonzero(stresses < stress)
@@ -231,6 +232,7 @@ def _by_counting(
     doubts = imprecise(count.cv, target_cv, spent)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return {
+        "algorithm": "plain",
         "probability": count.probability,
         "cv": count.cv,
         "interval": count.interval(confidence),
@@ -249,13 +251,12 @@ def _by_tail(
     if count := tail.counted(stress):
         cv, interval = count.cv, count.interval(confidence)
     doubts = imprecise(cv, target_cv, tail.spent)
-    two = tail.algorithm == "two_level"
-    if two and probability == 0.0:
+    if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, last.rarest
         doubts = [
             f"{tail.short_of('a failure')}; the interval ends at the last level of the first stage"
         ]
-    elif two:
+    elif tail.algorithm == "two_level":
         covered = min(one.last for one in tail.repetitions)
         if covered < COVERED:
             doubts.append(

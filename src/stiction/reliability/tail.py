@@ -49,11 +49,11 @@ class Tail(NamedTuple):
 
     def short_of(self, goal: str) -> str:
         """Return a message that the tail does not reach the requested level."""
-        text, advice = f"{self.spent} evaluations do not reach {goal}", "raise max_evaluations"
+        text = f"{self.spent} evaluations do not reach {goal}"
         if self.algorithm == "two_level":
-            return f"{text}: {advice}"
-        if len(self.repetitions[0].populations) >= MOST_LEVELS:
-            advice = f"it stops after {MOST_LEVELS} levels"
+            return f"{text}: raise max_evaluations"
+        stopped = len(self.repetitions[0].populations) >= MOST_LEVELS
+        advice = f"it stops after {MOST_LEVELS} levels" if stopped else "raise max_evaluations"
         chance = self.probability(self.reached)
         return f"{text}: they come down to {self.reached:.7g} Pa (P = {chance:.2g}); {advice}"
 
