@@ -165,7 +165,8 @@ def plain_text(app, what, name, obj, options, lines):
         if not code:
             parts = re.split(r"(``.*?``|`.*?`)", line)
             parts[::2] = [
-                re.sub(r"(?<!\\)\||(?<=[( ])\*(?=\w+[,)])", r"\\\g<0>", part) for part in parts[::2]
+                re.sub(r"(?<!\\)\||(?<=[( ])\*(?=\w+[,)])", r"\\\g<0>", part)
+                for part in parts[::2]
             ]
             lines[number] = "".join(parts)
 

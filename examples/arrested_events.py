@@ -31,4 +31,4 @@ print(
 )
 print(f"{slipping:.0f} % of the interface has slipped by then; it slides at", end=" ")
 print(f"{float(onset.critical_stress) / 1e6:.3f} MPa")
-st.plot.equilibrium_path(path.isel(load=slice(None, None, 4)))
+path.slip[::4].plot.line(x="x")

@@ -120,14 +120,6 @@ def test_failure_curve_and_weak_spots(system):
     assert abs(mean[mean[:, 1].argmin(), 0]) < 0.5  # weakest within the critical patch
 
 
-def test_path(system):
-    problem, _, tau_p = system
-    path = st.equilibrium_path(problem, tau_p[0], [0.66e6, 0.7e6, 1.6e6])
-    assert len(st.plot.equilibrium_path(path).lines) == 2  # it slides at the last
-    words = "slides at every load"
-    refuses(words, lambda: st.plot.equilibrium_path(path.isel(load=[2])))
-
-
 def test_a_rupture(system, run, tmp_path):
     onset = st.plot.rupture(run).lines[0].get_xydata()[0]
     assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])
@@ -169,8 +161,6 @@ def test_planes():
     assert len(axes.patches) == 9  # the ellipse and its periodic images
     exact = st.onset(problem, tau_p, method=st.Equilibrium(slip=True, sensitivity=True))
     assert len(st.plot.onset([local, exact], tau_p).collections) == 2  # two outlines
-    loads = exact.critical_load.item() * np.array([0.98, 0.999])
-    assert st.plot.equilibrium_path(st.equilibrium_path(problem, tau_p[0], loads)).images
 
 
 def test_what_does_not_fit_is_refused(system, run, swept):

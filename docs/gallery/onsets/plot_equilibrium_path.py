@@ -2,7 +2,7 @@
 Patches on the way to the onset
 ===============================
 
-Slip and stress at six loads below the critical load.
+Slip at six loads below the critical load.
 """
 
 import numpy as np
@@ -13,4 +13,5 @@ problem = st.paper.problem(nodes=512)
 tau_p = st.paper.strength(problem, correlation_ratio=0.25).sample(problem.interface, seed=3)[0]
 onset = st.onset(problem, tau_p, method=st.Equilibrium())
 loads = float(onset.critical_load[0]) * np.array([0.9, 0.93, 0.96, 0.98, 0.99, 0.999])
-st.plot.equilibrium_path(st.equilibrium_path(problem, tau_p, loads))
+path = st.equilibrium_path(problem, tau_p, loads)
+path.slip.plot.line(x="x")

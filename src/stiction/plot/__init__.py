@@ -12,12 +12,11 @@ from stiction.plot.failure import failure_curve, weak_spots
 from stiction.plot.fields import field
 from stiction.plot.films import film
 from stiction.plot.fits import fit, posterior
-from stiction.plot.onsets import equilibrium_path, onset
+from stiction.plot.onsets import onset
 from stiction.plot.ruptures import rupture
 from stiction.plot.style import paper_style
 
 __all__ = [
-    "equilibrium_path",
     "failure_curve",
     "field",
     "film",

@@ -1,15 +1,13 @@
-"""Figures of the onset by each method on a profile, and of the slip before it."""
+"""Figures of the onset by each method on a profile."""
 
 import itertools
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import PowerNorm
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
@@ -191,61 +189,3 @@ def _ellipse(axes: Axes, interface: Interface, result: xr.Dataset) -> None:
         moved = result["critical_position"].values[0] + np.multiply(shift, interface.lengths)
         ellipse = Ellipse(moved * factor, *extent, fill=False, edgecolor="white", linewidth=0.9)
         axes.add_patch(ellipse)
-
-
-def equilibrium_path(
-    path: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
-) -> Axes:
-    """Draw slip along the interface at each load of a path; on a plane a map at the highest one.
-
-    Parameters
-    ----------
-    path : Dataset
-        From `stiction.equilibrium_path`; loads at which the interface slides are left out.
-    problem : Problem, optional
-        Needed only if the result does not hold it.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    InputError
-        If no load of the path is in equilibrium.
-    """
-    need(path, "slip", "sliding")
-    interface = problem_of(path, problem).interface
-    factor, unit = unit_for("Pa", path["load"].values)
-    loads = path["load"].values * factor
-    balanced = np.flatnonzero(~path["sliding"].values)
-    if balanced.size == 0:
-        raise InputError("path: the interface slides at every load; give lower loads")
-    if interface.is_plane:
-        number = int(balanced[-1])
-        slip = path["slip"].values[number]
-        scale, slip_unit = unit_for("m", slip)
-        with on_axes(ax, height=maps.height(interface, 1.2)) as axes:
-            # Slip grows steeply with the load: a root shows small patches beside large ones.
-            norm = PowerNorm(0.4, vmin=0.0, vmax=max(float(slip.max()) * scale, 1e-300))
-            text = f"slip ({slip_unit})"
-            maps.image(axes, interface, slip * scale, text, cmap="viridis", norm=norm)
-            maps.outline(axes, interface, slip > 0.0, "white", 0.4)
-            share = 100.0 * (slip > 0.0).mean()
-            title = rf"$\tau_0$ = {loads[number]:.4f} {unit}, {share:.2g} % slips"
-            axes.set_title(title, fontsize=7.5)
-        return axes
-    scale, slip_unit = unit_for("m", path["slip"].values[balanced])
-    with on_axes(ax, width=PAGE, height=2.6) as axes:
-        shades = matplotlib.colormaps["viridis_r"](np.linspace(0.12, 1.0, balanced.size))
-        for shade, number in zip(shades, balanced.tolist(), strict=True):
-            slip = path["slip"].values[number] * scale
-            text = f"{loads[number]:.4f} {unit}"
-            axes.plot(places(interface), slip, color=shade, linewidth=0.9, label=text)
-        finish_line(axes, interface, f"slip ({slip_unit})")
-        axes.set_ylim(bottom=0.0)
-        if balanced.size <= 8:
-            axes.legend(title=r"load $\tau_0$")
-    return axes
