@@ -42,13 +42,12 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
 
 def at_first_slip(run: Run) -> State:
     """Return the state of rest at first slip; refuse or warn of loads that cannot be followed."""
-    time = run.first_slip()
+    time, step = run.first_slip(), run.medium.step
     if time > LARGEST_STEP:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, more than "
             f"{LARGEST_STEP:g} s; load faster (the onset no longer depends on the rate)"
         )
-    step = run.medium.step
     if not resolves_steps(run, time):
         warn_accuracy(
             f"the first slip comes after {time:.3g} s, too late for floating-point times"

@@ -69,14 +69,11 @@ def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> A
     """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
 
     The fall counts from the last local maximum, and only as far as waves carry it away: where the
-    load itself goes down, nothing has become unstable. An event begins when the fall exceeds
-    EVENT_DROP, and ends when the mean stress rises above that maximum again or everything creeps.
-    It was an arrested instability if a node slipped faster than `unstable_rate` in it: waves that
-    an earlier one has left behind, and creep that they modulate, also make the mean stress fall,
-    but stay slower.
-
-    At slow loading all creeping patches are about equally slow at the maximum itself, so that
-    the place of the onset is read just after it.
+    load itself goes down, nothing has become unstable. An event begins when it exceeds EVENT_DROP
+    and ends when the mean stress rises above that maximum again or everything creeps. It was an
+    arrested instability if a node slipped faster than `unstable_rate`; waves of an earlier one are
+    slower. At slow loading all creeping patches are about equally slow at the maximum itself, so
+    that the place of the onset is read just after it.
     """
     now.mean_stress = mean_stress
     if mean_stress > now.peak_stress:

@@ -146,10 +146,7 @@ def explicit_steps(
     now, thresholds = state.diagnostics[0], setting.thresholds
     rate_hat, slip_hat = tables.rate_hat, state.slip_hat
     half = thresholds.arrival
-    taken, reason = (
-        ZERO,
-        Reason.DONE,
-    )  # one way out: each costs the compiler as much as the rest
+    taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
     while taken < count and reason == Reason.DONE:
         time = now.time + step
         load = load_at(setting.load_times, setting.load_values, time)

@@ -235,21 +235,16 @@ def implicit_steps(
 ) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
-    Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the size to try
-    first. Second order: the slip rate at the end of a step follows from the mean rates of this
-    step and of the one before (`past`, m/s; none if `past_step` is 0), as in the two-step backward
-    differences, and the memory sees it rise or fall linearly.
-    A step is repeated at half the size if no slip increments are found (negative rise: the
-    patches are unstable at this size), a node weakens too much, or the interface accelerates too
-    much. Creep of nodes at their residual strength does not count, nor the weakening of nodes that
-    weaken by next to nothing.
+    Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the first size to
+    try. Second order, as in the two-step backward differences: the slip rate at the end of a step
+    follows from the mean rates of this step and of the one before (`past`), and the memory sees it
+    change linearly. A step is repeated at half the size if no slip increments are found (negative
+    rise: the patches are unstable at this size), a node weakens too much, or the interface
+    accelerates too much. Creep at the residual strength does not count.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = thresholds.smallest_step
-    taken, reason = (
-        ZERO,
-        Reason.DONE,
-    )  # one way out: each costs the compiler as much as the rest
+    taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
     while taken < count:
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:

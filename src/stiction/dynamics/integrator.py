@@ -164,19 +164,14 @@ class Run:
             return "runaway"
         if self.ended(state):
             return "time"
-        if self.stop != "time" and self._resting(state):
-            return "rest"
-        return None
-
-    def _resting(self, state: State) -> bool:
-        """Return whether nothing slips and the load, beyond its last piece, never rises again."""
         times, values = self.history
-        return bool(
+        resting = (  # the load, beyond its last piece, never rises again, and nothing slips
             not state.explicit
             and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
             and self.medium.impedance * state.rate.max() <= _NO_SLIP * state.now["scale"]
         )
+        return "rest" if self.stop != "time" and resting else None
 
     @functools.cached_property
     def _largest_fracture_energy(self) -> float:
@@ -236,23 +231,28 @@ class Run:
         return taken, Reason.DONE
 
     def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
-        medium = self.medium
+        medium, tables = self.medium, self._explicit_tables()
         left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
-        tables = self._explicit_tables()
         taken, reason = explicit_steps(count, state, medium.grid, self.setting, tables, record)
         return int(taken), int(reason)
 
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+        size, grid = float(state.phase[1]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # let go of the others before these are made
-            self.tables = implicit_tables(self.medium.grid)
-        size, grid = float(state.phase[1]), self.medium.grid
+            self.tables = implicit_tables(grid)
         taken, state.phase[1], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record
         )
         return int(taken), int(reason)
+
+    def _explicit_tables(self) -> ExplicitTables:
+        if not isinstance(self.tables, ExplicitTables):
+            self.tables, medium = None, self.medium
+            self.tables = explicit_tables(medium.grid, medium.step, *medium.step_table())
+        return self.tables
 
     def _to_explicit(self, state: State) -> None:
         grid, tables = self.medium.grid, self._explicit_tables()
@@ -267,13 +267,6 @@ class Run:
         state.phase[:] = 0.0, 2.0 * self.setting.thresholds.smallest_step
         state.now["past_step"] = 0.0  # the first implicit step is one of first order
         state.now["radiated"] = self.medium.impedance * state.rate.mean()
-
-    def _explicit_tables(self) -> ExplicitTables:
-        if not isinstance(self.tables, ExplicitTables):
-            self.tables = None
-            medium = self.medium
-            self.tables = explicit_tables(medium.grid, medium.step, *medium.step_table())
-        return self.tables
 
 
 def longest_row(marked: NDArray[np.bool_]) -> int:

@@ -91,9 +91,7 @@ class Grid(NamedTuple):
     stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
     entry: Ints  # (modes,): which entry of the tables a mode uses
     offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
-    multiplicity: (
-        int  # modes that share an entry of the tables: 2 on a plane, kx and -kx, else 1
-    )
+    multiplicity: int  # modes that share an entry of the tables: 2 on a plane, kx and -kx
     frequency: Array  # |k| c_s of each entry, rad/s
     mode_two: Array  # how much of it is mode II, (kx/k)²; 1 on a line, whatever its mode
     poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`,

@@ -149,12 +149,9 @@ def rupture_speed(
 ) -> Floats:
     """Return the apparent speed of the front at each node, m/s; nan where no front passed.
 
-    `arrival` is when the front arrived, s, periodic and nan where it never did; `spacings` of the
-    nodes and `windows` over which speeds are taken, m, hold one number a direction. The speed is
-    1/|gradient of arrival|, each component as a difference over its window around the node, where
-    arrival is strictly monotone over the window in some direction, so that the birth of patches
-    and the meeting of fronts do not count as motion. Patches that grow ahead of the front still
-    raise the apparent speed.
+    `arrival` (s) is periodic and nan where the front never came. The speed is 1/|gradient of
+    arrival|, a mean over `windows` (m, one a direction), where the arrival is strictly monotone
+    over the window in some direction: the birth of patches and the meeting of fronts do not count.
     """
     slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
     for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):

@@ -73,13 +73,7 @@ def paper_style() -> Iterator[None]:
 
 
 def save_figure(figure: Figure | SubFigure, path: Path) -> None:
-    """Write a figure, whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be written.
-    """
+    """Write a figure, whole or not at all."""
     data = io.BytesIO()
     root: Any = figure.figure  # of a part of a figure the whole
     root.savefig(data, format=path.suffix[1:], dpi=_RC["savefig.dpi"])
@@ -102,12 +96,12 @@ def series(index: int, *, marker: bool = False) -> dict[str, Any]:
 
 def color(index: int) -> str:
     """Colour of series number `index`."""
-    return _SERIES[index % len(_SERIES)][0]
+    return str(series(index)["color"])
 
 
 def marker(index: int) -> str:
     """Marker of series number `index`."""
-    return _SERIES[index % len(_SERIES)][2]
+    return str(series(index, marker=True)["marker"])
 
 
 def panel(axes: Axes, letter: str) -> None:

@@ -149,32 +149,17 @@ def descend(
     floor: float = -math.inf,
     max_evaluations: float = math.inf,
 ) -> Descent:
-    """Subset simulation down to a threshold or a probability, whichever comes first.
+    """Walk down to a threshold or a probability, whichever comes first.
 
-    Parameters
-    ----------
-    function : callable
-        From draws (k, dimension) to values (k,), whose low values are rare.
-    samples : int
-        N of each level; a tenth as many chains walk side by side.
-    threshold, probability : float
-        Failure is a value below the threshold. Levels stop there, or when the lowest share of one
-        reaches the probability.
-    floor : float
-        No value is below it: a level whose lowest share lies on it is the last.
-    max_evaluations : int, optional
-        No level is begun that would exceed it.
+    `function` takes draws (k, dimension) to values (k,); low values are rare, and none is below
+    `floor`. Each level has `samples`; none is begun that would exceed `max_evaluations`.
 
-    Notes
-    -----
     Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
     (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.
-
     The threshold of a level is the lowest value that does *not* go on, and only samples strictly
     below it do: then the product of the shares is unbiased although the levels are chosen from
-    the samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). With the highest value
-    that goes on as the threshold, each level would add one part in N p_0 to the estimate. Where
-    the lowest values are all equal, none is strictly below: the next higher value is the threshold.
+    the samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). Where the lowest values
+    are all equal, the next higher value is the threshold.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))

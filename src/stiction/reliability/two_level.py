@@ -47,9 +47,7 @@ class Bridge(NamedTuple):
     complete: bool = False
     log_probability: float = -math.inf  # logarithm of P(L < b)
     values: Array = np.zeros(0)  # E of samples with L < b
-    ancestors: NDArray[np.int64] = np.zeros(
-        0, dtype=np.int64
-    )  # in the first level of the guide
+    ancestors: NDArray[np.int64] = np.zeros(0, np.int64)  # in the first level of the guide
     share: float = 0.0  # of them that fails
     last: float = 1.0  # P(L < b | E < s)
     last_variance: float = 0.0  # squared coefficient of variation of its estimate
@@ -111,16 +109,8 @@ def bridge(
 ) -> Bridge:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
-    Parameters
-    ----------
-    guide, exact : callable
-        From draws (k, dimension) to values (k,).
-    samples : int
-        Exact evaluations for the middle factor; as many again walk in the failure set.
-    max_evaluations : int
-        Of the exact limit state.
-    threshold, probability, floor : float
-        As in `descend`.
+    `samples` are exact evaluations for the middle factor, as many again walk in the failure set;
+    `max_evaluations` limits both.
     """
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,

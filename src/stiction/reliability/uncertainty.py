@@ -39,20 +39,11 @@ def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[f
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Squared coefficient of variation of a subset estimate, from the ancestry of its failures.
 
-    Families that descend from different first samples evolve independently, so the spread of
-    their shares among the failures measures the error of the whole estimate, with the
-    correlation along chains, between chains of one ancestor and from level to level: the sum of
-    (share - 1/N)^2 over the N first samples. With k families of equal size that is 1/k, where the
-    variance of a mean of k calls for 1/(k - 1): hence a last division by one minus the sum.
-    The genealogy estimator of sequential Monte Carlo, after Chan and Lai (2013) and Lee and
-    Whiteley (2018).
-
-    Parameters
-    ----------
-    ancestors : (failures,) int array
-        For each failing sample of the last level, the first-level sample it descends from.
-    samples : int
-        N.
+    Families that descend from different first samples, `samples` in all, evolve independently, so
+    the spread of their shares among the failures measures the error of the whole estimate: the
+    sum of (share - 1/N)^2 over the N first samples. With k families of equal size that is 1/k,
+    where the variance of a mean of k calls for 1/(k - 1): hence a last division by one minus the
+    sum. The genealogy estimator of Chan and Lai (2013) and Lee and Whiteley (2018).
     """
     if ancestors.size == 0:
         return math.inf
