@@ -71,9 +71,9 @@ class Rupture:
         d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
     kernel_tolerance : float
         Allowed error of the memory kernel C(T), a sum of exponentials (1), up to T = |k|
-        c_s t = 1e5; older slip rate decays too fast. The sum is fitted once for each solid
-        and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8 (35). From
-        about 1e-3 on, waves may grow at any time step, which raises an error.
+        c_s t = 1e5. The sum is fitted once for each solid and stored on disk, in 1 s at 1e-6
+        (22 pairs) or half a minute at 1e-8 (35). From about 1e-3 on, waves may grow at any
+        time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     time_step : float, optional
@@ -98,17 +98,11 @@ class Rupture:
         Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
         0.5 is the middle of the cohesive zone, 1e-3 its tip.
     stop : {"sliding", "onset", "rest", "runaway", "time"}
-        "sliding": when every node that can break is at its residual strength. "onset": when
-        the first instability has begun. Critical values are those of that maximum of the mean
-        stress, even if the instability would be arrested later; later quantities are NaN
-        (kinetic stress, stress drop, moment, energies, arrested events, rupture speeds).
-        "rest": when the interface is at rest after an instability, or slides. Critical values
-        are those of the largest mean stress so far, kinetic stress and stress drop are NaN
-        unless it slides, and the rest is that of the arrested event. "runaway": when the
-        rupture is so long that no fracture energy of the interface can stop it (Griffith), or
-        the interface slides; lines only. All loads and `arrested_events` are then final;
-        other quantities that "onset" leaves NaN stay NaN. "time": at `end_time`. With the
-        others a run also ends where nothing slips and the load has stopped rising.
+        When to end (see Notes), unless nothing slips and the load has stopped rising:
+        "sliding": every node that can break is at its residual strength. "onset": the first
+        instability has begun. "rest": the interface is at rest after an instability, or
+        slides. "runaway": the rupture is so long that no fracture energy of the interface can
+        stop it (Griffith), or the interface slides; lines only. "time": at `end_time`.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -128,14 +122,19 @@ class Rupture:
     radiated. An instability begins when the mean stress has fallen by 1e-4 of the stress
     scale below its last maximum, not counting any fall of the load itself. `arrested_events`
     counts those in which a node slips so fast that Z V exceeds 7.5 % of the median of tau_p -
-    tau_r before the mean stress is as high again or all is calm: the waves after an event,
-    and the creep that they modulate, stay slower. `Equilibrium` also counts jumps too small
-    to reach that slip rate. The stress scale is the mean over nodes of tau_p - tau_r, where
-    each node counts for at most three times the drop tau_0 p + tau_i - tau_r at the largest
-    load so far, so that unbroken barriers do not count. `kinetic_stress` and the energies are
-    those of the first step after which every node that can break is at its residual strength;
-    the interface then slides fast, and radiated energy and moment grow by about 2 % in that
-    step. Slip never reverses: a node whose slip rate would become negative sticks, keeps its
+    tau_r before the mean stress is as high again or all is calm. `Equilibrium` also counts
+    jumps too small to reach that slip rate. The stress scale is the mean over nodes of tau_p -
+    tau_r, where each node counts for at most three times the drop tau_0 p + tau_i - tau_r at
+    the largest load so far, so that unbroken barriers do not count. `kinetic_stress` and the
+    energies are those of the first step after which every node that can break is at its
+    residual strength; radiated energy and moment grow by about 2 % in that step.
+
+    With "onset" and "runaway", quantities that are not final are NaN: kinetic stress, stress
+    drop, moment, energies and rupture speeds, with "onset" also arrested events; its critical
+    values are those of the first maximum of the mean stress. With "rest" they are those of the
+    largest mean stress so far, and kinetic stress and stress drop are NaN unless it slides.
+
+    Slip never reverses: a node whose slip rate would become negative sticks, keeps its
     weakened strength, and slips again only when the stress reaches it. Boundary integral in
     Fourier space: Breitenfeld and Geubelle (1998).
     """

@@ -115,7 +115,7 @@ def _checked(record: Any) -> tuple[Array, Array, Array, str]:
     if kind not in UNITS or "time" not in record.dims or "x" not in record.coords:
         raise InputError(
             f"measured: must be a DataArray named one of {', '.join(UNITS)}, over a dimension"
-            " 'time' (s) with coordinates, and with a coordinate 'x' (m)"
+            f" 'time' (s), with a coordinate 'x' (m); got {kind!r} over {', '.join(record.dims)}"
         )
     if "x" not in record.dims:
         record = record.expand_dims("x")
