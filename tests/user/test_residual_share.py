@@ -42,17 +42,6 @@ def test_strength_below_the_residual_strength_is_said_before_computing(solid, ma
         )
 
 
-def test_share_below_a_random_residual_strength(problem, make_strength):
-    """Two uniform marginals that overlap in a quarter of each: 1/32."""
-    spectrum = make_strength().spectrum
-    strength = st.RandomField(marginal=scipy.stats.uniform(3e5, 4e5), spectrum=spectrum)
-    residual = st.RandomField(marginal=scipy.stats.uniform(0.0, 4e5), spectrum=spectrum)
-    share = share_below_residual(
-        problem, st.RandomInterface(strength=strength, residual_strength=residual)
-    )
-    assert share == pytest.approx(1.0 / 32.0, rel=1e-5)
-
-
 @pytest.mark.parametrize("strengths", [(1.0, 1.0), (2e6, 1.0), (1.0, 2e6), (2e6, 2e6)])
 def test_strengths_in_coefficients_are_compared_as_stresses(problem, make_strength, strengths):
     """Both overlap in a quarter of each, in Pa (unit 1) or as coefficients (unit 2 MPa): 1/32."""
