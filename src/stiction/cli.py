@@ -472,7 +472,7 @@ def rupture(
         loaded = Study.from_toml(study)
         point, save = loaded.experiments[0], loaded.save
         problem, method = point.problem, point.method
-        profiles = point.profiles(point.draws(point.seed, sample, 1))
+        profiles = point.profiles(point.draws(sample, 1))
     else:
         setup = read_setup(study)
         problem, method, save = setup.problem, setup.method, setup.save

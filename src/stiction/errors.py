@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
-from typing import NamedTuple
+from typing import TypeAlias
 
 _SYMBOLS = {"E": "youngs_modulus", "nu": "poisson_ratio", "rho": "density"}
 _OURS = ("stiction", "pydantic", "dataclasses", "functools")
@@ -84,13 +84,8 @@ def warn_accuracy(message: str) -> None:
     warn_user(message, AccuracyWarning)
 
 
-class Warned(NamedTuple):
-    """A warning that was collected instead of issued."""
-
-    message: str
-    category: type[Warning]
-
-
+Warned: TypeAlias = tuple[str, type[Warning]]
+"""A warning that was collected instead of issued."""
 _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=None)
 
 
@@ -113,7 +108,7 @@ def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the caller's own line, outside this package."""
     collected = _collected.get()
     if collected is not None:
-        collected.append(Warned(message, category))
+        collected.append((message, category))
         return
     level = 1
     frame = sys._getframe(1)

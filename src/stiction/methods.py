@@ -17,7 +17,7 @@ from stiction.errors import InputError
 from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, Sample, refusals
 from stiction.profiles.placing import with_gaps
-from stiction.progress import Meter, Portions
+from stiction.progress import Meter
 from stiction.results import (
     DIRECTION,
     FRICTION_COEFFICIENT,
@@ -30,8 +30,8 @@ from stiction.results import (
 if TYPE_CHECKING:
     import xarray as xr
 
-FIRST = 16
-"""Samples that `onset` solves to measure the time of one."""
+TICK = 0.5
+"""Seconds of work after which progress is shown."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -262,10 +262,14 @@ def onset(
     sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     solver, parts = prepared(problem, method), []
+    size = max(
+        1, min(method.chunk_size, int(TICK / max(method.seconds_per_sample(problem), 1e-9)))
+    )
     with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
-        for some in Portions(min(FIRST, method.chunk_size))(sample.samples):
-            parts.append(solver(sample.part(some)))
-            meter.advance(some.stop - some.start)
+        for start in range(0, sample.samples, size):
+            part = sample.part(slice(start, start + size))
+            parts.append(solver(part))
+            meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     if hasattr(method, "warn_of"):
         method.warn_of(problem, sample, values)

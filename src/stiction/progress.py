@@ -11,7 +11,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
@@ -24,8 +24,6 @@ LONG = 10.0
 WIDTH = 100
 """Letters of a line in a notebook."""
 TICK = 0.25
-PORTION = 0.25
-"""Seconds of work between two looks at the clock."""
 
 
 def duration(seconds: float) -> str:
@@ -194,30 +192,3 @@ def _notebook(meter: Meter, last: bool) -> None:
     """Show a line that is rewritten, and goes away at the end; rich would need ipywidgets."""
     line = "" if last else _with_bar(meter)
     print(f"\r{line:{WIDTH}}\r", end="", file=sys.stderr, flush=True)
-
-
-class Portions:
-    """Cuts rows into portions of about a quarter of a second, by what the last ones took."""
-
-    def __init__(self, smallest: int = 1) -> None:
-        self._smallest = smallest
-        self._pace: float | None = None
-
-    @property
-    def slow(self) -> bool:
-        """Whether a row takes more than a millisecond."""
-        return self._pace is not None and self._pace > 1e-3
-
-    def __call__(self, count: int) -> Iterator[slice]:
-        """Slices that cover `count` rows; the time between two slices is measured."""
-        first, size = 0, self._smallest
-        while first < count:
-            if self._pace is not None:
-                size = max(1, int(PORTION / max(self._pace, 1e-9)))
-            stop = min(count, first + size)
-            begin = time.perf_counter()
-            yield slice(first, stop)
-            took = (time.perf_counter() - begin) / (stop - first)
-            # The fastest so far: the first may have compiled kernels.
-            self._pace = took if self._pace is None else min(self._pace, took)
-            first = stop

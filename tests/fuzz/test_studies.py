@@ -142,7 +142,7 @@ def use(path: Path) -> None:
     point = study.experiments[0]
     interface = point.problem.interface
     if max(interface.size, point.dimension) <= 2**15:
-        point.results(point.seed, study.ensemble.first, 1)
+        point.results(study.ensemble.first, 1)
 
 
 def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):

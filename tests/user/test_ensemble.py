@@ -90,7 +90,7 @@ def test_coefficients_are_stresses_times_the_pressure():
         scipy.stats.lognorm(0.5, scale=0.2), strength.spectrum, True, of="friction_coefficient"
     )
     experiment = Experiment(pressed, share, st.LocalCriterion())
-    draws = experiment.draws(3, 0, 4)
+    draws = experiment.draws(0, 4)
     found = experiment.profiles(draws)["strength"]
     ratio = (
         found / Experiment(problem, strength, st.LocalCriterion()).profiles(draws)["strength"]

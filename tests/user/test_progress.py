@@ -12,7 +12,7 @@ import pytest
 
 import stiction as st
 from stiction import progress
-from stiction.progress import Meter, Portions
+from stiction.progress import Meter
 
 
 @pytest.fixture
@@ -82,13 +82,6 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     assert threading.active_count() == before
     code = "from stiction.progress import Meter; Meter('left open').__enter__()"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
-
-
-def test_portions_cover_all_rows_and_take_a_quarter_of_a_second(monkeypatch):
-    assert [i for rows in Portions(4)(1000) for i in range(1000)[rows]] == list(range(1000))
-    monkeypatch.setattr(progress, "PORTION", 0.02)
-    sizes = [rows.stop - rows.start for rows in Portions()(3) if time.sleep(0.03) is None]
-    assert sizes == [1, 1, 1]
 
 
 def test_a_call_ends_when_its_time_is_over():

@@ -22,7 +22,7 @@ from stiction.ensemble import batches, store
 from stiction.ensemble.batches import Span, solve_spans
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import StoreError, WorkerError
-from stiction.study.run import Part, as_part
+from stiction.study.run import samples_of_part
 
 STUDY = small_study(
     ensemble={"samples": 120, "seed": 3, "keep": ["strength"]},
@@ -43,9 +43,9 @@ def pieces_of(size):
 
 @pytest.fixture
 def often(monkeypatch):
-    """Many chunks of twenty samples instead of one a second, which are not joined."""
+    """Many chunks of twenty samples instead of one a second."""
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(store.Store, "_join", lambda self: None)
+    monkeypatch.setattr(store, "SAVE_SHARE", 0.0)
     monkeypatch.setattr(batches, "piece_size", pieces_of(20))
 
 
@@ -140,7 +140,7 @@ def test_an_interrupted_run_is_readable_and_goes_on(tmp_path, often, reference):
 
 @pytest.mark.parametrize(("points", "samples", "of"), [(1, 1, 3), (7, 1000, 10), (1, 5000, 3)])
 def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
-    masks = [Part(k, of).mask(points, samples) for k in range(1, of + 1)]
+    masks = [samples_of_part((k, of), points, samples) for k in range(1, of + 1)]
     assert (np.sum(masks, axis=0) == 1).all()
     sizes = [mask.sum() for mask in masks]
     # Eight blocks a part or more: no part is longer than another by more than one.
@@ -149,7 +149,7 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
 
 @pytest.mark.parametrize("value", ["0/3", "4/3", "3", "a/b", (1, 0), (1, 2, 3), 3, 1.5])
 def test_what_is_no_part_is_refused(value):
-    refuses("part: must be", lambda: as_part(value))
+    refuses("part: must be", lambda: make_study().run(out="none", part=value))
 
 
 def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
@@ -163,7 +163,6 @@ def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
 
 def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(store, "MANY", 3)
     monkeypatch.setattr(batches, "piece_size", pieces_of(10))
     options = {"out": tmp_path / "run", "workers": 1, "pilot": False}
     thread = threading.Thread(target=lambda: make_study().run(**options), daemon=True)
@@ -173,16 +172,12 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
         if (tmp_path / "run" / "study.json").exists():
             state = st.open_run(tmp_path / "run").status()
             assert state.damaged == ()
-            assert state.done >= done  # joining loses nothing
+            assert state.done >= done
             seen, done = seen + 1, state.done
     assert seen
-    assert len(chunks(tmp_path / "run")) == 1
 
 
-@pytest.mark.parametrize("size", [7, 1000])
-def test_chunks_of_unequal_variables_stay(tmp_path, monkeypatch, size):
-    """A method's chunk that is the only one of its variables is written again as it was."""
-    monkeypatch.setattr(batches, "piece_size", pieces_of(size))
+def test_points_may_have_unequal_variables(tmp_path):
     study = make_study(
         sweep=[{"method": [{"type": "local_criterion"}, {"type": "equilibrium"}]}]
     )
@@ -271,10 +266,10 @@ def test_unusable_folders_are_refused_before_any_work(tmp_path):
 def failing(samples):
     original = Experiment.results
 
-    def results(self, seed, first, count):
+    def results(self, first, count):
         if any(first <= sample < first + count for sample in samples):
             raise FloatingPointError("the slip rate became non-finite")
-        return original(self, seed, first, count)
+        return original(self, first, count)
 
     return results
 
@@ -388,9 +383,8 @@ def test_twenty_thousand_points(tmp_path):
     assert result["critical_stress"].shape == (20, 1000, 1)
 
 
-def test_time_between_chunks_is_about_a_second(tmp_path, monkeypatch):
+def test_time_between_chunks_is_about_a_second(tmp_path):
     """A sample that takes long does not keep finished ones from being stored."""
-    monkeypatch.setattr(store.Store, "_join", lambda self: None)
     with SlowFrom(256, seconds=1.6) as executor:
         make_study(samples=600, sweep=[]).run(
             out=tmp_path / "run", executor=executor, workers=2

@@ -4,15 +4,15 @@ import os
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from contextvars import Context, copy_context
 from functools import cache
+from importlib.metadata import version
 from itertools import repeat
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
@@ -20,10 +20,11 @@ from pydantic import BeforeValidator
 from stiction import __version__
 from stiction.arrays import one_blas_thread
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.table import Failure, Table, rows_of
 from stiction.errors import InputError, WorkerError, collect_warnings, warn_user
 from stiction.random.synthesis import BLOCK, block_of
 
+POINT, NUMBER = "_point", "_sample"
+"""Names of the columns that hold the numbers of the point and of the sample."""
 SECONDS = 0.5
 """Of a piece of work."""
 MOST_BYTES = 16 * 2**20
@@ -50,6 +51,59 @@ class Span(NamedTuple):
     samples: int
 
 
+class Failure(NamedTuple):
+    """A sample that could not be solved.
+
+    Attributes
+    ----------
+    point : int
+        Number of the point of a sweep; 0 without a sweep.
+    sample, seed : int
+    error : str
+        The message of the solver.
+    input : bool
+        Whether it was an `InputError`: the sample itself does not fit the method or the grid.
+    """
+
+    point: int
+    sample: int
+    seed: int
+    error: str
+    input: bool = False
+
+    def __str__(self) -> str:
+        where = f" of point {self.point}" if self.point else ""
+        return f"sample {self.sample}{where} (seed {self.seed}): {self.error}"
+
+
+class Table(NamedTuple):
+    """Samples of any points of a sweep, the failures among them, and the computing time in s.
+
+    A sample that was solved is a row of a structured array: `POINT`, `NUMBER` and the variables of
+    the method.
+    """
+
+    rows: NDArray[Any]
+    failures: tuple[Failure, ...]
+    seconds: float
+
+    @property
+    def size(self) -> int:
+        """Samples dealt with, failed ones included."""
+        return self.rows.size + len(self.failures)
+
+
+def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    """Return the values of consecutive samples of a point, the number of the first given."""
+    count = len(next(iter(values.values()), ()))
+    columns = {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
+    types = [(name, array.dtype, array.shape[1:]) for name, array in columns.items()]
+    rows = np.empty(count, dtype=types)
+    for name, array in columns.items():
+        rows[name] = array
+    return rows
+
+
 def usable_cores() -> int:
     """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -70,7 +124,7 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 @cache
 def versions() -> str:
     """Return the versions on which the last digits of a result depend, as one line of text."""
-    return f"stiction {__version__}, numpy {np.__version__}, numba {numba.__version__}"
+    return f"stiction {__version__}, numpy {version('numpy')}, numba {version('numba')}"
 
 
 def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
@@ -84,7 +138,7 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
             " the same versions there, or end that worker"
         )
     begin = time.perf_counter()
-    parts = [rows_of(span.point, span.first, {})]
+    parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
     waiting = deque(experiment.batches(span.first, span.samples))
     while waiting:
@@ -92,8 +146,7 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
         try:
             # The number of BLAS threads changes last bits, and the kernels are the parallel part.
             with one_blas_thread():
-                values = experiment.results(experiment.seed, first, count)
-            parts.append(rows_of(span.point, first, values))
+                parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
             if count > 1:  # find out which sample it is
                 waiting.extendleft((first + i, 1) for i in reversed(range(count)))
@@ -102,7 +155,7 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
             text = str(error) if known else f"{type(error).__name__}: {error}"
             text = " / ".join(text.split("\n"))
             failures.append(Failure(span.point, first, experiment.seed, text, known))
-    rows = np.concatenate(parts[1:] or parts)
+    rows = np.concatenate(parts or [_rows(span.point, 0, {})])
     return Table(rows, tuple(failures), time.perf_counter() - begin)
 
 
@@ -135,7 +188,7 @@ def _workers_of(executor: Executor, workers: int) -> int:
 
 def solve_spans(
     points: Sequence[Experiment],
-    spans: Iterable[Span],
+    spans: Sequence[Span],
     *,
     executor: Executor | None = None,
     workers: int = 1,
@@ -150,7 +203,7 @@ def solve_spans(
     A worker that is lost, or has other versions, is a `WorkerError`.
     """
     waiting = deque(spans)
-    left = sum(span.samples for span in waiting)
+    left = sum(span.samples for span in spans)
     paces: dict[int, float] = {}
     latest: float | None = None
     running: dict[Future[Table], Span] = {}
@@ -162,8 +215,7 @@ def solve_spans(
             while waiting or running:
                 slots = _workers_of(executor, workers)
                 while waiting and len(running) < 2 * slots:
-                    whole = waiting.popleft()
-                    point, first, samples = whole
+                    point, first, samples = whole = waiting.popleft()
                     experiment = points[point]
                     size = piece_size(experiment, whole, paces.get(point, latest), left, slots)
                     if size < samples:
@@ -177,7 +229,7 @@ def solve_spans(
                     span = running.pop(future)
                     table = _result(future, span, points[span.point].seed)
                     # The fastest so far: the first pieces may have compiled kernels.
-                    latest = min(paces.get(span.point, np.inf), table.seconds / table.count)
+                    latest = min(paces.get(span.point, np.inf), table.seconds / table.size)
                     paces[span.point] = latest
                     tables.append(table)
                 yield tables

@@ -1,17 +1,21 @@
 """Tables of samples, in any order, gathered to one labelled dataset over sweep, sample and x."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
+from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.table import NUMBER, POINT, Failure, Table
 from stiction.model import check_memory
 from stiction.results import SAMPLE, Variable, coordinate, to_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FAILED = "failed_samples"
 Coordinates = dict[str, tuple[NDArray[Any], Variable]]
@@ -72,30 +76,26 @@ class Gathered:
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}
-        self._seen: dict[str, NDArray[np.bool_]] = {}
+        self._offered: dict[str, NDArray[np.bool_]] = {}  # at which points there is a variable
 
-    def add(self, tables: Sequence[Table]) -> None:
-        """Put the rows of tables in their places; those of other samples are left out."""
-        last = self.first + self.done.shape[1]
-        for table in tables:
-            self._failures |= {
-                (failure.point, failure.sample - self.first): failure
-                for failure in table.failures
-                if self.first <= failure.sample < last
-            }
-            point, number = table.rows[POINT], table.rows[NUMBER]
-            inside = (number >= self.first) & (number < last)
-            where = point[inside], number[inside] - self.first
-            self.done[where] = True
-            names = {*(table.rows.dtype.names or ())} - {POINT, NUMBER}
-            for name in names if self._only is None else names & {*self._only}:
+    def add(self, table: Table) -> None:
+        """Put the rows of a table in their places; those of other samples are left out."""
+        samples = self.done.shape[1]
+        for failure in table.failures:
+            if 0 <= failure.sample - self.first < samples:
+                self._failures[failure.point, failure.sample - self.first] = failure
+        point, sample = table.rows[POINT], table.rows[NUMBER] - self.first
+        inside = (sample >= 0) & (sample < samples)
+        where = point[inside], sample[inside]
+        self.done[where] = True
+        for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
+            if self._only is None or name in self._only:
                 values = table.rows[name][inside]
-                if name not in self._arrays:
-                    shape = self.done.shape + values.shape[1:]
-                    self._arrays[name] = np.zeros(shape, dtype=values.dtype)
-                    self._seen[name] = np.zeros_like(self.done)
-                self._arrays[name][where] = values
-                self._seen[name][where] = True
+                shape = self.done.shape + values.shape[1:]
+                array = self._arrays.setdefault(name, np.zeros(shape, dtype=values.dtype))
+                array[where] = values
+                offered = np.zeros(len(self.points), dtype=np.bool_)
+                self._offered.setdefault(name, offered)[where[0]] = True
 
     @property
     def failed(self) -> list[Failure]:
@@ -116,20 +116,16 @@ class Gathered:
         """Return everything as a dataset, in the order in which the method names it.
 
         Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
-        missing too, the attribute 'cut_short' gives the number that are done.
-
-        Parameters
-        ----------
-        attributes : mapping
-        axes : sequence of GridAxis
-            Of the sweep; the product of their sizes is the number of points.
+        missing too, the attribute 'cut_short' gives the number that are done. The product of the
+        sizes of the `axes` is the number of points.
         """
         shape = tuple(axis.size for axis in axes)
         dims = tuple(axis.dim for axis in axes)
         values, variables = {}, {}
         for name, variable in variables_in(self.points).items():
             if name in self._arrays:
-                array, seen = self._arrays[name], self._seen[name]
+                array = self._arrays[name]
+                seen = self.done & self._offered[name][:, None]
                 if not seen.all():
                     if array.dtype.kind != "f":
                         array = array.astype(np.float64)

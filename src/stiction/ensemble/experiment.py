@@ -24,7 +24,6 @@ from stiction.random.stresses import (
     check_residual,
     mean_in_stress,
     profiles_in_stress,
-    support_in_stress,
 )
 from stiction.random.synthesis import block_of
 from stiction.results import PROFILES, Variable, along
@@ -41,8 +40,8 @@ MOST_NODES = 1 << 20
 class Experiment:
     """A problem, what is random in it, and a method, checked together once.
 
-    The numbers of sample i follow from the experiment, a seed and i alone, whoever computes them
-    and in whatever batches.
+    The numbers of sample i follow from the experiment and i alone, whoever computes them and in
+    whatever batches.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ class Experiment:
         What is kept along the interface: random properties by name, and what the method adds. An
         option of the method that is needed for it is switched on.
     seed : int
-        Of the ensemble that `results` are samples of.
+        Of the samples.
 
     Raises
     ------
@@ -132,29 +131,22 @@ class Experiment:
         given = self.problem.load.normal_pressure
         return float("nan") if given is None else float(np.mean(given))
 
-    def mean(self, name: str) -> float:
-        """Return the mean of a random property, in its unit; of a coefficient as a stress, Pa."""
-        return mean_in_stress(self.problem, self.random, name)
-
-    def support(self, name: str) -> tuple[float, float]:
-        """Return the bounds of a random property; those of a coefficient as a stress, Pa."""
-        return support_in_stress(self.problem, self.random, name)
-
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units.
 
         Most of the strength below the residual strength is an `InputError`.
         """
         self.random.warn_if_inaccurate(self.problem.interface)
-        self.problem.warn_of_units(self.mean("strength"))
+        mean = mean_in_stress(self.problem, self.random, "strength")
+        self.problem.warn_of_units(mean)
         check_residual(self.problem, self.random)
 
-    def draws(self, seed: int, first: int, count: int) -> Array:
+    def draws(self, first: int, count: int) -> Array:
         """Return standard normal draws of samples first .. first + count - 1.
 
         An array of shape (count, dimension), whose row i depends on (seed, first + i) only.
         """
-        return self.random.draws(self.problem.interface, count, seed, first)
+        return self.random.draws(self.problem.interface, count, self.seed, first)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return the profiles of draws (samples, dimension) by name, (samples, *shape) each.
@@ -186,12 +178,12 @@ class Experiment:
         """Return the prepared solver of the method, which is kept for the next call."""
         return _solver(self.problem, self.method)
 
-    def results(self, seed: int, first: int, count: int) -> Values:
+    def results(self, first: int, count: int) -> Values:
         """Return all `variables` of samples first .. first + count - 1, solved at once.
 
         A plain computation without threads, for any executor.
         """
-        profiles = self.profiles(self.draws(seed, first, count))
+        profiles = self.profiles(self.draws(first, count))
         kept = {name: profiles[name] for name in self.keep if name in profiles}
         return self.onset(profiles) | kept
 
@@ -205,14 +197,12 @@ class Experiment:
         # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
         return size if size < SLOW else max(size, block)
 
-    def batches(
-        self, first: int, count: int, size: int | None = None
-    ) -> Iterator[tuple[int, int]]:
+    def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
 
         The default of `size` is `batch`.
         """
-        size = self.batch if size is None else size
+        size = size or self.batch
         start, end = first, first + count
         while start < end:
             stop = min(end, (start // size + 1) * size)

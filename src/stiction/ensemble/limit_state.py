@@ -16,14 +16,15 @@ from stiction.friction import SCALES
 from stiction.methods import MethodObject
 from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
-from stiction.progress import SILENT, Meter, Portions
+from stiction.progress import SILENT, Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.random.stresses import support_in_stress
 
 Event = Literal["critical_stress", "first_instability"]
 
-FEWEST = 16
-"""Fewest samples worth a thread of their own."""
+SHORTEST, LONGEST = 2e-3, 0.5
+"""Seconds of work that are worth a thread, and after which progress is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +43,6 @@ class LimitState:
 
     def __repr__(self) -> str:
         return f"<LimitState: {self.dimension} standard normal draws to {self.event}, Pa>"
-
-    @cached_property
-    def _portions(self) -> Portions:
-        return Portions(self.workers)
 
     @property
     def dimension(self) -> int:
@@ -66,7 +63,7 @@ class LimitState:
 
         They are those of `stiction.monte_carlo`, of shape (samples, dimension).
         """
-        return self.experiment.draws(seed, first, samples)
+        return self.experiment.with_seed(seed).draws(first, samples)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return sampled profiles by name, each of shape (samples, *shape)."""
@@ -91,24 +88,18 @@ class LimitState:
             )
         if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
-        rows = np.atleast_2d(given)
-        found = np.empty(rows.shape[0])
-        for some in self._portions(rows.shape[0]):
-            found[some] = self._in_threads(rows[some])
-            self.meter.advance(some.stop - some.start)
+        rows, lowest = np.atleast_2d(given), self.bounds[0]
+        experiment = self.experiment
+        pace = max(experiment.method.seconds_per_sample(experiment.problem), 1e-9)
+        size = max(int(SHORTEST / pace), -(-len(rows) // self.workers))
+        size = max(1, min(size, int(LONGEST / pace), experiment.batch))
+        parts = np.split(rows, range(size, len(rows), size))
+        if len(parts) == 1:
+            found = self._stress(rows)
+        else:
+            found = np.concatenate(in_threads(self._stress, parts, self.workers))
+        found = np.maximum(found, lowest)  # rounding may leave a stress a hair below
         return found if given.ndim == 2 else found[0]
-
-    def _in_threads(self, draws: Array) -> Array:
-        lowest = self.bounds[0]  # before the threads need it
-        parts = draws.shape[0] // (1 if self._portions.slow else FEWEST)
-        parts = min(self.workers, max(1, parts))
-        found = (
-            np.concatenate(in_threads(self._stress, np.array_split(draws, parts), parts))
-            if parts > 1
-            else self._stress(draws)
-        )
-        result: Array = np.maximum(found, lowest)  # rounding may leave a stress a hair below
-        return result
 
     def _stress(self, draws: Array) -> Array:
         profiles = self.profiles(draws)
@@ -116,6 +107,7 @@ class LimitState:
         if self._random_pressure:
             pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
             found = found * self.experiment.pressure / pressure
+        self.meter.advance(draws.shape[0])
         return found
 
     @cached_property
@@ -129,12 +121,12 @@ class LimitState:
         if self._random_pressure:  # the stress per pressure has no other bounds
             return 0.0, math.inf
         problem, random = self.experiment.problem, self.experiment.random
-        low, high = self.experiment.support("strength")
+        low, high = support_in_stress(problem, random, "strength")
         profile = np.asarray(problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(problem.load.initial_stress, dtype=np.float64)
         most: Any = least
         if "initial_stress" in random.names:
-            least, most = self.experiment.support("initial_stress")
+            least, most = support_in_stress(problem, random, "initial_stress")
         lowest_load = float(np.min((low - most) / profile))
         shape = problem.interface.shape
         mean = float(np.mean(np.broadcast_to(profile, shape)))

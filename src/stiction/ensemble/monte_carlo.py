@@ -1,12 +1,12 @@
 """An ensemble of random interfaces: the public function, and the loop over its samples."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from stiction.ensemble.batches import AnyExecutor, missing_spans, solve_spans, usable_cores
@@ -20,13 +20,16 @@ from stiction.model import Count, Flag, Names, Number, Positive, Progress, check
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 FEW, SHOWN = 4, 3
 """Warnings and failures that are reported one by one."""
 HOPELESS = 16
 """Samples that fail, with none solved, before the whole ensemble is given up."""
 
 
-def check_fields(points: Sequence[Experiment]) -> None:
+def _check_fields(points: Sequence[Experiment]) -> None:
     """Warn of fields that do not suit the grid, the interface or their units, once each."""
     with collect_warnings() as caught:
         for point in distinct(points, "random", "problem"):
@@ -47,7 +50,7 @@ def gather(
     *,
     store: Store | None = None,
     retry: bool = False,
-    others: NDArray[np.bool_] | None = None,
+    others: NDArray[Any] | bool = False,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Show = True,
@@ -56,58 +59,41 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or what is not stored of it.
 
-    Parameters
-    ----------
-    points, ensemble, axes
-    attributes : mapping
-        Of the result.
-    store : Store, optional
-        Where samples are, and where they go as they are done.
-    retry : bool
-        Compute stored samples that failed again.
-    others : (points, samples) array of bool, optional
-        Samples that somebody else computes.
-    workers, executor, progress, time_limit, pilot
-        See `monte_carlo`.
+    Samples go to the `store` as they are done. With `retry`, stored samples that failed are
+    computed again. `others`, of shape (points, samples), are samples that another job computes. For
+    the rest see `monte_carlo`.
     """
-    first = ensemble.first
-    rows = Gathered(points, ensemble.samples, first)
-    if store is not None:
-        store.load(rows.add)
-    done = rows.done.copy() if retry else rows.dealt_with
-    if others is not None:
-        done |= others
-    spans, solved, lost = missing_spans(done, first), bool(done.any()), 0
+    rows = Gathered(points, ensemble.samples, ensemble.first)
+    for table in store.load() if store else ():
+        rows.add(table)
+    done = others | (rows.done if retry else rows.dealt_with)
+    spans, solved, lost = missing_spans(done, ensemble.first), bool(rows.done.any()), 0
     if spans:
-        check_fields(points)
-        if len(points) == 1:
-            points[
-                0
-            ].prepare()  # here and not in a thread, so that it warns at the caller's line
+        _check_fields(points)
+        points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
     total = int(done.size - done.sum())
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})
     with ExitStack() as stack:
-        if store is not None:  # also on Ctrl-C, and when workers are lost: what is done is kept
-            stack.callback(store.close)
+        if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
+            stack.callback(store.save)
         meter = stack.enter_context(Meter(label, total, progress, time_limit=time_limit))
         work = solve_spans(points, spans, executor=executor, workers=workers or usable_cores())
         for tables in stack.enter_context(closing(work)):
-            rows.add(tables)
-            if store is not None:
+            if store:
                 store.add(tables)
             for table in tables:
-                meter.advance(table.count)
+                rows.add(table)
+                meter.advance(table.size)
                 solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
                 if not solved and lost >= min(HOPELESS, total):
                     failure = table.failures[0]
                     raise (InputError if failure.input else RuntimeError)(str(failure))
             if meter.over:
                 break
-    found = None if store is None else store.pilot
+    found = store.pilot if store else None
     if found is None and pilot:
-        show = progress is True
-        found = pilot_attributes(points, ensemble.samples, first, show=show)
-        if store is not None:
+        found = pilot_attributes(points, ensemble, show=progress is True)
+        if store:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)
     if failed := rows.failed:

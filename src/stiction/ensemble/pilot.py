@@ -8,7 +8,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.batches import in_threads, usable_cores
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.equilibrium.method import Equilibrium
 from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.progress import Meter
@@ -21,17 +21,9 @@ WORTH_A_WARNING = 0.01
 
 
 class Pilot(NamedTuple):
-    """How far a method is from its exact counterpart, relative to the mean of the latter.
+    """Mean and scatter of the difference to the exact onset, relative to the mean of the latter."""
 
-    Attributes
-    ----------
-    samples : int
-        Solved by both.
-    bias, scatter : float
-        Mean and standard deviation of the difference.
-    """
-
-    samples: int
+    samples: int  # solved by both
     bias: float
     scatter: float
 
@@ -41,10 +33,10 @@ def exact_counterpart(experiment: Experiment) -> Experiment | None:
 
     None for other methods, and if `Equilibrium` cannot take the problem.
     """
-    method = Equilibrium()
-    if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
+    method, problem = Equilibrium(), experiment.problem
+    if not isinstance(experiment.method, LocalCriterion) or method.supports(problem):
         return None
-    return Experiment(experiment.problem, experiment.random, method, seed=experiment.seed)
+    return Experiment(problem, experiment.random, method, seed=experiment.seed)
 
 
 def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pilot | None:
@@ -56,7 +48,7 @@ def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pi
     if exact is None:
         return None
     size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
-    draws = experiment.draws(experiment.seed, first, min(size, most))
+    draws = experiment.draws(first, min(size, most))
 
     def both(row: Array) -> list[float]:
         try:
@@ -87,19 +79,18 @@ def doubt(pilot: Pilot, where: str = "") -> str | None:
 
 
 def pilot_attributes(
-    points: Sequence[Experiment], samples: int, first: int = 0, *, show: bool = True
+    points: Sequence[Experiment], ensemble: Ensemble, show: bool
 ) -> dict[str, Any]:
-    """Compare the first samples of some points, and warn of a difference beyond 1 %.
+    """Compare the first samples of at most eight points, and warn of a difference beyond 1 %.
 
-    Of many points, eight are taken, the first and the last among them. The result has
-    'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; it is empty if no
-    method has an exact counterpart.
+    The result has 'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; it
+    is empty if no method has an exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     found: list[Pilot] = []
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
-            pilot = compare(points[number], first, samples)
+            pilot = compare(points[number], ensemble.first, ensemble.samples)
             found += [pilot] if pilot else []
             meter.advance()
     if not found:

@@ -2,9 +2,8 @@
 
 ``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk is a table
 of samples with a mark of their study; its name is a digest of its content. Chunks are
-written whole or not at all, and nothing lists them: so any number of processes may write to
-a folder at once, a run may be killed at any moment, and damage is found. Each writer joins
-its own small chunks as they become many.
+written whole or not at all, they never change, and nothing lists them: so any number of
+processes may write to a folder at once, a run may be killed at any moment, and damage is found.
 """
 
 from __future__ import annotations
@@ -15,15 +14,14 @@ import json
 import os
 import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.ensemble.batches import versions
-from stiction.ensemble.table import Failure, Table, joined
+from stiction.ensemble.batches import Failure, Table, versions
 from stiction.errors import StoreError, warn_user
 from stiction.files import PART, UNREADABLE, cannot, write_whole
 from stiction.model import describe
@@ -31,12 +29,9 @@ from stiction.model import describe
 FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
-SAVE_SECONDS = 1.0
+SAVE_SECONDS, SAVE_SHARE, SAVE_MOST = 1.0, 0.03, 60.0
+"""A chunk holds the samples of a second, later of a share of the whole time, at most a minute."""
 SAVE_BYTES = 32 * 2**20
-MANY = 64
-"""Small chunks that are joined to one."""
-LARGE = 16 * 2**20
-"""Bytes of a chunk that is not joined any more."""
 
 
 class Damaged(ValueError):
@@ -73,8 +68,7 @@ class Store:
         self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
         self._taken: list[Table] = []
-        self._saved = time.monotonic()
-        self._small: dict[str, Table] = {}
+        self._begun = self._saved = time.monotonic()
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
@@ -100,7 +94,7 @@ class Store:
         store, before = cls(path, study), None
         try:
             before = read_json(path / STUDY)
-            refuse_another(path, study, before)
+            _refuse_another(path, study, before)
         except (FileNotFoundError, Damaged):
             if list(store.chunks()) or STUDY in others:
                 store._warn(
@@ -115,43 +109,35 @@ class Store:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks that are what was written; what is wrong with others is in `damage`.
 
-        Chunks that another process joins meanwhile are read in their new form; a sample may then
-        occur twice, with the same numbers.
-
         Raises
         ------
         StoreError
             If something is there and cannot be read, so that damage cannot be ruled out.
         """
-        self.damage = {}
-        seen: set[str] = set()
-        while new := sorted(self._names() - seen):
-            seen.update(new)
-            for name in new:
-                try:
-                    chunk = read_chunk(self.path / CHUNKS / name)
-                except FileNotFoundError:  # joined meanwhile
-                    continue
-                except Damaged as error:
-                    self.damage[name] = str(error)
-                    continue
-                if chunk.study != self._mark:
-                    raise StoreError(f"{self.path}: {CHUNKS}/{name} belongs to another study")
-                yield chunk
-
-    def _names(self) -> set[str]:
+        folder, self.damage = self.path / CHUNKS, {}
         try:
-            return set(filter(NAME.fullmatch, os.listdir(self.path / CHUNKS)))
+            names = sorted(filter(NAME.fullmatch, os.listdir(folder)))
         except FileNotFoundError:
-            return set()
+            return
         except OSError as error:
-            raise cannot("read", self.path / CHUNKS, error) from error
+            raise cannot("read", folder, error) from error
+        for name in names:
+            try:
+                chunk = _read_chunk(folder / name)
+            except FileNotFoundError:  # it was damaged, and another process has deleted it
+                continue
+            except Damaged as error:
+                self.damage[name] = str(error)
+                continue
+            if chunk.study != self._mark:
+                raise StoreError(f"{self.path}: {CHUNKS}/{name} belongs to another study")
+            yield chunk
 
-    def load(self, take: Callable[[list[Table]], None]) -> None:
-        """Hand on all tables; delete damaged chunks, and warn of them and of other versions."""
+    def load(self) -> Iterator[Table]:
+        """Yield all tables; delete damaged chunks, and warn of them and of other versions."""
         found = set()
         for chunk in self.chunks():
-            take([chunk.table])
+            yield chunk.table
             found.add(chunk.versions)
         for other in sorted(found - {versions()}):
             self._warn(
@@ -175,7 +161,7 @@ class Store:
     # -- writing -------------------------------------------------------------------------------
 
     def add(self, tables: list[Table]) -> None:
-        """Take tables, and store what was taken if a second has passed or it is large.
+        """Take tables, and store what was taken if it is time or it is large.
 
         Raises
         ------
@@ -183,43 +169,21 @@ class Store:
             If it cannot be written; what was stored before stays readable.
         """
         self._taken += tables
-        late = time.monotonic() - self._saved >= SAVE_SECONDS
+        now = time.monotonic()
+        interval = min(max(SAVE_SECONDS, SAVE_SHARE * (now - self._begun)), SAVE_MOST)
+        late = now - self._saved >= interval
         if late or sum(table.rows.nbytes for table in self._taken) >= SAVE_BYTES:
-            self._save()
-            size = sum(table.rows.nbytes for table in self._small.values())
-            if len(self._small) >= MANY or size >= LARGE:
-                self._join()
+            self.save()
 
-    def close(self) -> None:
-        """Store what was taken, and join the small chunks of this writer."""
-        self._save()
-        self._join()
-
-    def _save(self) -> None:
-        self._write(self._taken)
+    def save(self) -> None:
+        """Store what was taken, one chunk for each set of variables."""
+        groups: dict[Any, list[Table]] = {}
+        for table in self._taken:
+            groups.setdefault(table.rows.dtype, []).append(table)
+        for group in groups.values():
+            data = _encode(group, self._mark)
+            write_whole(self.path / CHUNKS / f"{digest(data)}.npz", data)
         self._taken, self._saved = [], time.monotonic()
-
-    def _write(self, tables: Iterable[Table]) -> None:
-        for table in joined(tables):
-            data = encode(table, self._mark)
-            name = f"{digest(data)}.npz"
-            write_whole(self.path / CHUNKS / name, data)
-            if len(data) < LARGE:
-                self._small[name] = table
-
-    def _join(self) -> None:
-        """Replace small chunks by larger ones; they go when the larger ones are whole."""
-        if len(self._small) < 2:
-            return
-        small, self._small = self._small, {}
-        try:
-            self._write(small.values())
-        except StoreError:  # the disk is full: the small ones stay, and nothing is lost
-            return
-        # A table whose columns no other has comes back under the name that it had.
-        for name in small.keys() - self._small.keys():
-            with suppress(OSError):
-                (self.path / CHUNKS / name).unlink()
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store what the pilot has found."""
@@ -234,16 +198,17 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:32]
 
 
-def encode(table: Table, study: str) -> bytes:
-    """Return a table as the bytes of an .npz archive, with a few words about it as JSON."""
-    about = [study, versions(), table.seconds, table.failures]
-    text = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
-    file = io.BytesIO()
-    np.savez(file, about=text, rows=table.rows)
+def _encode(tables: list[Table], study: str) -> bytes:
+    """Return tables as the bytes of an .npz archive, with a few words about them as JSON."""
+    seconds = round(sum(table.seconds for table in tables), 3)
+    failures = [failure for table in tables for failure in table.failures]
+    about = json.dumps([study, versions(), seconds, failures]).encode()
+    rows, file = np.concatenate([table.rows for table in tables]), io.BytesIO()
+    np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
     return file.getvalue()
 
 
-def read_chunk(file: Path) -> Chunk:
+def _read_chunk(file: Path) -> Chunk:
     """Return a chunk, or raise `Damaged` or an error of `_read`."""
     data = _read(file)
     if file.stem != digest(data):
@@ -292,22 +257,16 @@ def _read(file: Path) -> bytes:
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """What makes two studies the same run: all but the title and the number of samples."""
+    """Return what makes two studies the same run: all but title and number of samples."""
     ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
-    return {key: value for key, value in study.items() if key != "title"} | {
-        "ensemble": ensemble
-    }
+    rest = {key: value for key, value in study.items() if key != "title"}
+    return rest | {"ensemble": ensemble}
 
 
-def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
+def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
     """Refuse a study that differs from the stored one in more than a growing number of samples."""
-    ours, theirs = flat(_identity(here)), flat(_identity(there))
-    found = [
-        f"{key}: {_shown(ours.get(key))} here, {_shown(theirs.get(key))} there"
-        for key in dict.fromkeys([*ours, *theirs])
-        if ours.get(key) != theirs.get(key)
-    ]
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
+    found = _differences(_identity(here), _identity(there))
     if now < before and not found:
         found = [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
     if found:
@@ -317,17 +276,15 @@ def refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]
         )
 
 
-def flat(content: Any, path: str = "") -> dict[str, Any]:
-    """Return the numbers and texts in plain tables and lists by their paths."""
-    if isinstance(content, list):
-        content = dict(enumerate(content))
-    if not isinstance(content, Mapping) or not content:
-        return {path: content}
-    found: dict[str, Any] = {}
-    for key, value in content.items():
-        found |= flat(value, f"{path}.{key}" if path else str(key))
-    return found
-
-
-def _shown(value: Any) -> str:
-    return "nothing" if value is None else describe(value)
+def _differences(here: Any, there: Any, path: str = "") -> list[str]:
+    """Return the entries in which two plain tables differ, with their paths."""
+    if isinstance(here, list) and isinstance(there, list):
+        here, there = dict(enumerate(here)), dict(enumerate(there))
+    if isinstance(here, Mapping) and isinstance(there, Mapping):
+        return [
+            text
+            for key in dict.fromkeys([*here, *there])
+            for text in _differences(here.get(key), there.get(key), f"{path}.{key}".strip("."))
+        ]
+    shown = ["nothing" if one is None else describe(one) for one in (here, there)]
+    return [f"{path}: {shown[0]} here, {shown[1]} there"] if here != there else []

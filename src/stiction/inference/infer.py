@@ -25,6 +25,7 @@ from stiction.profiles.units import factor_to
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.random.stresses import mean_in_stress
 
 DRAWS = 4000
 TOLERABLE = 0.25
@@ -151,7 +152,7 @@ def infer(
     with Meter("infer", show=progress) as meter:
         options |= {"error": error, "seed": seed, "meter": meter}
         (own,) = experiments_at(parameters, parameters.middle[None], method)
-        own.problem.warn_of_units(own.mean("strength"))
+        own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
         likelihood, grid = _located(parameters, method, measured, samples, options)
         return _posterior(likelihood, grid, measured, seed, meter)
 

@@ -122,7 +122,7 @@ def simulate(
 
     def work(job: tuple[int, int, int]) -> None:
         number, start, count = job
-        values = experiments[number].results(seed, start, count)
+        values = experiments[number].with_seed(seed).results(start, count)
         peaks[number, start - first : start - first + count] = values[variable]
         meter.advance(count)
 

@@ -15,6 +15,7 @@ from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
+from stiction.random.stresses import mean_in_stress
 from stiction.reliability.answer import (
     Budget,
     Confidence,
@@ -137,7 +138,7 @@ def failure_probability(
     if stress is None:
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
     low, high = state.bounds
-    mean = experiment.mean("strength")
+    mean = mean_in_stress(experiment.problem, experiment.random, "strength")
     if max(low, 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
         name = "stress" if friction_coefficient is None else "friction_coefficient"
         warn_user(

@@ -1,57 +1,59 @@
 """Runs on disk: parts of a study for several jobs, and reading of stored samples."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
+from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
-from stiction.ensemble.store import Store
-from stiction.ensemble.table import Failure
-from stiction.errors import InputError, warn_user
-from stiction.model import FilePath, brief, check, describe, is_whole
+from stiction.ensemble.store import Chunk, Store
+from stiction.errors import warn_user
+from stiction.model import FilePath, brief, check, is_whole
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import check_suffix, export
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FEWEST_BLOCKS = 8
 """Blocks of samples that a part has if there are enough, so that parts take about as long."""
 
 
-class Part(NamedTuple):
-    """Part `number` (from 1) of `of`: the samples that one of several jobs computes."""
-
-    number: int
-    of: int
-
-    def mask(self, points: int, samples: int) -> NDArray[np.bool_]:
-        """Return which samples it has, (points, samples).
-
-        Blocks of consecutive samples are dealt out in turn, through all points of a sweep, so that
-        parts are alike even where points are not.
-        """
-        total = points * samples
-        block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * self.of)))
-        mine: NDArray[np.bool_] = np.arange(total) // block % self.of == self.number - 1
-        return mine.reshape(points, samples)
-
-
-def as_part(value: Any) -> Part:
-    """Return a part from a pair of numbers or a text such as '3/100'."""
+def _part(value: Any) -> tuple[int, int]:
     pair: Any = value
     if isinstance(value, str):
         pair = [int(text) if text.isdecimal() else text for text in value.split("/")]
     if isinstance(pair, tuple | list) and len(pair) == 2 and all(is_whole(n, 1) for n in pair):
-        part = Part(*map(int, pair))
-        if part.number <= part.of:
-            return part
-    raise InputError(
-        "part: must be a part and the number of parts, such as 3/100 (in Python also (3,"
-        f" 100)), from 1/100 to 100/100; got {describe(value)}"
+        number, of = map(int, pair)
+        if number <= of:
+            return number, of
+    raise ValueError(
+        "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
+        " 1/100 to 100/100"
     )
+
+
+AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
+"""Number of a part, from 1, and the number of parts: the samples that one of several jobs has."""
+
+
+def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
+    """Return which samples a part has, (points, samples).
+
+    Blocks of consecutive samples are dealt out in turn, through all points of a sweep, so that
+    parts are alike even where points are not.
+    """
+    (number, of), total = part, points * samples
+    block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
+    mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
+    return mine.reshape(points, samples)
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,9 @@ class StoredRun:
             failures=tuple(rows.failed),
             damaged=tuple(f"{name}: {text}" for name, text in self._store.damage.items()),
             chunks=len(chunks),
-            bytes=sum(size for size, _, _ in chunks),
-            seconds=sum(seconds for _, seconds, _ in chunks),
-            versions=tuple(dict.fromkeys(versions for _, _, versions in chunks)),
+            bytes=sum(chunk.bytes for chunk in chunks),
+            seconds=sum(chunk.table.seconds for chunk in chunks),
+            versions=tuple(dict.fromkeys(chunk.versions for chunk in chunks)),
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
@@ -150,15 +152,13 @@ class StoredRun:
             {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
         )
 
-    def _read(
-        self, only: Sequence[str] | None
-    ) -> tuple[Gathered, list[tuple[int, float, str]]]:
-        """Everything that is stored; and of each chunk its bytes, seconds and versions."""
+    def _read(self, only: Sequence[str] | None) -> tuple[Gathered, list[Chunk]]:
+        """Return everything that is stored, and the chunks without their rows."""
         ensemble, chunks = self.study.ensemble, []
         rows = Gathered(self.study.experiments, ensemble.samples, ensemble.first, only)
         for chunk in self._store.chunks():
-            rows.add([chunk.table])
-            chunks.append((chunk.bytes, chunk.table.seconds, chunk.versions))
+            rows.add(chunk.table)
+            chunks.append(chunk._replace(table=chunk.table._replace(rows=np.empty(0))))
         return rows, chunks
 
     def export(self, path: str | Path) -> None:

@@ -7,7 +7,7 @@ import itertools
 import json
 import operator
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
@@ -43,7 +43,7 @@ from stiction.problem import Problem
 from stiction.profiles.reading import profile_in_file
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
-from stiction.study.run import StoredRun, as_part
+from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import (
     Point,
     Sweep,
@@ -159,12 +159,10 @@ class Study:
         A mistake is reported once, with the points where it is.
         """
         base = _Parts(**{name: getattr(self, name) for name in _PARTS})
-        swept = [key for axis in self.sweep for key in axis.keys]
-        below = {name: [key for key in swept if key.split(".")[0] == name] for name in _PARTS}
         made: dict[Any, Any] = {}
 
         def part(name: str, values: Mapping[str, Any]) -> Any:
-            own = {key: values[key] for key in below[name]}
+            own = {key: one for key, one in values.items() if key.split(".")[0] == name}
             key = name, *map(id, own.values())
             if key not in made:
                 made[key] = getattr(with_values(base, own), name)
@@ -182,18 +180,8 @@ class Study:
             except InputError as error:
                 for text in error.problems:
                     problems.setdefault(text, []).append(point)
-        if problems and not self.sweep:
-            raise InputError(problems)
         if problems:
-            raise InputError(
-                f"{text}, at {name_point(points[0])}"
-                + (
-                    f" and {len(points) - 1} more of the sweep"
-                    if points[1:]
-                    else " of the sweep"
-                )
-                for text, points in problems.items()
-            )
+            raise InputError(text + _place(points) for text, points in problems.items())
         return found
 
     @property
@@ -222,7 +210,7 @@ class Study:
         progress: Progress = True,
         time_limit: Positive | None = None,
         retry: Flag = False,
-        part: Any = None,
+        part: AnyPart | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
         """Run the study, or the part of it that is missing.
@@ -252,13 +240,13 @@ class Study:
         StoreError
             If `out` cannot be used.
         """
-        store = others = None
+        store: Store | None = None
+        others: Any = False
         if part is not None:
-            mine = as_part(part)
             if out is None:
                 raise InputError("part: needs out=, the folder in which the parts are stored")
-            others = ~mine.mask(len(self.experiments), self.ensemble.samples)
-            pilot = pilot and mine.number == 1
+            others = ~samples_of_part(part, len(self.experiments), self.ensemble.samples)
+            pilot = pilot and part[0] == 1
         if out is not None:
             store = Store.open(out, self.to_dict())
         return gather(
@@ -328,6 +316,12 @@ class Study:
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"result: its attribute 'study' is not JSON: {error}") from None
         return cls.from_dict(given)
+
+
+def _place(points: Sequence[Point]) -> str:
+    """Return where a mistake is; nothing without a sweep."""
+    more = f" and {len(points) - 1} more" if len(points) > 1 else ""
+    return f", at {name_point(points[0])}{more} of the sweep" if points[0].values else ""
 
 
 @model(kw_only=True)

@@ -122,21 +122,15 @@ def _axis(number: int, given: Any, folder: Path | None) -> Axis:
         raise InputError(
             f"{where}: must be a table of keys and their values, got {describe(given)}"
         )
-    problems, columns = [], {}
-    for key, values in _flat(given).items():
-        try:
-            columns[key] = _values(key, values, folder)
-        except InputError as error:
-            problems += [f"{where}.{text}" for text in error.problems]
+    with prefixed(where, "."):
+        columns = {key: _values(key, values, folder) for key, values in _flat(given).items()}
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
         named = ", ".join(f"{key} has {count}" for key, count in lengths.items())
-        problems.append(
+        raise InputError(
             f"{where}: keys of one table vary together and need as many values each ({named});"
             " to cross them, give each a [[sweep]] of its own"
         )
-    if problems:
-        raise InputError(problems)
     return Axis(tuple(columns), tuple(zip(*columns.values(), strict=True)))
 
 
