@@ -61,7 +61,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     level = parser.add_mutually_exclusive_group()
     level.add_argument("--quick", action="store_true", help="500 samples, for a first look")
     level.add_argument("--full", action="store_true",
-                       help="also ruptures by the thousand; some ten minutes more")  # fmt: skip
+                       help="also ruptures by the thousand; some six minutes more")  # fmt: skip
     parser.add_argument("--figures", type=_numbers, default=(), metavar="N,N",
                         help="only these figures, without the page, such as 5,6")  # fmt: skip
     parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")

@@ -447,10 +447,10 @@ WHAT_IF = [
 
 
 def _from_usual(d: Data) -> Series:
-    study = "dynamic" if "dynamic" in d else "ruptures"
-    usual = arrested(d, RATIOS[1], study)
+    usual = arrested(d, RATIOS[1], "dynamic" if "dynamic" in d else "ruptures")
     moving = shares(d, "wide_strength", inertia=True)
-    return Series(moving.label, "", [("the paper's range", usual), *moving.rows])
+    label = moving.label.partition(" (")[0]  # the paper's range has another number of ruptures
+    return Series(label, "", [("the paper's range", usual), *moving.rows])
 
 
 GROUPS = {
