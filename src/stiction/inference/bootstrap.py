@@ -55,20 +55,16 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """The result of one fit.
-
-    `distance` is Kolmogorov's, between values and marginal, and `roughness` the mean square
-    of the logarithm of periodogram over expectation, both averaged over bands. `noise`
-    holds the variance of the noise, negative where even less than none would suit better,
-    and its standard error; 0 where the noise is known.
-    """
+    """The result of one fit."""
 
     setting: Setting
     marginal: Any
     model: Model
-    distance: float
-    roughness: float
-    noise: tuple[float, float]
+    distance: float  # Kolmogorov's, between values and marginal
+    roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
+    noise: tuple[
+        float, float
+    ]  # variance, which may be negative, and its error; 0 if it is known
 
     @cached_property
     def parameters(self) -> dict[str, float]:
@@ -114,9 +110,7 @@ def estimate(
 ) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
-    The marginal of noisy values is too wide. So the noise is found first, with the marginal
-    of the values as they are; then both are fitted again, the marginal to values less that
-    noise.
+    The noise is found with the marginal of the values, which it widens; then both are fitted again.
     """
     family = setting.spectrum
     values = np.concatenate(rows)
@@ -176,8 +170,7 @@ def bootstrapped(
 ) -> tuple[list[Repetitions], int]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Returns the repetitions, as many as the family can be fitted to, and how many were
-    requested. Repetition b depends on (seed, b) only.
+    Returns the repetitions to which the family can be fitted, and the number requested.
     """
 
     def one(field: Estimate, number: int) -> Estimate | None:
@@ -209,11 +202,7 @@ def bootstrapped(
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
-    """Return the field with its correlation length at either end of a first interval.
-
-    Records of short correlation lengths hold more of them, and errors are smaller and more
-    alike. An estimate that is too short by chance therefore promises too much.
-    """
+    """Return the field with its correlation length at either end of a first interval."""
     found, family = around.truth, around.truth.setting.spectrum
     values, place = family.of(found.model), family.free.index("correlation_length")
     moved = []
@@ -234,20 +223,21 @@ class Scale(NamedTuple):
     name: str
     linear: bool = False
 
-    def _origin(self, values: Mapping[str, float]) -> float:
-        return values["mean"] if self.name in SIDES else origin(self.name)
+    def _from(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Where the logarithm begins, and on which side of it the parameter lies."""
+        if self.name in SIDES:
+            return values["mean"], SIDES[self.name]
+        return origin(self.name), 1.0
 
     def to(self, values: Mapping[str, float]) -> float:
         """Return the parameter on this scale."""
-        value = values[self.name]
-        above = SIDES.get(self.name, 1.0) * (value - self._origin(values))
-        return value if self.linear else math.log(max(above, 1e-300))
+        (start, side), value = self._from(values), values[self.name]
+        return value if self.linear else math.log(max(side * (value - start), 1e-300))
 
     def back(self, scaled: float, values: Mapping[str, float]) -> float:
         """Return a parameter from this scale."""
-        if self.linear:
-            return scaled
-        return self._origin(values) + SIDES.get(self.name, 1.0) * math.exp(scaled)
+        start, side = self._from(values)
+        return scaled if self.linear else start + side * math.exp(scaled)
 
     def of(self, one: Estimate) -> tuple[float, float]:
         """Return an estimate on this scale, and what its error is proportional to."""
@@ -259,11 +249,7 @@ class Scale(NamedTuple):
         return self.to(one.parameters), width
 
     def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
-        """Return an estimate less a quantile of its error in units of its width.
-
-        Of R repetitions the quantile p is the p (R + 1)th: interpolated to the ends, as by
-        default, it lies further inside.
-        """
+        """Return an estimate less a quantile of its error in units of its width."""
         (at, width), truth = self.of(found), repeated.truth
         true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
         errors = [(own - true) / wide for own, wide in map(self.of, repeated.fits)]
@@ -275,20 +261,11 @@ def intervals(
 ) -> dict[str, tuple[float, float]]:
     """Return studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
 
-    `repeated` are repetitions of the estimate, and of `at_ends`, shorter and longer. The
-    error of any parameter is as wide as the root of the correlation length, of which a
-    record holds few, and that of a place, such as the mean, also as the field's standard
-    deviation; a repetition finds both anew. What still changes with the correlation length
-    is met by taking the error at an end of an interval from a field that belongs there,
-    with a longer or a shorter correlation (one step of a test inversion; Carpenter, 1999):
-    the longer one at the upper end of parameters whose estimates rise with that of the
-    correlation length, and else at the lower.
-
-    Of the noise it is the variance that has an interval, with its own standard error, which
-    follows the correlation length as it is, and as if it could be negative: estimates that
-    end at zero would all have the same error, and an interval from them would hold nothing
-    but zero. What is below zero is cut off last. So is of other parameters what they cannot
-    be, see `limits_of`.
+    Errors are in units of the root of the correlation length, of which a record holds few. Upper
+    and lower ends come from fields of longer and shorter correlation, `at_ends` (one step of a test
+    inversion; Carpenter, 1999): the longer one at the upper end of parameters whose estimates rise
+    with the correlation length. The noise has an interval by its variance and its own standard
+    error, as if it could be negative: estimates at zero would all have an error of zero.
     """
     around, *ends = repeated
     found, estimated = around.truth, around.truth.parameters
@@ -318,11 +295,7 @@ def intervals(
 
 
 def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
-    """Return the limits of parameters that have some: bounds of the marginal, ranges of the search.
-
-    Values lie inside the bounds of their marginal; `quiet` are the values as they would be
-    without the greatest noise that they may carry.
-    """
+    """Return the limits of bounds of the marginal, by values without noise, and of searches."""
     estimated = found.parameters
     bottom, top = (float(end) for end in found.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
@@ -344,10 +317,7 @@ def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
 def cut(
     interval: tuple[float, float], limits: tuple[float, float], at: float
 ) -> tuple[float, float]:
-    """Cut an interval at limits; one at a limit or beyond becomes the whole range.
-
-    Where there is no limit, it reaches to the estimate.
-    """
+    """Cut an interval at limits; one beyond becomes the whole range, or reaches to the estimate."""
     low, high = (min(max(end, limits[0]), limits[1]) for end in interval)
     near = SAME if np.isfinite(limits).all() else 0.0
     for end in limits:

@@ -44,13 +44,13 @@ STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale"
 
 def _known(value: Any, info: ValidationInfo) -> float | None:
     """A number, that of `False`, or None, which is estimated."""
-    least, number, none = 0.0, "number >= 0", 0.0
-    if info.field_name == "anisotropy":
-        least, number, none = 1e-300, "positive number", 1.0
+    ratio = info.field_name == "anisotropy"
     if isinstance(value, bool):
-        return None if value else none
-    if not (is_finite(value) and value >= least):
-        raise ValueError(f"must be True, False or a {number}")
+        return None if value else float(ratio)
+    if not is_finite(value) or value < 0.0 or (ratio and value == 0.0):
+        raise ValueError(
+            f"must be True, False or a {'positive number' if ratio else 'number >= 0'}"
+        )
     return float(value)
 
 
@@ -144,13 +144,11 @@ class FieldFit:
         for name, value in self.parameters.items():
             if name == "mean" and "marginal.mean" in self.parameters:
                 continue  # the same number
-            low, high = self.interval[name]
+            (low, high), last = self.interval[name], name.rpartition(".")[2]
+            own = QUANTITIES[self.quantity].units if last in STRESSES else "1"
+            unit = "m" if last.endswith("length") else own
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
-            last = name.rpartition(".")[2]
-            if last.endswith("length"):
-                line += " m"
-            elif last in STRESSES and QUANTITIES[self.quantity].units != "1":
-                line += f" {QUANTITIES[self.quantity].units}"
+            line += "" if unit == "1" else f" {unit}"
             least, most = RANGES.get(last, (-math.inf, math.inf))
             if low <= least or high >= most:
                 line += f" (searched from {least:g} to {most:g})"

@@ -8,9 +8,9 @@ estimate consistent (a composite likelihood) and its error to the bootstrap.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.stats
@@ -37,10 +37,12 @@ NEGLIGIBLE = 1e-4
 MOST_NOISE = 0.95
 
 
-Parameters: TypeAlias = tuple[float, ...]
-"""Those of scipy: shapes, loc and scale."""
-Search: TypeAlias = tuple[Array, Any, Callable[[Array], Parameters]]
-"""Where to begin, between which limits, and the parameters of a vector."""
+class Search(NamedTuple):
+    """Where to begin, between which limits, and scipy's parameters of a vector."""
+
+    start: Any
+    limits: Sequence[tuple[float, float]]
+    parameters: Callable[[Array], tuple[float, ...]]
 
 
 class Kind(NamedTuple):
@@ -99,28 +101,25 @@ class Family:
     fixed: dict[str, float]
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
-        """Return the marginal of values (points,) that carry noise of a standard deviation.
-
-        `start` is a marginal of this family to begin with.
-        """
+        """Return the marginal of values that carry noise of this deviation, from a first guess."""
         quiet = self.quiet(values, noise)
         if self.name not in KINDS:
             return self._by_scipy(quiet)
         if noise**2 <= NEGLIGIBLE * values.var():
             noise, values = 0.0, quiet
-        kind = KINDS[self.name]
-        first, ranges, parameters = self._search(values, quiet, noise, start)
-        limits = np.array(ranges)
-        bins = _bins(values, noise) if noise else None
-        counts, at = (np.ones(values.size), values) if bins is None else bins[:2]
+        kind, search = KINDS[self.name], self._search(values, quiet, noise, start)
+        limits = np.array(search.limits)
+        counts, at, probabilities = (
+            _bins(values, noise) if noise else (np.ones(values.size), values, None)
+        )
 
         def terms(v: Array) -> Array:
-            *shapes, low, scale = parameters(v)
+            *shapes, low, scale = search.parameters(v)
             u = (at - low) / scale
-            if bins is None:
-                found: Array = kind.log_density(u, *shapes) - math.log(scale)
-                return found
-            return np.log(bins[2](kind.distribution(u, *shapes)))
+            if probabilities is not None:
+                return np.log(probabilities(kind.distribution(u, *shapes)))
+            found: Array = kind.log_density(u, *shapes) - math.log(scale)
+            return found
 
         def value_of(v: Array) -> tuple[float, Array]:
             found = terms(v)
@@ -128,12 +127,11 @@ class Family:
 
         def derivatives(v: Array, found: Array) -> tuple[Array, Array]:
             sides = np.where(v + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
-            moved = [(terms(v + step) - found) / step.sum() for step in np.diag(sides)]
-            slopes = np.stack(moved)
+            slopes = np.stack([(terms(v + s) - found) / s.sum() for s in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
 
-        best = climb(first, limits, value_of, derivatives, longest=0.5, settled=1e-4)
-        return self._member(parameters(best))
+        best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
+        return self._member(search.parameters(best))
 
     def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Search:
         if self.name == "beta":
@@ -142,19 +140,19 @@ class Family:
         mean, unit = float(quiet.mean()), float(quiet.std())
         if self.name == "truncated_normal":
 
-            def parameters(v: Array) -> Parameters:
+            def parameters(v: Array) -> tuple[float, ...]:
                 middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
                 return (low - middle) / width, (high - middle) / width, middle, width
 
-            return np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters
-        if start is None:
-            start = MARGINALS[self.name](mean=mean, cv=unit / mean, low=low)
+            return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
+        start = start or MARGINALS[self.name](mean=mean, cv=unit / mean, low=low)
         shape, _, scale = start.distribution.args
         limits = [(-700.0, 700.0), (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)]
-        first = np.log([scale, shape])
-        return first, limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
+        return Search(
+            np.log([scale, shape]), limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
+        )
 
-    def _member(self, parameters: Parameters) -> Any:
+    def _member(self, parameters: tuple[float, ...]) -> Any:
         """The marginal of scipy's parameters; most of ours have a mean and a cv instead."""
         if self.name == "beta":
             a, b, low, width = parameters
@@ -203,26 +201,25 @@ class Family:
     def check(self, values: Array) -> None:
         """Refuse values that the family cannot have."""
         low, high = self.bounds
-        outside = int(((values <= low) | (values >= high)).sum())
-        if outside:
+        if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
                 f"marginal: {outside} of {values.size} values, from {values.min():.6g} to"
                 f" {values.max():.6g}, do not lie between the bounds of {self.name!r}, {low:.6g}"
-                f" and {high:.6g}; give others, as in marginal={{'type': {self.name!r}, 'low':"
-                " ...}, or noise=True if measurement noise carries them there"
+                f" and {high:.6g}; give others, as in {{'type': {self.name!r}, 'low': ...}}, or"
+                " noise=True if measurement noise carries them there"
             )
 
 
 def table_of(given: Any) -> dict[str, Any]:
     """Return a table {type, ...} of what may also be a name."""
-    if isinstance(given, str):
-        return {"type": given}
-    if not isinstance(given, Mapping):
+    if isinstance(given, Mapping):
+        return dict(given)
+    if not isinstance(given, str):
         raise InputError(
-            "must be a name, or a table with the parameters to keep, such as"
-            f" {{'type': 'beta', 'low': 0.0}}, got {describe(given)}"
+            "must be a name, or a table such as {'type': 'beta', 'low': 0.0} with the parameters"
+            f" to keep, got {describe(given)}"
         )
-    return dict(given)
+    return {"type": given}
 
 
 def family_of(given: Any) -> Family:
@@ -260,7 +257,7 @@ def _beta(
         pairs = zip(sides.items(), distances, strict=True)
         return fixed | {name: mean + side * distance for (name, side), distance in pairs}
 
-    def parameters(v: Array) -> Parameters:
+    def parameters(v: Array) -> tuple[float, ...]:
         ends = ends_at(unit * math.exp(at) for at in v[2:])
         return math.exp(v[0]), math.exp(v[1]), ends["low"], ends["high"] - ends["low"]
 
@@ -269,23 +266,22 @@ def _beta(
         u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
         total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, 0.2)
         start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
-    distances = [side * (getattr(start, name) - mean) / unit for name, side in sides.items()]
     # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
-    for name in sides:
+    first = [start.alpha, start.beta]
+    for name, side in sides.items():
+        first.append(max(side * (getattr(start, name) - mean) / unit, 1e-3))
         least = 0.5 if noise else room[name] / unit * (1.0 + 1e-9)
         most = (room[name] + WIDEST * float(np.ptp(values))) / unit
         limits.append((math.log(least), math.log(most)))
-    first = np.log([start.alpha, start.beta, *np.maximum(distances, 1e-3)])
-    return first, limits, parameters
+    return Search(np.log(first), limits, parameters)
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Counts of values in bins, and how their probabilities follow from a distribution function.
+    """Counts of values in bins, where a distribution function is needed, and what it gives.
 
-    That function, of the values without noise, is needed at the second array. The
-    convolution with the noise is a sum in steps of half its deviation or less; far below
-    the width of a bin it does not count.
+    The probabilities of the bins are the differences of the distribution function of the values
+    without noise, convolved with that of the noise by a sum in steps of half its deviation or less.
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])

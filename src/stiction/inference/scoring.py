@@ -21,12 +21,10 @@ def climb(
     longest: float,
     settled: float,
 ) -> Array:
-    """Return the parameters of the greatest likelihood, from a start within limits.
+    """Return the parameters of the greatest likelihood, by damped steps of at most `longest`.
 
-    Fisher scoring with the damping of Levenberg and Marquardt. `value_of` returns the log
-    likelihood and what its derivatives need; `derivatives` returns the score and Fisher's
-    information. No parameter moves by more than `longest` in a step, and a gain below
-    `settled` ends the search.
+    `value_of` returns the log likelihood and what `derivatives` needs for the score and Fisher's
+    information. A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)

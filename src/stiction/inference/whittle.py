@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -61,11 +61,9 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in the Hermite orders 0, 1, ..., which sum to 1.
+    """Return the shares of the variance in the Hermite orders 0, 1, ..., the last for the rest.
 
-    As `stiction.random.mapping.hermite_coefficients`, with fewer points and orders: a
-    hundredth of its cost and an error below 1e-4, the last order standing for all that are
-    left out.
+    As `stiction.random.mapping.hermite_coefficients`, at a hundredth of its cost, to 1e-4.
     """
     z = np.linspace(-REACH, REACH, POINTS)
     weight = np.exp(-0.5 * z * z)
@@ -109,17 +107,15 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
 class Model(NamedTuple):
     """What a spectrum, the Hermite shares of a marginal and noise predict of records.
 
-    `noise_share` is of `variance`, which is that of the values, noise included; it is
-    negative only on the way to an estimate. `end_seen` is whether the truncation of the
-    spectrum is a property of the field, which records may show. Otherwise it only makes
-    simulation finite: at a multiple of 1/xi_0 it would, among the wavenumbers of a record,
-    determine the correlation length.
+    The truncation of a spectrum is a property of the field only if it was given (`end_seen`): at a
+    multiple of 1/xi_0 it would, among the wavenumbers of a record, determine the correlation
+    length.
     """
 
     spectrum: Any
     anisotropy: float
-    noise_share: float
-    variance: float
+    noise_share: float  # of the variance; negative only on the way to an estimate
+    variance: float  # of the values, noise included
     shares: Array
     end_seen: bool
 
@@ -168,17 +164,13 @@ def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class SpectrumFamily:
-    """A family of spectra with fixed parameters, and what else is estimated (None) with it.
-
-    `noise` is the standard deviation of the measurement noise, and `lengths` (m) are those
-    between which correlation lengths are looked for.
-    """
+    """A family of spectra with fixed parameters, and what else is estimated (None) with it."""
 
     name: str
     fixed: dict[str, float]
     anisotropy: float | None
-    noise: float | None
-    lengths: tuple[float, float]
+    noise: float | None  # standard deviation
+    lengths: tuple[float, float]  # m: between which correlation lengths are searched
 
     @cached_property
     def free(self) -> tuple[str, ...]:
@@ -235,10 +227,6 @@ class SpectrumFamily:
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
 
 
-State: TypeAlias = tuple[Model, list[Array]]
-"""A model, and the expected periodograms without noise."""
-
-
 class Whittle(NamedTuple):
     """The likelihood of periodograms, in terms of the vector of a family."""
 
@@ -278,11 +266,10 @@ class Whittle(NamedTuple):
 
     def fit(self, start: Array) -> Array:
         """Return the vector of the greatest likelihood, from a start."""
-        return climb(
-            start, self.family.limits, self.value, self.score, longest=LONGEST, settled=SETTLED
-        )
+        limits = self.family.limits
+        return climb(start, limits, self.value, self.score, longest=LONGEST, settled=SETTLED)
 
-    def value(self, at: Array) -> tuple[float, State]:
+    def value(self, at: Array) -> tuple[float, tuple[Model, list[Array]]]:
         """Return the log likelihood, and what its derivatives need."""
         model = self.family.model(at, self.shares)
         signals = [model.signal(one.window) for one in self.observed]
@@ -290,12 +277,8 @@ class Whittle(NamedTuple):
         loss = self.loss([model.expectation(one.window, signal) for one, signal in pairs])
         return -loss, (model, signals)
 
-    def score(self, at: Array, state: State) -> tuple[Array, Array]:
-        """Return derivatives of the log likelihood, (parameters,), and Fisher's information.
-
-        With d = d log E/d theta the score is sum w d (I/E - 1) and the information sum w d
-        d^T.
-        """
+    def score(self, at: Array, state: tuple[Model, list[Array]]) -> tuple[Array, Array]:
+        """Return sum w d (I/E - 1) and Fisher's information sum w d d^T, d = d log E/d theta."""
         family, limits = self.family, self.family.limits
         model, signals = state
         moved = {}
@@ -325,8 +308,7 @@ class Whittle(NamedTuple):
     def noise_variance(self, at: Array) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The information takes ordinates for independent, so that the error is somewhat too
-        small; what a bootstrap needs is that it grows and shrinks as the true one.
+        The error takes ordinates for independent: too small, but in proportion to the true one.
         """
         state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)

@@ -119,10 +119,9 @@ class Window:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
 
-        The spectrum fades out at its truncation; what lies above the sampling wavenumber is
-        folded back, and what lies above `FOLDS` times that, which is flat by then, evenly.
-        With `end_seen` false it is not truncated: what a truncation leaves out of a rough
-        spectrum would be taken for noise.
+        What lies above the sampling wavenumber is folded back, and above `FOLDS` times that evenly.
+        The spectrum fades out at its truncation, and has none if `end_seen` is false: what it
+        leaves out of a rough spectrum would be taken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
