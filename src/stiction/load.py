@@ -1,13 +1,9 @@
-"""The load: a profile that grows, on top of an initial stress.
-
-A load of your own is a class that derives from `LoadShape`, as `GradientLoad` and
-`EdgeLoad` do.
-"""
+"""The load: a profile that grows, on top of an initial stress."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -22,7 +18,6 @@ from stiction.model import (
     Positive,
     Profile,
     Real,
-    is_unplaced,
     model,
 )
 
@@ -36,6 +31,8 @@ class LoadShape(ABC):
     To add one, decorate a class that derives from it with `stiction.model.model`, so that
     its parameters are checked, and with `register`, so that study files accept its `type`.
     """
+
+    type: str
 
     @abstractmethod
     def values(self, interface: Interface) -> Array:
@@ -60,19 +57,13 @@ SHAPES: dict[str, Any] = {}
 
 
 def register(shape: Shape) -> Shape:
-    """Make a load shape known to study files by its `type`; a decorator of its class.
-
-    In any program that has imported the class; the commands take only those of this package.
-    """
-    SHAPES[shape.type] = shape  # type: ignore[attr-defined]  # the default of a field
+    """Let study files name a load shape by its `type`, wherever its class is imported."""
+    SHAPES[shape.type] = shape
     return shape
 
 
 def distance(interface: Interface, centre: float) -> Array:
-    """Return the distance of nodes along x from a place given as a share of the length, m.
-
-    Periodic; of shape (nx,) on a line and (nx, 1) on a plane.
-    """
+    """Return the distance (m) along x from a share of the length, (nx,); (nx, 1) on a plane."""
     length = interface.lengths[0]
     x = np.arange(interface.shape[0]) * length / interface.shape[0]
     away = np.mod(x - centre * length + 0.5 * length, length) - 0.5 * length
@@ -90,7 +81,6 @@ class GradientLoad(LoadShape):
         The profile runs from 1 + amplitude down to 1 - amplitude (1), in [0, 1).
     centre : float
         Position of the maximum as a share of the length, in [0, 1).
-
     """
 
     amplitude: Fraction
@@ -108,9 +98,8 @@ class GradientLoad(LoadShape):
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
 
-    The profile is proportional to 1 + excess exp(-distance/decay). The interface is
-    periodic, so that both sides of the edge are loaded, like a specimen and its mirror
-    image.
+    The profile is proportional to 1 + excess exp(-distance/decay). Both sides of the edge
+    are loaded, like a specimen and its mirror image.
 
     Parameters
     ----------
@@ -120,7 +109,6 @@ class EdgeLoad(LoadShape):
         Decay length, m, positive.
     edge : float
         Position of the edge as a share of the length, in [0, 1).
-
     """
 
     excess: NotNegative
@@ -138,9 +126,6 @@ def _shape(value: Any) -> Any:
         return value
     table = isinstance(value, dict) and "type" in value
     return from_table(SHAPES, value) if table else NotImplemented
-
-
-LoadProfile: TypeAlias = Annotated[Profile, OneOf(SHAPES, _shape, PROFILE_SCHEMA)]
 
 
 @model
@@ -162,19 +147,19 @@ class Load:
     >>> load = st.Load(profile=st.EdgeLoad(excess=2.0, decay=0.01), normal_pressure=5e6)
     """
 
-    profile: LoadProfile = 1.0
+    profile: Annotated[Profile, OneOf(SHAPES, _shape, PROFILE_SCHEMA)] = 1.0
     initial_stress: Profile = 0.0
     normal_pressure: OptionalProfile = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
         profile, pressure, problems = self.profile, self.normal_pressure, []
-        formula = isinstance(profile, LoadShape) or is_unplaced(profile)
-        if not formula and np.min(profile) <= 0.0:
+        if isinstance(profile, float | np.ndarray) and np.min(profile) <= 0.0:
             problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
-        if not (pressure is None or is_unplaced(pressure)) and np.mean(pressure) <= 0.0:
+        if isinstance(pressure, float | np.ndarray) and np.mean(pressure) <= 0.0:
+            mean = np.mean(pressure)
             problems.append(
-                f"normal_pressure must be positive on average, its mean is {np.mean(pressure):g}"
+                f"normal_pressure must be positive on average, its mean is {mean:g}"
             )
         if problems:
             raise InputError(problems)

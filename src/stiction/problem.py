@@ -56,10 +56,9 @@ class Sample(NamedTuple):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Without
-        the first axis for `one` sample. Strength may be infinite for methods that accept
-        barriers. Where it is at or below the residual strength, both are equal and W has
-        no effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength
+        may be infinite for methods that accept barriers. Where it is at or below the residual
+        strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
@@ -288,19 +287,22 @@ class Problem:
         return tuple(length / spacing for length, spacing in lengths)
 
     def _check_resolution(self, highest_rate: float) -> None:
-        resolutions = self.nodes_in_nucleation_length(highest_rate)
-        resolution, shape = min(resolutions), self.interface.shape
-        if resolution < FEWEST_NODES:
-            length = self.nucleation_lengths(highest_rate)[resolutions.index(resolution)]
-            finer = 2.0 * np.ceil(
-                0.5 * FEWEST_NODES * np.array(shape) / max(resolution, 1e-300)
-            )
+        resolution = self.nodes_in_nucleation_length(highest_rate)
+        if min(resolution) < FEWEST_NODES:
+            length = self.nucleation_lengths(highest_rate)[int(np.argmin(resolution))]
             raise InputError(
-                f"interface.nodes: the nucleation length {length:.3g} m spans {resolution:.2g}"
-                f" nodes; at least {FEWEST_NODES} are needed, that is interface.nodes >="
-                f" {' x '.join(f'{n:.10g}' for n in finer)}, got {' x '.join(map(str, shape))};"
-                " if that is far off, check the units of all lengths, moduli and strengths"
+                f"interface.nodes: the nucleation length {length:.3g} m spans"
+                f" {min(resolution):.2g} nodes; at least {FEWEST_NODES} are needed, that is"
+                f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
+                f" {' x '.join(map(str, self.interface.shape))}; if that is far off, check the"
+                " units of all lengths, moduli and strengths"
             )
+
+    def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
+        """Return the nodes with which the nucleation length would span `wanted` of them."""
+        growth = wanted / np.maximum(resolution, 1e-300)
+        halves = np.ceil(0.5 * np.array(self.interface.shape) * growth)
+        return " x ".join(f"{2 * n:.10g}" for n in halves)
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
@@ -310,11 +312,9 @@ class Problem:
             if self.interface.is_plane:
                 spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
             wanted = 16 if enough <= 12.0 else 32
-            finer = 0.5 * np.array(self.interface.shape) * wanted / np.array(resolution)
-            nodes = " x ".join(f"{2 * n:g}" for n in np.ceil(finer))
             warn_accuracy(
                 f"the nucleation length spans {spanned}; {wanted} are recommended"
-                f" (interface.nodes = {nodes}): {cost}"
+                f" (interface.nodes = {self._finer(resolution, wanted)}): {cost}"
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
@@ -325,12 +325,11 @@ class Problem:
         profiles : array, mapping of arrays, xarray.Dataset or Sample
             Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
             name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
-            'critical_slip' and 'fracture_energy'. A profile replaces the problem's own, and
-            may also be (samples, 1) or a number.
+            'critical_slip' and 'fracture_energy'. They replace the problem's own; all but the
+            strength may also be (samples, 1) or a number.
         accept : collection of {"barriers", "overstress", "constant"}
-            What the method accepts: infinite strength where nothing breaks; an initial
-            stress above the strength. "constant": the caller has warned of nodes that do
-            not weaken.
+            What the method accepts: infinite strength where nothing breaks; initial stress
+            above the strength; nodes that do not weaken, of which the caller has warned.
 
         Raises
         ------

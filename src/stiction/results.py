@@ -76,12 +76,12 @@ ONSET_VARIABLES: dict[str, Variable] = {
 
 
 def along(interface: Interface, variable: Variable) -> Variable:
-    """The same variable with one value a node."""
+    """Return the same variable with one value a node."""
     return replace(variable, dims=(*variable.dims, *interface.dims))
 
 
 def position(interface: Interface, variable: Variable) -> Variable:
-    """The same variable as a place on the interface: on a plane it has two components."""
+    """Return the same variable as a place, which has two components on a plane."""
     dims = (*variable.dims, DIRECTION) if interface.is_plane else variable.dims
     return replace(variable, dims=dims)
 
@@ -93,7 +93,7 @@ def onset_variables(interface: Interface) -> dict[str, Variable]:
 
 
 def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
-    """Values and meaning of a dimension of the interface."""
+    """Return the values and the meaning of a dimension of the interface."""
     if dim == DIRECTION:
         return np.array(interface.dims), Variable("", "direction of a component", (DIRECTION,))
     what = f"position along {dim}" if interface.is_plane else "position along the interface"

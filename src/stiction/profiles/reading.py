@@ -39,6 +39,8 @@ NAMES = {
 """What else a quantity may be called."""
 PLACES = ("x", "position", "pos", "distance", "coordinate")
 SAMPLES = ("sample", "samples")
+_UNNAMED = re.compile(r"\d+$|values?$")
+"""Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
 Column = str | int | None
 
@@ -61,14 +63,13 @@ def read_profile(
     Parameters
     ----------
     source : path, xarray.DataArray or xarray.Dataset
-        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``: columns
-        separated by semicolons, tabs, commas or blanks, with or without a line of names, such as
-        ``x (mm); strength (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. A map of
-        a plane is over 'x' and 'y'; as text it has the columns x, y and value.
+        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``: columns, with
+        or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``: variables with
+        `units`, and x as a coordinate. A map is over 'x' and 'y'; as text it has both as columns.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
-        length or of `quantity`, or the first and second of two columns; one column has no x.
+        length or of `quantity`, or the first and second of two columns.
     unit, x_unit : str, optional
         Units of the values and of positions if the source states none; SI by default.
     quantity : str
@@ -80,20 +81,20 @@ def read_profile(
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
         Refuse missing values (NaN, empty cells, missing points), fill them with straight
-        lines (on a plane with the smoothest surface over their rim), or leave NaN, for
-        `stiction.fit_field`. Without an interface, they always stay.
+        lines (on a plane smoothly from their rim), or leave NaN, for `stiction.fit_field`.
+        Without an interface, they always stay.
 
     Returns
     -------
     xarray.DataArray
         Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the coordinate
-        'measured', False in a gap, which `stiction.onset` and its figure take over.
+        'measured', False in a gap, which results take over.
 
     Raises
     ------
     InputError
-        If the source cannot be read, is in an unknown or unsuitable unit, is ambiguous
-        about the columns, or does not fit the interface.
+        If the source cannot be read, a unit is unknown or unsuitable, columns are ambiguous,
+        or the profile does not fit the interface.
 
     Warns
     -----
@@ -233,36 +234,38 @@ def labelled(
             only = f"the name of the only variable, {data.name!r}"
             raise InputError(f"value: {value!r} is not {only}")
         data, value = data.to_dataset(name=quantity), quantity
-    names = list(data.data_vars)
-    if value is not None:
-        value = _column(data, names, "value", value)
-    along = [name for name in data.variables if data[name].ndim == 1 and name != value]
-    if dims is None:
-        dims = ("x", "y") if _is_map(data) else ("x",)
+    dims = dims or (("x", "y") if _is_map(data) else ("x",))
+    names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
+    wide = [name for name in names if table or data[name].ndim >= len(dims)]
+    if value is None:
+        others = [name for name in wide if _plain(name) not in (*PLACES, *dims)]
+        chosen = _choose(data, others, (quantity, *NAMES.get(quantity, ())), si)
+    else:
+        chosen = _column(data, names, "value", value)
+    along = [name for name in data.variables if data[name].ndim == 1 and name != chosen]
     if len(dims) == 2:
         places = {_plain(name): name for name in along if _plain(name) in dims}
     else:
-        name = _place_on_line(data, along, quantity, value) if x is None else None
+        name = _choose(data, along, PLACES, "m" if table and si != "m" else "1")
+        if name is None and table and len(names) == 2 and names[0] != chosen:
+            name = names[0]
         places = {} if name is None else {"x": name}
     if x is not None:
         places["x"] = _column(data, along, "x", x)
-    table = "row" in data.dims
-    if (
-        table
-        and len(places) < len(dims)
-        and (len(dims) == 2 or (value is None and len(names) > 2))
-    ):
-        raise InputError(_unclear(data, names, quantity))
-    if value is None:
-        left = [name for name in names if name not in places.values()]
-        left = [name for name in left if table or data[name].ndim >= len(dims)]
-        value = _named(data, left, quantity)
-    array = data[value]
-    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
+    left = [name for name in wide if name not in places.values()]
+    if chosen is None and len(left) == 1 and _UNNAMED.match(_plain(left[0])):
+        chosen = left[0]
+    misplaced = table and len(places) < len(dims) and len(names) > 2 and value is None
+    if chosen is None or misplaced or (table and len(places) < len(dims) == 2):
+        raise InputError(_unclear(data, left, quantity))
+    array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
+    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
     array = _directed(array.drop_vars(own).assign_coords(at), dims)
-    values = _in_si(array, quantity, QUANTITIES[quantity].units, unit)
+    if len({*dims} & {*array.coords}) == 1 < len(dims):
+        raise InputError("has the coordinate x or y only; a map has both, or none")
+    values = _in_si(array, quantity, si, unit)
     for dim in {*dims} & {*array.coords}:
         place = _in_si(array[dim], dim, "m", x_unit)
         if not np.all(np.isfinite(place)):
@@ -281,34 +284,16 @@ def _is_map(data: Any) -> bool:
     return several and np.unique(columns["x"]).size < columns["x"].size
 
 
-def _place_on_line(data: Any, along: list[Any], quantity: str, value: Column) -> Any:
-    """Return the variable that holds x; None if nothing does."""
-    called = [name for name in along if _plain(name) in PLACES]
-    if called or "row" not in data.dims:
-        called.sort(key=lambda name: (name not in data.dims, PLACES.index(_plain(name))))
-        return called[0] if called else None
-    names = list(data.data_vars)
-    lengths = [name for name in along if is_in(_unit_of(data[name]), "m")]
-    if len(lengths) == 1 and QUANTITIES[quantity].units != "m":
-        return lengths[0]
-    known = value == names[0] or _plain(names[0]) in (quantity, *NAMES.get(quantity, ()))
-    return names[0] if len(names) == 2 and not known else None
+def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str) -> Any:
+    """Return the variable with one of several names, or else the only one in a unit, or None.
 
-
-def _named(data: Any, names: list[Any], quantity: str) -> Any:
-    """Return the variable among `names` that is clearly the quantity."""
-    if len(names) == 1 and str(names[0]).isdecimal():  # a column without a name
-        return names[0]
-    alone = ("value", "values") if len(names) == 1 else ()
-    for called in (quantity, *NAMES.get(quantity, ()), *alone):
-        if found := [name for name in names if _plain(name) == called]:
+    Any number is dimensionless: such a quantity is not recognised by its unit.
+    """
+    for word in called:
+        if found := [name for name in names if _plain(name) == word]:
             return found[0]
-    # Any number is dimensionless: such a quantity cannot be recognised by its unit.
-    si = QUANTITIES[quantity].units
     fitting = [name for name in names if si != "1" and is_in(_unit_of(data[name]), si)]
-    if len(fitting) != 1:
-        raise InputError(_unclear(data, names, quantity))
-    return fitting[0]
+    return fitting[0] if len(fitting) == 1 else None
 
 
 def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
@@ -340,36 +325,23 @@ def _plain(name: Any) -> str:
 
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     """Return an array over 'x' ('x' and 'y', or 'row'), after the sample if there are several."""
+    if len(dims) == 1 and "x" in array.coords:
+        array = array.swap_dims({array["x"].dims[0]: "x"})
     names = [str(dim) for dim in array.dims]
-    shown = ", ".join(names)
-    if len(dims) == 2:
-        along = [dim for dim in (*dims, "row") if dim in names]
-        if along not in (["x", "y"], ["row"]) and (along or len(names) != 1):
-            raise InputError(
-                f"which dimensions run along the plane is not clear from ({shown}); call them 'x',"
-                " the direction of load and slip, and 'y', and a third one 'sample'"
-            )
-        if len({"x", "y"} & {*array.coords}) == 1:
-            raise InputError("has the coordinate x or y only; a map has both, or none")
-    else:
-        if {"x", "y"} <= {*names}:
-            raise InputError(f"holds values over x and y, not along a line{OF_A_PLANE}")
+    if len(dims) == 1 and "x" not in names:
         called = [name for name in names if _plain(name) in PLACES]
         called = called or [name for name in names if _plain(name) not in SAMPLES]
-        if "x" in array.coords:
-            array = array.swap_dims({array["x"].dims[0]: "x"})
-        elif len(called) == 1 or (names and all(name.startswith("dim_") for name in names)):
+        if len(called) == 1 or (names and all(name.startswith("dim_") for name in names)):
             array = array.rename({called[-1]: "x"})  # without names the order counts
-        elif len(names) != 1:  # not one value a sample
-            raise InputError(
-                f"which dimension runs along the interface is not clear from ({shown}); call it"
-                " 'x', and the other 'sample'"
-            )
-        along = ["x"] if "x" in array.dims else []
+    along = [dim for dim in (*dims, "row") if dim in array.dims]
     samples = [dim for dim in array.dims if dim not in along]
-    if len(samples) > 1:
-        sizes = ", ".join(f"{name}: {size}" for name, size in array.sizes.items())
-        raise InputError(f"must have one dimension beside x, got ({sizes}); select one point")
+    one_each = not along and len(samples) == 1
+    if len(samples) > 1 or "y" in samples or not (one_each or along in ([*dims], ["row"])):
+        raise InputError(
+            f"which dimensions run along the interface is not clear from ({', '.join(names)}); call"
+            " it 'x', on a plane 'x' (the direction of load and slip) and 'y', and another one"
+            f" 'sample'{OF_A_PLANE * (len(dims) == 1)}"
+        )
     array = array.drop_vars([name for name in array.coords if name not in (MEASURED, *dims)])
     return array.transpose(*samples, *along)
 
