@@ -124,7 +124,7 @@ MISTAKES = {
     "'powerlaw' ... did you mean 'power_law'": lambda: make_strength(
         spectrum={"type": "powerlaw", "correlation_length": 1.0}
     ),
-    "unknown 'weight' ... did you mean 'weights'": lambda: st.LocalCriterion(weight="exact"),
+    "unknown 'gab' ... did you mean 'gap'": lambda: st.Equilibrium(gab=1e-6),
     "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
         keep=("initial_stress",)
     ),

@@ -182,7 +182,7 @@ def test_messages_are_in_the_words_of_the_command_line(command):
     ask = ("onset", "study.toml", "--strength", "p.csv", "--method", "local_criterion")
     code, _, err = command(*ask)
     assert code == 2
-    assert "(11 of 256 nodes)" in err
+    assert "11 of 256 nodes" in err
     assert "--gaps fill" in err
     assert "gaps=" not in err
     code, out, err = command(*ask, "--gaps", "fill")

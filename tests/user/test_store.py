@@ -4,7 +4,6 @@ import copy
 import errno
 import json
 import os
-import re
 import threading
 import warnings
 from concurrent.futures import Future
@@ -390,13 +389,3 @@ def test_time_between_chunks_is_about_a_second(tmp_path):
             out=tmp_path / "run", executor=executor, workers=2
         )
     assert st.open_run(tmp_path / "run").status().chunks >= 2
-
-
-def test_the_page_on_clusters(tmp_path, monkeypatch):
-    """Its job array in Python runs."""
-    monkeypatch.chdir(tmp_path)
-    make_study(samples=40).to_toml("study.toml")
-    page = (Path(__file__).parents[2] / "docs" / "clusters.md").read_text("utf-8")
-    first = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0]
-    exec(compile(first, "clusters.md", "exec"), {})
-    assert 0 < st.open_run("RUN").status().done < 160

@@ -99,7 +99,7 @@ def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
         ("random.strength.marginal.low", 2e6, "strength.marginal ... low must be below high"),
         ("random.strength.spectrum.correlation_length", 10.0, "strength ... no mode is left"),
         ("method.type", "local", "method.type ... 'local' ... local_criterion"),
-        ("method.weight", "exact", "method ... 'weight' ... did you mean 'weights'"),
+        ("method.typ", "exact", "method ... 'typ' ... did you mean 'type'"),
         ("ensemble.samples", 0, "ensemble.samples ... 0"),
         ("ensemble.samples", 2.5, "ensemble.samples ... whole number ... 2.5"),
         ("ensemble.keep", ["stregth"], "keep ... 'stregth' ... strength"),
@@ -112,9 +112,9 @@ def test_mistakes_are_named(tmp_path, path, value, words):
 def test_all_mistakes_come_at_once():
     study = changed("problem.solid.density", -1.0)
     study["ensemble"] = {"samples": -5, "sed": 1}
-    study["sweep"] = [{"method.wieghts": ["exact"]}]
+    study["sweep"] = [{"method.typ": ["exact"]}]
     del study["random"]["strength"]["spectrum"]
-    words = "solid.density ... ensemble.samples ... 'sed' ... strength.spectrum ... 'weights'"
+    words = "solid.density ... ensemble.samples ... 'sed' ... strength.spectrum ... 'type'"
     refuses(words, lambda: st.Study.from_dict(study))
 
 
@@ -125,7 +125,7 @@ def test_a_function_cannot_be_written_down(tmp_path):
     study = st.Study.from_dict(STUDY)
     own = st.Study(
         problem=study.problem,
-        random=st.RandomField(study.random.strength.marginal, bell),
+        random=st.RandomField(study.random.strength.marginal, st.CustomSpectrum(bell, 8e3)),
         method=study.method,
         ensemble=study.ensemble,
     )

@@ -122,7 +122,7 @@ def test_objects_and_functions_in_python():
             {
                 "random.strength.spectrum": [
                     base.random.strength.spectrum,
-                    lambda k: np.exp(-((k * 2e-3) ** 2)),
+                    st.CustomSpectrum(lambda k: np.exp(-((k * 2e-3) ** 2)), 4e3),
                 ]
             }
         ],

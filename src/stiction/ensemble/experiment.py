@@ -25,13 +25,10 @@ from stiction.random.stresses import (
     mean_in_stress,
     profiles_in_stress,
 )
-from stiction.random.synthesis import block_of
 from stiction.results import PROFILES, Variable, along
 
 AnyRandom: TypeAlias = RandomInterface | RandomField
 
-SLOW = 32
-"""Methods that solve fewer samples at once take so long that drawing does not matter."""
 MOST_NODES = 1 << 20
 """Nodes of all samples of planes that are solved at once: 8 MiB for each profile."""
 
@@ -137,8 +134,7 @@ class Experiment:
         Most of the strength below the residual strength is an `InputError`.
         """
         self.random.warn_if_inaccurate(self.problem.interface)
-        mean = mean_in_stress(self.problem, self.random, "strength")
-        self.problem.warn_of_units(mean)
+        self.problem.warn_of_units(mean_in_stress(self.problem, self.random, "strength"))
         check_residual(self.problem, self.random)
 
     def draws(self, first: int, count: int) -> Array:
@@ -157,18 +153,10 @@ class Experiment:
         return profiles_in_stress(self.problem, self.random, found)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
-        """Solve profiles by name, (samples, *shape) each.
+        """Solve profiles by name, (samples, *shape) each; a row for each sample.
 
-        Returns
-        -------
-        dict of arrays
-            What the method returns, one row a sample, and with a normal pressure the
-            `friction_coefficient`. A row does not depend on the other samples.
-
-        Raises
-        ------
-        InputError
-            If a sample does not fit the method.
+        A row does not depend on the other samples. A sample that does not fit the method is an
+        `InputError`.
         """
         # `check_fields` has warned of nodes of constant strength.
         accept = (*getattr(self.method, "accepts", ()), "constant")
@@ -191,11 +179,9 @@ class Experiment:
     def batch(self) -> int:
         """Samples to solve at once: as many as suit the method, and of planes the memory."""
         interface, size = self.problem.interface, int(self.method.chunk_size)
-        block = block_of(len(interface.shape))
-        if block == 1:
-            return max(1, min(size, MOST_NODES // interface.size))
-        # Draws come in blocks: a part of one costs as much as the whole, which fast methods feel.
-        return size if size < SLOW else max(size, block)
+        most = max(1, MOST_NODES // interface.size)
+        # Draws of a line come in blocks: a part of one costs as much as the whole.
+        return min(size, most) if interface.is_plane else size
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.

@@ -10,11 +10,10 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import pydantic
 import tomli_w
-import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from stiction.dynamics.save import Save
@@ -52,6 +51,9 @@ from stiction.study.sweep import (
     with_first_values,
 )
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 T = TypeVar("T")
 
 
@@ -71,14 +73,25 @@ def _interface(value: Any) -> Any:
     return as_random_interface(value) if isinstance(value, RandomField) else value
 
 
-if TYPE_CHECKING:  # a field alone is accepted and becomes an interface
-    AnyRandom: TypeAlias = RandomInterface | RandomField
-else:
-    AnyRandom = Annotated[RandomInterface, BeforeValidator(_interface)]
+AnyRandom: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
+"""A random interface; a field alone becomes one."""
 
 
 @model(kw_only=True)
-class Study:
+class _Parts:
+    """The parts of a point of a sweep, each valid by itself."""
+
+    problem: Problem
+    random: AnyRandom
+    method: AnyMethod
+    ensemble: Ensemble
+
+
+_PARTS = tuple(_Parts.__dataclass_fields__)
+
+
+@model(kw_only=True)
+class Study(_Parts):
     """Definition of a Monte Carlo study.
 
     The same names serve Python and TOML; a study read from the attributes of a result runs again
@@ -123,10 +136,6 @@ class Study:
     True
     """
 
-    problem: Problem
-    random: AnyRandom
-    method: AnyMethod
-    ensemble: Ensemble
     sweep: Sweep = ()
     save: Save | None = None
     title: Text = ""
@@ -306,13 +315,11 @@ class Study:
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """Return the study that produced a result."""
-        check("result", result, xr.Dataset)
-        if "study" not in result.attrs:
-            raise InputError(
-                "result: has no attribute 'study'; it is not the result of a study"
-            )
+        about = getattr(result, "attrs", {})
+        if "study" not in about:
+            raise InputError("result: must be a dataset with the attribute 'study'")
         try:
-            given = json.loads(result.attrs["study"])
+            given = json.loads(about["study"])
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"result: its attribute 'study' is not JSON: {error}") from None
         return cls.from_dict(given)
@@ -322,19 +329,6 @@ def _place(points: Sequence[Point]) -> str:
     """Return where a mistake is; nothing without a sweep."""
     more = f" and {len(points) - 1} more" if len(points) > 1 else ""
     return f", at {name_point(points[0])}{more} of the sweep" if points[0].values else ""
-
-
-@model(kw_only=True)
-class _Parts:
-    """The parts of a point of a sweep, each valid by itself."""
-
-    problem: Problem
-    random: AnyRandom
-    method: AnyMethod
-    ensemble: Ensemble
-
-
-_PARTS = tuple(_Parts.__dataclass_fields__)
 
 
 def study_schema() -> dict[str, Any]:
