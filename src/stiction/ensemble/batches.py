@@ -52,24 +52,13 @@ class Span(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """A sample that could not be solved.
+    """A sample that could not be solved."""
 
-    Attributes
-    ----------
-    point : int
-        Number of the point of a sweep; 0 without a sweep.
-    sample, seed : int
-    error : str
-        The message of the solver.
-    input : bool
-        Whether it was an `InputError`: the sample itself does not fit the method or the grid.
-    """
-
-    point: int
+    point: int  # of a sweep; 0 without one
     sample: int
     seed: int
-    error: str
-    input: bool = False
+    error: str  # the message of the solver
+    input: bool = False  # an `InputError`: the sample does not fit the method or the grid
 
     def __str__(self) -> str:
         where = f" of point {self.point}" if self.point else ""
@@ -162,10 +151,9 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
 def piece_size(
     experiment: Experiment, span: Span, pace: float | None, left: int, workers: int
 ) -> int:
-    """Return how many samples of `span` go into the next piece of work.
+    """Return how many samples of `span` go into the next piece of work, at a pace in s a sample.
 
-    A piece takes about `SECONDS` at a `pace` in seconds a sample. It is not more than a fair share
-    of the samples that are `left`, and bounded in bytes. The numbers do not depend on it.
+    It takes about `SECONDS`, is a fair share of the samples that are left, and bounded in bytes.
     """
     block = block_of(len(experiment.problem.interface.shape))
     size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, BLOCK)

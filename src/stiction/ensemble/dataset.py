@@ -47,19 +47,8 @@ def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
-    Parameters
-    ----------
-    points : sequence of Experiment
-        One for each point, in their order.
-    samples, first : int
-        Samples of each point.
-    only : sequence of str, optional
-        Names of the variables to gather; all if left out.
-
-    Attributes
-    ----------
-    done : (points, samples) array of bool
-        Which samples are there.
+    Of the variables, `only` those of these names are gathered. `done`, of shape (points, samples),
+    tells which samples are there.
     """
 
     def __init__(
@@ -113,11 +102,10 @@ class Gathered:
     def dataset(
         self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()
     ) -> xr.Dataset:
-        """Return everything as a dataset, in the order in which the method names it.
+        """Return everything as a dataset over the axes of a sweep, the samples and the nodes.
 
         Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
-        missing too, the attribute 'cut_short' gives the number that are done. The product of the
-        sizes of the `axes` is the number of points.
+        missing too, the attribute 'cut_short' gives the number that are done.
         """
         shape = tuple(axis.size for axis in axes)
         dims = tuple(axis.dim for axis in axes)

@@ -38,31 +38,15 @@ class Experiment:
     """A problem, what is random in it, and a method, checked together once.
 
     The numbers of sample i follow from the experiment and i alone, whoever computes them and in
-    whatever batches.
-
-    Parameters
-    ----------
-    problem : Problem
-    random : RandomInterface or RandomField
-        What is random; a field alone is the peak strength, Pa. Friction coefficients are turned
-        into stresses here if one pressure does that; otherwise `profiles` multiplies each node.
-    method : LocalCriterion, Equilibrium, Rupture or any other `Method`
-    keep : tuple of str
-        What is kept along the interface: random properties by name, and what the method adds. An
-        option of the method that is needed for it is switched on.
-    seed : int
-        Of the samples.
-
-    Raises
-    ------
-    InputError
-        Naming everything that does not fit.
+    whatever batches. An `InputError` lists everything that does not fit.
     """
 
     problem: Problem
-    random: Any  # a RandomInterface once it is made
+    random: Any  # a RandomInterface, or a RandomField that becomes one
     method: Any
-    keep: tuple[str, ...] = ()
+    keep: tuple[
+        str, ...
+    ] = ()  # along the interface; options of the method are switched on for it
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -48,19 +48,9 @@ class Chunk(NamedTuple):
 
 
 class Store:
-    """What is stored in a folder.
+    """What the folder of a run holds: samples of a study, which is given in plain form.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a run.
-    study : dict
-        The study whose samples it holds, in plain form.
-
-    Attributes
-    ----------
-    damage : dict of str
-        What is wrong with which chunk, by its name, as far as they were read.
+    `damage` gives what is wrong with which chunk, by its name, as far as they were read.
     """
 
     def __init__(self, path: Path, study: dict[str, Any]) -> None:
@@ -74,11 +64,7 @@ class Store:
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
         """Open a folder for writing: a new one, or one that holds the same study.
 
-        Raises
-        ------
-        StoreError
-            If the folder cannot be written, holds other files, or holds another study (the
-            differences are named).
+        It is a `StoreError` if the folder cannot be written, or holds other files or another study.
         """
         if path.exists() and not path.is_dir():
             raise StoreError(f"{path}: is a file; a run needs a folder")
@@ -109,10 +95,7 @@ class Store:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks that are what was written; what is wrong with others is in `damage`.
 
-        Raises
-        ------
-        StoreError
-            If something is there and cannot be read, so that damage cannot be ruled out.
+        What is there and cannot be read may be whole: a `StoreError`.
         """
         folder, self.damage = self.path / CHUNKS, {}
         try:
@@ -163,10 +146,7 @@ class Store:
     def add(self, tables: list[Table]) -> None:
         """Take tables, and store what was taken if it is time or it is large.
 
-        Raises
-        ------
-        StoreError
-            If it cannot be written; what was stored before stays readable.
+        If it cannot be written, a `StoreError`, what was stored before stays readable.
         """
         self._taken += tables
         now = time.monotonic()

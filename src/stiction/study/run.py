@@ -58,32 +58,17 @@ def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray
 
 @dataclass(frozen=True)
 class Status:
-    """State of a run.
+    """State of a run."""
 
-    Attributes
-    ----------
-    samples, done : int
-        Total of all points.
-    done_by_point : (points,) array
-    failures : tuple of Failure
-    damaged : tuple of str
-        Defect of each damaged chunk; running the study again repairs it.
-    chunks, bytes : int
-    seconds : float
-        Computing time of all workers together.
-    versions : tuple of str
-        Versions of the packages that computed the samples.
-    """
-
-    samples: int
+    samples: int  # of all points
     done: int
     done_by_point: NDArray[np.int64]
     failures: tuple[Failure, ...]
-    damaged: tuple[str, ...]
+    damaged: tuple[str, ...]  # defect of each damaged chunk; running the study again repairs it
     chunks: int
     bytes: int
-    seconds: float
-    versions: tuple[str, ...]
+    seconds: float  # of all workers together
+    versions: tuple[str, ...]  # of the packages that computed the samples
 
     __repr__ = brief
 
