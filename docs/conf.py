@@ -88,8 +88,8 @@ def scrape_figure(block, block_vars, gallery_conf):
     return figure_rst([path], gallery_conf["src_dir"])
 
 
-# The how-tos that README.md lists, with what the gallery wants of a script: a title that is marked.
-HOW_TOS = re.findall(r"examples/(\w+)\.py\)? \|", (HERE / "README.md").read_text("utf-8"))
+# The how-tos that README.md lists, with a title each.
+HOW_TOS = re.findall(r"\[([^\]]+)\]\(examples/(\w+)\.py\)", (ROOT / "README.md").read_text("utf-8"))
 SCRIPTS = ROOT / "build" / "how-to"
 sphinx_gallery_conf = {
     "examples_dirs": [str(SCRIPTS), "gallery"],
@@ -97,7 +97,7 @@ sphinx_gallery_conf = {
     "backreferences_dir": "api/backreferences",
     "doc_module": ("stiction",),
     "image_scrapers": ("matplotlib", scrape_figure),
-    "thumbnail_size": (480, 320),
+    "thumbnail_size": (800, 540),
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
@@ -114,10 +114,10 @@ def mark_titles():
         "GALLERY_HEADER.rst": "How-tos\n=======\n\nEach is a script of some twenty-five lines with a"
         " question, a printed answer and a picture, all made when\nthese pages are built.\n"
     }
-    for name in HOW_TOS:
-        text = (ROOT / "examples" / f"{name}.py").read_text("utf-8")
-        title, _, rest = text.removeprefix('"""').partition("\n")
-        texts[f"{name}.py"] = f'"""\n{title}\n{"=" * len(title)}\n{rest}'
+    for title, name in HOW_TOS:
+        title = title.removeprefix("a ").capitalize()
+        text = (ROOT / "examples" / f"{name}.py").read_text("utf-8").removeprefix('"""')
+        texts[f"{name}.py"] = f'"""\n{title}\n{"=" * len(title)}\n\n{text}'
     for path in SCRIPTS.glob("*.py"):
         if path.name not in texts:
             path.unlink()
@@ -144,7 +144,7 @@ html_theme_options = {
     ],
     "navbar_align": "left",
     "header_links_before_dropdown": 6,
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": {"**": ["page-toc"], "how-to/index": [], "pictures/index": []},
     "footer_start": ["copyright"],
     "footer_end": [],
 }

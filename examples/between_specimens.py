@@ -18,11 +18,11 @@ cases = {
 onsets = {}
 for name, random in cases.items():
     onsets[name] = st.monte_carlo(
-        problem, random, method=st.LocalCriterion(), samples=2000, seed=0, progress=False
+        problem, random, method=st.Equilibrium(), samples=500, seed=0, progress=False
     )
     stress = onsets[name].critical_stress
     design = st.design_stress(
-        problem, random, probability=1e-4, method=st.LocalCriterion(), target_cv=0.3
+        problem, random, probability=1e-4, method=st.Equilibrium(), target_cv=0.3
     )
     scatter = 100.0 * float(stress.std() / stress.mean())
     print(f"{name}: scatter {scatter:.1f} %, P = 1e-4 at {design.stress / 1e6:.3f} MPa")

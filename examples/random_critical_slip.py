@@ -9,7 +9,7 @@ import scipy.stats
 
 import stiction as st
 
-paper = st.paper.problem(nodes=1024)
+paper = st.paper.problem(nodes=2048)
 strength = st.paper.strength(paper, correlation_ratio=1.0)
 critical_slip, energy = 2e-6, 1.0  # m, J/m2
 

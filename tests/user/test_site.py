@@ -77,4 +77,4 @@ def test_tutorials_and_gallery_show_pictures(pages):
             counts[folder] += any(".png" in target for target in page.fetched)
     assert counts["tutorials"] >= 4
     assert counts["how-to"] >= 10
-    assert counts["pictures"] >= 14
+    assert counts["pictures"] >= 25

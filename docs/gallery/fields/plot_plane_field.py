@@ -13,6 +13,6 @@ problem = st.Problem(
     friction=st.LinearWeakening(weakening_rate=0.5e12),
 )
 strength = st.RandomField(
-    st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3), anisotropy=3.0
+    st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(3e-3), mean_mode=True, anisotropy=3.0
 )
 st.plot.field(problem, strength.sample(problem.interface, seed=2))

@@ -7,7 +7,7 @@ The lower bound of the strength from 25 synthetic tests, and the peaks that it p
 
 import stiction as st
 
-problem = st.paper.problem(nodes=256)
+problem = st.paper.problem(nodes=512)
 strength = st.paper.strength(problem)
 method = st.LocalCriterion()
 peaks = st.monte_carlo(problem, strength, method=method, samples=25, seed=7).critical_stress

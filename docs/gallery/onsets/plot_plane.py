@@ -16,6 +16,7 @@ problem = st.Problem(
 strength = st.RandomField(
     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
     spectrum=st.PowerLawSpectrum(correlation_length=3e-3),
+    mean_mode=True,
 )
 tau_p = strength.sample(problem.interface, seed=0)
 local = st.onset(problem, tau_p, method=st.LocalCriterion())

@@ -1,0 +1,23 @@
+"""
+Precursors under an edge load
+=============================
+
+Slip at the critical load is preceded by arrested events where the load is concentrated.
+"""
+
+import dataclasses
+
+import numpy as np
+
+import stiction as st
+
+plain = st.paper.problem(nodes=512)
+problem = dataclasses.replace(
+    plain,
+    friction=st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3),
+    load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+)
+tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
+onset = st.onset(problem, tau_p, method=st.Equilibrium())
+loads = float(onset.critical_load[0]) * np.array([0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
+st.plot.equilibrium_path(st.equilibrium_path(problem, tau_p, loads))
