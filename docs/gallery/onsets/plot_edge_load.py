@@ -20,4 +20,4 @@ problem = dataclasses.replace(
 tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
 onset = st.onset(problem, tau_p, method=st.Equilibrium())
 loads = float(onset.critical_load[0]) * np.array([0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
-st.plot.equilibrium_path(st.equilibrium_path(problem, tau_p, loads))
+st.equilibrium_path(problem, tau_p, loads).slip.plot.line(x="x")
