@@ -151,10 +151,9 @@ class Recorder:
         self._record = np.empty((save.every, self._columns))
         self._frames: list[dict[str, Any]] = []
         self._steps: list[Floats] = []
-        self.variables = {name: along(interface, what) for name, what in FIELDS.items()}
-        self.variables |= STATIONS
-        for name, what in (SCALARS | STEPS).items():
-            self.variables[name] = per_area(interface, what)
+        over = {name: along(interface, what) for name, what in FIELDS.items()}
+        over |= SCALARS | STEPS | STATIONS
+        self.variables = {name: per_area(interface, what) for name, what in over.items()}
 
     def advance(self, state: State, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them; return (steps taken, why it returned)."""
@@ -189,8 +188,8 @@ class Recorder:
         interface, save = self.run.medium.interface, self.save
         names = ("time", *SCALARS, *save.fields)
         data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
-        if not self._frames:
-            data |= {name: np.empty((0, *interface.shape)) for name in save.fields}
+        shape = len(self._frames), *interface.shape  # also if there are none
+        data |= {name: data[name].reshape(shape) for name in save.fields}
         record = np.concatenate([np.empty((0, self._columns)), *self._steps])
         data |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
         self._frames, self._steps = [], []

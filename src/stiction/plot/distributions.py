@@ -43,10 +43,6 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
     InputError
         If a result lacks the quantity, or is swept over several parameters.
 
-    See Also
-    --------
-    stiction.monte_carlo, stiction.statistics.density
-
     Examples
     --------
     >>> import stiction as st

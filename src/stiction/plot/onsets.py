@@ -74,10 +74,6 @@ def onset(
     InputError
         If results, strength and problem do not fit together.
 
-    See Also
-    --------
-    stiction.onset
-
     Examples
     --------
     >>> import stiction as st
