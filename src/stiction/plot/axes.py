@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 
 from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.methods import methods
 from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
@@ -94,19 +95,14 @@ def named(results: Any) -> dict[str, xr.Dataset]:
     if not isinstance(results, Mapping):
         found: dict[str, Any] = {}
         for number, one in enumerate(results):
-            name = _method_of(one) or f"result {number}"
+            name = f"result {number}"
+            with suppress(AttributeError, KeyError, TypeError, ValueError):
+                name = methods()[json.loads(one.attrs["study"])["method"]["type"]].label
             found[f"{name}, result {number}" if name in found else name] = one
         results = found
     if not results:
         raise InputError("result: is empty; give one result or several")
     return dict(results)
-
-
-def _method_of(result: Any) -> str | None:
-    try:
-        return str(json.loads(result.attrs["study"])["method"]["type"])
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return None
 
 
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:

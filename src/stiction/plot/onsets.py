@@ -32,12 +32,6 @@ from stiction.profiles.placing import IN_GAP, MEASURED
 
 Array = NDArray[np.float64]
 
-_NAMES = {
-    "local_criterion": "local criterion",
-    "equilibrium": "equilibrium",
-    "rupture": "elastodynamic rupture",
-}
-
 
 def onset(
     result: xr.Dataset | Mapping[str, xr.Dataset] | list[xr.Dataset],
@@ -166,7 +160,7 @@ def _mark(
     place = np.atleast_1d(result["critical_position"].values[0]) * length
     load = float(result["critical_load"][0])
     own, unit = unit_for("Pa", load)
-    text = f"{_NAMES.get(name, name)}: {load * own:.4f} {unit}"
+    text = f"{name}: {load * own:.4f} {unit}"
     if "friction_coefficient" in result:
         text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
     text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
