@@ -111,11 +111,11 @@ def _best_shift(
 
 def _checked(record: Any) -> tuple[Array, Array, Array, str]:
     """Return times, values (times, gauges) and places of a record, SI, and its quantity."""
-    kind = str(getattr(record, "name", None))
-    if kind not in UNITS or "time" not in record.dims or "x" not in record.coords:
+    kind, dims = str(getattr(record, "name", None)), getattr(record, "dims", ())
+    if kind not in UNITS or "time" not in dims or "x" not in record.coords:
         raise InputError(
             f"measured: must be a DataArray named one of {', '.join(UNITS)}, over a dimension"
-            f" 'time' (s), with a coordinate 'x' (m); got {kind!r} over {', '.join(record.dims)}"
+            f" 'time' (s), with a coordinate 'x' (m); got {kind!r} over {', '.join(dims)}"
         )
     if "x" not in record.dims:
         record = record.expand_dims("x")
