@@ -31,4 +31,4 @@ print(
 )
 print(f"{slipping:.0f} % of the interface has slipped by then; it slides at", end=" ")
 print(f"{float(onset.critical_stress) / 1e6:.3f} MPa")
-path.slip[::4].plot.line(x="x")
+path.slip.assign_coords(load=loads.round(-3))[::4].plot.line(x="x")

@@ -14,4 +14,4 @@ tau_p = st.paper.strength(problem, correlation_ratio=0.25).sample(problem.interf
 onset = st.onset(problem, tau_p, method=st.Equilibrium())
 loads = float(onset.critical_load[0]) * np.array([0.9, 0.93, 0.96, 0.98, 0.99, 0.999])
 path = st.equilibrium_path(problem, tau_p, loads)
-path.slip.plot.line(x="x")
+path.slip.assign_coords(load=loads.round(-3)).plot.line(x="x")

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.methods import methods
 from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
@@ -97,7 +96,7 @@ def named(results: Any) -> dict[str, xr.Dataset]:
         for number, one in enumerate(results):
             name = f"result {number}"
             with suppress(AttributeError, KeyError, TypeError, ValueError):
-                name = methods()[json.loads(one.attrs["study"])["method"]["type"]].label
+                name = json.loads(one.attrs["study"])["method"]["type"].replace("_", " ")
             found[f"{name}, result {number}" if name in found else name] = one
         results = found
     if not results:

@@ -167,7 +167,7 @@ def _mark(
     text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
     axes.plot(
         *(place if interface.is_plane else (*place, load * factor)), linestyle="none",
-        marker=marker(number), markersize=8.0 - 2.5 * number, color=color(number + 1),
+        marker=marker(number), markersize=9.0 - 3.5 * number, color=color(number + 1),
         markeredgecolor="white", markeredgewidth=0.8, label=text,
     )  # fmt: skip
 
