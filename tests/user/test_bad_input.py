@@ -128,7 +128,9 @@ MISTAKES = {
     "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
         keep=("initial_stress",)
     ),
-    "sweep ... unknown 'type' ... valid: problem": lambda: make_study(sweep={"type": ["beta"]}),
+    "sweep ... unknown 'type' ... valid: problem": lambda: make_study(
+        sweep=[{"type": ["beta"]}]
+    ),
     "'strength' or 'z' ... 'tau'": lambda: make_strength().correlation(LINE, of="tau"),
     # Objects in the place of others
     "solid ... Solid ... 3": lambda: make_problem(solid=3),

@@ -177,16 +177,11 @@ MANY = [{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}]
         ([{"problem.solid.density": [1.0, "heavy"]}], "problem.solid.density ... 'heavy'"),
         (MANY, "1000000 points"),
         ("everything", "list of tables"),
-        ({LENGTH: [1e-3], "ensemble.seed": [1]}, "crosses them"),
+        ({LENGTH: [1e-3], "ensemble.seed": [1]}, "list of tables"),
     ],
 )
 def test_mistakes_are_named(axes, words):
     refuses(words, lambda: st.Study.from_dict(STUDY | {"sweep": axes}))
-
-
-def test_one_table_of_one_key_is_a_sweep():
-    study = st.Study.from_dict(STUDY | {"sweep": {LENGTH: [4e-3, 6e-3]}})
-    assert len(study.points) == 2
 
 
 def test_kept_profiles():

@@ -154,8 +154,8 @@ class Study(_Parts):
     @property
     def points(self) -> list[Point]:
         """The points of the sweep, in order; without a sweep, one point without values."""
-        keys = [key for axis in self.sweep for key in axis.keys]
-        steps = itertools.product(*(axis.steps for axis in self.sweep))
+        keys = [key for axis in self.sweep for key in axis]
+        steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
             Point(number, dict(zip(keys, itertools.chain(*one), strict=True)))
             for number, one in enumerate(steps)

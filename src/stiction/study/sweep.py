@@ -1,7 +1,6 @@
 """Sweeps: any key of a study takes several values; axes are crossed, keys of one axis zipped."""
 
 import dataclasses
-import json
 import math
 import numbers
 from collections.abc import Mapping, Sequence
@@ -48,11 +47,8 @@ _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
 }
 
 
-class Axis(NamedTuple):
-    """Keys that vary together, each with one value for each step."""
-
-    keys: tuple[str, ...]
-    steps: tuple[tuple[Any, ...], ...]
+Axis: TypeAlias = dict[str, list[Any]]
+"""Keys that vary together, each with one value for each step."""
 
 
 class Point(NamedTuple):
@@ -93,6 +89,7 @@ def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
 
 
 def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
+    """Return the values of a key; profiles in files are read."""
     if isinstance(given, Mapping):
         return _range(key, given)
     if isinstance(given, np.ndarray):
@@ -102,36 +99,31 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
             f"{key}: must be a list of values or a range such as {{start = 1e-3, stop = 4e-3,"
             f" count = 4}}, got {describe(given)}"
         )
-    return [_value(key, value, folder) for value in given]
-
-
-def _value(key: str, value: Any, folder: Path | None) -> Any:
-    """A value as it stands in TOML; a profile in a file is read."""
-    file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
-    if file and folder is not None and is_profile(key):
-        with prefixed(key):
-            value = profile_in_file(value, key, folder)
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    found = []
+    for value in given:
+        file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
+        if file and folder is not None and is_profile(key):
+            with prefixed(key):
+                value = profile_in_file(value, key, folder)
+        found.append(value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
+    return found
 
 
 def _axis(number: int, given: Any, folder: Path | None) -> Axis:
     where = f"[{number}]"
-    if isinstance(given, Axis):
-        return given
     if not isinstance(given, Mapping) or not given:
         raise InputError(
             f"{where}: must be a table of keys and their values, got {describe(given)}"
         )
     with prefixed(where, "."):
-        columns = {key: _values(key, values, folder) for key, values in _flat(given).items()}
-    lengths = {key: len(values) for key, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        named = ", ".join(f"{key} has {count}" for key, count in lengths.items())
+        axis = {key: _values(key, values, folder) for key, values in _flat(given).items()}
+    if len({len(values) for values in axis.values()}) > 1:
+        named = ", ".join(f"{key} has {len(values)}" for key, values in axis.items())
         raise InputError(
             f"{where}: keys of one table vary together and need as many values each ({named});"
             " to cross them, give each a [[sweep]] of its own"
         )
-    return Axis(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+    return axis
 
 
 def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -146,26 +138,24 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return result
 
 
-def _axes(given: Any, info: pydantic.ValidationInfo) -> tuple[Axis, ...]:
-    """Axes of a sweep from what was written: a list of tables, or one table of one key."""
+def size_of(axis: Axis) -> int:
+    """Return the number of steps of an axis."""
+    return len(next(iter(axis.values())))
+
+
+def _axes(given: Any, info: pydantic.ValidationInfo) -> list[Axis]:
+    """Return the axes of a sweep from what was written."""
     folder = (info.context or {}).get("folder")
-    if isinstance(given, Mapping):
-        if len(_flat(given)) > 1:
-            raise InputError(
-                "must be a list of tables: a [[sweep]] for each key crosses them, one [[sweep]]"
-                " with several keys varies them together"
-            )
-        given = [given]
     if not isinstance(given, list | tuple):
-        raise InputError(f"must be a list of tables, got {describe(given)}")
+        raise InputError(f"must be a list of tables, each a [[sweep]], got {describe(given)}")
     problems: list[str] = []
     axes: list[Axis] = []
     for number, table in enumerate(given):
         try:
-            axes.append(_axis(number, table, None if folder is None else Path(folder)))
+            axes.append(_axis(number, table, folder))
         except InputError as error:
             problems += error.problems
-    keys = [key for axis in axes for key in axis.keys]
+    keys = [key for axis in axes for key in axis]
     for key in sorted(keys):
         table = key.split(".")[0]
         if key in _FIXED:
@@ -176,23 +166,21 @@ def _axes(given: Any, info: pydantic.ValidationInfo) -> tuple[Axis, ...]:
             problems.append(f"{key}: is swept twice")
         inner = [other for other in keys if other.startswith(f"{key}.")]
         problems += [f"{other}: is part of {key}, which is swept too" for other in inner]
-    points = math.prod(len(axis.steps) for axis in axes)
+    points = math.prod(map(size_of, axes))
     if points > MOST_POINTS:
         problems.append(f"makes {points} points, at most {MOST_POINTS} are allowed")
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
-    return tuple(axes)
+    return axes
 
 
-def _plain_value(value: Any) -> Any:
-    return to_plain(value) if dataclasses.is_dataclass(value) else value
-
-
-def _plain_axes(axes: tuple[Axis, ...]) -> list[dict[str, list[Any]]]:
-    columns = [zip(axis.keys, zip(*axis.steps, strict=True), strict=True) for axis in axes]
+def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
     return [
-        {key: [_plain_value(value) for value in values] for key, values in axis}
-        for axis in columns
+        {
+            key: [to_plain(one) if dataclasses.is_dataclass(one) else one for one in values]
+            for key, values in axis.items()
+        }
+        for axis in axes
     ]
 
 
@@ -225,8 +213,8 @@ def with_first_values(given: dict[str, Any], folder: Path | None) -> dict[str, A
     except pydantic.ValidationError:
         return given
     for axis in axes:
-        for key, value in zip(axis.keys, axis.steps[0], strict=True):
-            given = _with_default(given, key.split("."), value)
+        for key, values in axis.items():
+            given = _with_default(given, key.split("."), values[0])
     return given
 
 
@@ -252,20 +240,18 @@ def _text(value: Any) -> str:
 
 
 def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
-    """The axes as dimensions of a result, named by the ends of their keys."""
-    keys = [key for axis in axes for key in axis.keys]
-    names = _short_names(keys, taken)
+    """Return the axes as dimensions of a result, named by the ends of their keys."""
+    names = _short_names([key for axis in axes for key in axis], taken)
     result = []
     for axis in axes:
-        dim = names[axis.keys[0]]
+        dim = names[next(iter(axis))]
         coordinates = {}
-        for i, key in enumerate(axis.keys):
-            values = _coordinate([step[i] for step in axis.steps])
-            parts = key.split(".")
-            unit = "1" if "correlation" in parts else _UNITS.get(parts[-1], "1")
-            unit = unit if values.dtype.kind in "if" else "1"
-            coordinates[names[key]] = (values, Variable(unit, key, (dim,)))
-        result.append(GridAxis(dim, len(axis.steps), coordinates))
+        for key, values in axis.items():
+            labels, parts = _coordinate(values), key.split(".")
+            number = labels.dtype.kind in "if" and "correlation" not in parts
+            unit = _UNITS.get(parts[-1], "1") if number else "1"
+            coordinates[names[key]] = (labels, Variable(unit, key, (dim,)))
+        result.append(GridAxis(dim, size_of(axis), coordinates))
     return result
 
 
@@ -288,8 +274,6 @@ def _coordinate(values: Sequence[Any]) -> np.ndarray[Any, Any]:
         whole = all(isinstance(value, numbers.Integral) for value in values)
         return np.array(values, dtype=np.int64 if whole else np.float64)
     texts = [value if isinstance(value, str) else _text(value) for value in values]
-    if len(set(texts)) < len(texts):  # two tables of one type: write them out
-        texts = [json.dumps(_plain_value(value)) for value in values]
-    if len(set(texts)) < len(texts):
+    if len(set(texts)) < len(texts):  # two tables of one type, say
         texts = [f"{number}: {text}" for number, text in enumerate(texts)]
     return np.array(texts, dtype=object)
