@@ -21,7 +21,7 @@ from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import CustomSpectrum, Share, Spectrum, lag_of_correlation
-from stiction.random.synthesis import block_of, standard_normal
+from stiction.random.synthesis import Stream, block_of
 
 FEWEST_LENGTHS = 8.0 * math.pi  # e-folding lengths that make a mean mode superfluous
 # What is worth a warning: a share of the variance, a negative correlation, an error of one.
@@ -110,7 +110,7 @@ class RandomField:
         modes = self.modes(interface)
         check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
         block = block_of(len(interface.shape))
-        return standard_normal(seed, 0, first, samples, modes.ranks, self.mean_mode, block)
+        return Stream(0, block, modes.ranks, self.mean_mode).draw(seed, first, samples)
 
     @checked
     def gaussian(self, interface: Interface, draws: Numbers) -> Array:

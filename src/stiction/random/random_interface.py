@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property, lru_cache, reduce
 from itertools import chain
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from stiction.random.conditioning import Conditioning
 from stiction.random.mapping import from_normal
 from stiction.random.marginals import AnyMarginal
 from stiction.random.random_field import RandomField
-from stiction.random.synthesis import BLOCK, block_of, standard_normal
+from stiction.random.synthesis import BLOCK, Stream, block_of
 from stiction.results import PROFILES
 
 NAMES = tuple(PROFILES)
@@ -63,17 +63,6 @@ def lower_factor(matrix: Array) -> Array:
         root = factor[j, j] = np.sqrt(pivot)
         factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
     return factor
-
-
-class Stream(NamedTuple):
-    """The draws of one property, or of a factor between specimens, among all draws of a sample."""
-
-    number: int  # of the stream of draws; never changes
-    block: int  # samples that share a generator
-    ranks: NDArray[np.int64]  # modes drawn, for the property and all that it is correlated with
-    mean_mode: bool  # whether the mean mode is drawn
-    columns: slice  # of the vector of all draws
-    own: NDArray[np.int64]  # of `columns`: modes of the property itself
 
 
 @model(kw_only=True)
@@ -220,12 +209,7 @@ class RandomInterface:
         """
         each = self.dimension(interface) + len(self.names) * interface.size
         check_memory("samples", 8.0 * samples * each)
-        parts = [
-            standard_normal(
-                seed, one.number, first, samples, one.ranks, one.mean_mode, one.block
-            )
-            for one in _layout(self, interface)
-        ]
+        parts = [stream.draw(seed, first, samples) for stream in _layout(self, interface)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
@@ -238,7 +222,7 @@ class RandomInterface:
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
             mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
-            own = np.ascontiguousarray(mixed[:, stream.own])
+            own = np.take(mixed, stream.own, axis=1)
             found[name] = from_normal(field.marginal, field.gaussian(interface, own))
         factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
         for (name, marginal), u in factors:

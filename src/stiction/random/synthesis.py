@@ -6,6 +6,8 @@ that a spectrum with more modes extends the same field. A sample of a plane has 
 modes that it has a generator, a block of its own.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,37 +22,36 @@ def block_of(dimensions: int) -> int:
     return BLOCK if dimensions == 1 else 1
 
 
-def standard_normal(
-    seed: int,
-    stream: int,
-    first: int,
-    samples: int,
-    ranks: NDArray[np.int64],
-    mean_mode: bool,
-    block: int = BLOCK,
-) -> Array:
-    """Draw samples `first`, `first` + 1, ... of a stream: (samples, dimension).
+class Stream(NamedTuple):
+    """The draws of one property, or of a factor between specimens, among all draws of a sample."""
 
-    A row has A, B of one mode after the other, of those of the given `ranks` (rising), with A_0
-    in front if `mean_mode`. `block` samples share a generator.
-    """
-    modes = int(ranks[-1]) if ranks.size else 0
-    kept: slice | NDArray[np.int64] = slice(2, None)
-    if mean_mode or ranks.size < modes:
-        kept = (2 * ranks[:, None] + np.arange(2)).ravel()
-        kept = np.concatenate(([0], kept)) if mean_mode else kept
-    draws = np.empty((samples, 2 * ranks.size + int(mean_mode)))
-    done = 0
-    while done < samples:
-        number, offset = divmod(first + done, block)
-        count = min(block - offset, samples - done)
-        place = (stream, number) if block == BLOCK else (stream, number, block)
-        key = np.random.SeedSequence(entropy=seed, spawn_key=place)
-        generator = np.random.Generator(np.random.PCG64DXSM(key))
-        rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of all modes
-        draws[done : done + count] = rows[kept, offset : offset + count].T
-        done += count
-    return draws
+    number: int  # of the stream; never changes
+    block: int  # samples that share a generator
+    ranks: NDArray[np.int64]  # modes drawn, rising
+    mean_mode: bool  # whether the mean mode is drawn
+    columns: slice = slice(None)  # of the vector of all draws
+    own: Any = None  # of `columns`: modes of the property itself
+
+    def draw(self, seed: int, first: int, samples: int) -> Array:
+        """Draw samples `first`, `first` + 1, ...: A, B of one mode after the other, A_0 first."""
+        ranks, block = self.ranks, self.block
+        modes = int(ranks[-1]) if ranks.size else 0
+        kept: slice | NDArray[np.int64] = slice(2, None)
+        if self.mean_mode or ranks.size < modes:
+            kept = (2 * ranks[:, None] + np.arange(2)).ravel()
+            kept = np.concatenate(([0], kept)) if self.mean_mode else kept
+        draws = np.empty((samples, 2 * ranks.size + int(self.mean_mode)))
+        done = 0
+        while done < samples:
+            number, offset = divmod(first + done, block)
+            count = min(block - offset, samples - done)
+            place = (self.number, number, block)[: 2 if block == BLOCK else 3]
+            key = np.random.SeedSequence(entropy=seed, spawn_key=place)
+            generator = np.random.Generator(np.random.PCG64DXSM(key))
+            rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of all modes
+            draws[done : done + count] = rows[kept, offset : offset + count].T
+            done += count
+        return draws
 
 
 @jit
