@@ -242,16 +242,6 @@ def test_intervals_are_cut(interval, limits, cut):
     assert bootstrap.cut(interval, limits, 2.5) == cut
 
 
-@pytest.mark.parametrize(("name", "side"), [("marginal.low", -1.0), ("marginal.high", 1.0)])
-def test_bounds_stay_on_their_side_of_the_mean(name, side):
-    values = {"mean": 1.0, "marginal.low": 0.6, "marginal.high": 1.6}
-    scale = bootstrap.Scale(name)
-    at = scale.to(values)
-    assert scale.back(at, values) == pytest.approx(values[name])
-    for step in (-3.0, 3.0):
-        assert side * (scale.back(at + step, values) - values["mean"]) > 0.0
-
-
 def test_a_field_of_coefficients_says_so():
     """Taken for a strength of 0.3 Pa, everything that it is used in would be wrong."""
     mu = st.RandomField(st.Lognormal(mean=0.3, cv=0.2), st.ExponentialSpectrum(1e-3))

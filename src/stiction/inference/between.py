@@ -20,10 +20,7 @@ LARGEST = 9.0
 
 
 def variances_within(field: RandomField, windows: Sequence[Window]) -> Array:
-    """Return the variances that logarithms of record means have from the field alone.
-
-    From samples of the field on interfaces twice as long as each record.
-    """
+    """Return the variances that logarithms of record means have from samples of the field alone."""
     known: dict[Window, float] = {}
     for window in dict.fromkeys(windows):
         shape: Any = tuple(2 * n for n in window.shape)

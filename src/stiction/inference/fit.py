@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -294,10 +294,20 @@ def fit_field(
     p_values["spectrum"] = _p_value("roughness", *repeated[0])
     done = sum(len(one.fits) for one in repeated)
     points = sum(record.values.size for record in records)
+    parameters = dict(found.parameters)
+    ends = intervals(repeated, confidence, np.concatenate(rows))
+    if between:
+        within = variances_within(found.field(quantity), windows)
+        parameters["between"], ends["between"], width = scatter_between(
+            np.log(levels), within, confidence
+        )
+        for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
+            middle = parameters[name]
+            ends[name] = middle * math.exp(-width), middle * math.exp(width)
     fit = FieldFit(
         field=found.field(quantity),
-        parameters=found.parameters,
-        interval=intervals(repeated, confidence, np.concatenate(rows)),
+        parameters=parameters,
+        interval=ends,
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
         families=compared,
@@ -309,8 +319,6 @@ def fit_field(
         _estimate=found,
         _rows=rows,
     )
-    if between:
-        fit = _with_between(fit, levels)
     for doubt in fit.doubts:
         warn_accuracy(doubt)
     if interface is not None:
@@ -375,21 +383,6 @@ def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
     return (sum(getattr(one, name) >= own for one in fits) + 1) / (len(fits) + 1)
 
 
-def _with_between(fit: FieldFit, levels: Array) -> FieldFit:
-    """Add the scatter between records, and what it adds to the interval of the mean."""
-    within = variances_within(fit.field, fit._estimate.setting.windows)
-    cv, interval, width = scatter_between(np.log(levels), within, fit.confidence)
-    parameters = {**fit.parameters, "between": cv}
-    ends = {
-        name: (parameters[name] * math.exp(-width), parameters[name] * math.exp(width))
-        for name in ("mean", "marginal.mean")
-        if name in fit.interval
-    }
-    return replace(
-        fit, parameters=parameters, interval={**fit.interval, **ends, "between": interval}
-    )
-
-
 def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: int) -> list[str]:
     """Reasons not to trust a fit."""
     doubts = []
@@ -397,39 +390,34 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: in
     if held < ENOUGH_LENGTHS:
         doubts.append(
             f"the records hold {held:.2g} correlation lengths, too few for reliable intervals:"
-            f" at least {ENOUGH_LENGTHS:g} are needed; measure a longer profile, or several"
+            f" measure a longer profile, or several, of at least {ENOUGH_LENGTHS:g}"
         )
     left = max(_power_at_cutoff(found, window) for window in set(found.setting.windows))
     if left <= noise**2:
         doubts.append(
-            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field"
-            f" has {math.sqrt(left):.3g} left: the correlation length depends on the"
-            " family, not on the data"
+            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
+            f" {math.sqrt(left):.3g} left: the correlation length depends on the family"
         )
-    for name, value, end in found.setting.spectrum.ends_met(found.model):
-        doubts.append(
-            f"{name} {value:.3g} lies at the end of the searched range, {end:.3g}: the"
-            " data do not determine it; fix its value"
-        )
-    for name, p in p_values.items():
-        if p <= FAR:
-            doubts.append(
-                f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
-                " st.plot.fit"
-            )
+    doubts += [
+        f"{name} {value:.3g} lies at the end of the searched range, {end:.3g}: the data do not"
+        " determine it; fix its value"
+        for name, value, end in found.setting.spectrum.ends_met(found.model)
+    ]
+    doubts += [
+        f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
+        " st.plot.fit"
+        for name, p in p_values.items()
+        if p <= FAR
+    ]
     if done < asked:
         doubts.append(
-            f"intervals are from {done} of {asked} repetitions: the family could not be fitted to"
-            " the others"
+            f"intervals are from {done} of {asked} repetitions; the family does not fit the others"
         )
     return doubts
 
 
 def _power_at_cutoff(found: Estimate, window: Window) -> float:
-    """What is left of the field's power where it has fallen to a quarter, as the noise counts it.
-
-    The noise is white: each ordinate expects its variance, the taper being normalised.
-    """
+    """What is left of the field's power where it has fallen to a quarter, beside white noise."""
     model = found.model
     if model.noise_share <= 0.0:
         return math.inf

@@ -278,10 +278,9 @@ def _beta(
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Counts of values in bins, where a distribution function is needed, and what it gives.
+    """Counts of values in bins, where the distribution without noise is needed, and what it gives.
 
-    The probabilities of the bins are the differences of the distribution function of the values
-    without noise, convolved with that of the noise by a sum in steps of half its deviation or less.
+    Its convolution with that of the noise is a sum in steps of half a deviation or less.
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])

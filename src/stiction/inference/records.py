@@ -82,15 +82,13 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
         ) from None
     if interface is None:
         raise InputError(
-            f"an array of shape {array.shape} has no point spacing; give the interface,"
-            " or a DataArray over 'x' (m) such as st.read_profile returns"
+            f"an array of shape {array.shape} has no point spacing; give the interface, or a"
+            " DataArray over 'x' (m)"
         )
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):
-        raise InputError(
-            f"must have shape {shape} or (samples, {', '.join(map(str, shape))}) on this"
-            f" interface, got shape {array.shape}"
-        )
+        samples = f"(samples, {', '.join(map(str, shape))})"
+        raise InputError(f"must have shape {shape} or {samples}, got {array.shape}")
     return [Record(row, interface.spacings) for row in array.reshape(-1, *shape)]
 
 
@@ -108,9 +106,9 @@ def _spacing(x: Array, name: str) -> float:
     uneven = off.max() > 10.0 * UNEVEN or np.median(off) > UNEVEN
     if uneven or np.diff(np.round(place)).min() < 1:
         raise InputError(
-            f"{name} is not equally spaced: the mean spacing is {spacing:.6g} m, but the point at"
-            f" {x[off.argmax()]:.6g} m is off by {off.max():.2g} of it; first put the profile on"
-            " the nodes of an interface: st.read_profile(..., interface=..., interpolate=True)"
+            f"{name} is not equally spaced: the point at {x[off.argmax()]:.6g} m is off by"
+            f" {off.max():.2g} of the mean spacing, {spacing:.6g} m; first put the profile on the"
+            " nodes of an interface: st.read_profile(..., interface=..., interpolate=True)"
         )
     return spacing
 

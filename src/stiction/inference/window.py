@@ -43,10 +43,7 @@ class Window:
     """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
     Lags are 0, 1, ..., n - 1, -n, ..., -1 in each direction; (*half) is the shape of a real
-    transform. `basis` holds orthonormal polynomials of the trend, (points, terms), and
-    `white` the expected periodogram of white noise of unit variance. `weights` of wave
-    vectors are 1, a half where k and -k are both among them or k is its own opposite, and 0
-    for the mean.
+    transform.
     """
 
     def __init__(
@@ -58,7 +55,9 @@ class Window:
         self._lags = np.ix_(
             *[np.r_[:n, m - n : m] for n, m in zip(self.shape, self._period, strict=True)]
         )
-        self.basis = _polynomials(measured, degree)
+        self.basis = _polynomials(
+            measured, degree
+        )  # of the trend, orthonormal, (points, terms)
         tapers = np.ix_(*map(_taper, self.shape))
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
@@ -72,7 +71,8 @@ class Window:
         self._exact = np.stack([self._autocorrelation(wave) for wave in low])
         unit = np.zeros(lags)
         unit[(0,) * unit.ndim] = 1.0
-        self.white = self.expectation(unit)
+        self.white = self.expectation(unit)  # of white noise
+        # A half where k and -k are both there or k is its own opposite, and 0 for the mean.
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0
