@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import Flag, check, describe, is_finite, real_array
+from stiction.model import Flag, Numbers, Positive, Real, checked, describe
 from stiction.problem import Problem
 
 POINTS = 512
@@ -18,8 +18,9 @@ BATCH = 1 << 20
 HALVINGS = 30
 
 
+@checked
 def energy_release_rate(
-    problem: Problem, load: float, lengths: Any, *, centre: float = 0.0
+    problem: Problem, load: Real, lengths: Numbers, *, centre: Real = 0.0
 ) -> Array:
     """Return the static energy release rate at both tips of a crack, by Bueckner's weights.
 
@@ -63,25 +64,24 @@ def energy_release_rate(
     >>> bool(rate[1, 0] > rate[0, 0] > 0.0)  # J/m²
     True
     """
-    _check(problem, centre=centre, load=load)
-    period = problem.interface.extent
-    whole = np.atleast_1d(_numbers("lengths", lengths))
+    resting, profile = _stress_drops(problem)
+    whole, period = np.atleast_1d(lengths), problem.interface.extent
     if whole.ndim != 1 or not np.all((whole > 0.0) & (whole < period)):
         raise InputError(
             f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
         )
-    resting, profile = _stress_drops(problem)
     drops = (resting + load * profile)[None]
     return _release_rate(problem, _intensity_factors(problem, drops, whole, centre)[0])
 
 
+@checked
 def griffith_length(
     problem: Problem,
-    load: Any,
-    fracture_energy: float,
+    load: Numbers,
+    fracture_energy: Positive,
     *,
-    centre: float = 0.0,
-    arrest: bool = False,
+    centre: Real = 0.0,
+    arrest: Flag = False,
 ) -> Any:
     """Return the length at which a crack begins to run, or is arrested, by Griffith's criterion.
 
@@ -113,51 +113,35 @@ def griffith_length(
     -----
     Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
     """
-    _check(problem, centre=centre)
-    if not (is_finite(fracture_energy) and fracture_energy > 0.0):
-        given = describe(fracture_energy)
-        raise InputError(f"fracture_energy: must be a positive number (J/m²), got {given}")
-    check("arrest", arrest, Flag)
-    loads = _numbers("load", load)
-    if loads.ndim > 1 or not np.all(np.isfinite(loads)):
+    if load.ndim > 1 or not np.all(np.isfinite(load)):
         raise InputError(
-            f"load: must be a finite number or an array of them, got {describe(load)}"
+            f"load: must be a finite number or a list of them, got {describe(load)}"
         )
+    tau, drops = load.reshape(-1, 1, 1), _stress_drops(problem)
+
+    def runs(lengths: Array, tau: Array) -> Any:
+        resting, unit = _intensity_factors(problem, drops, lengths, centre)
+        rate = _release_rate(problem, resting + tau * unit)
+        return rate.min(axis=-1) > fracture_energy
+
     whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
-    drops = _stress_drops(problem)
-    resting, unit = _intensity_factors(problem, drops, whole, centre)
-    first = np.full(loads.size, -1)
-    for number, tau in enumerate(loads.ravel()):
-        above = _release_rate(problem, resting + tau * unit).min(axis=1) > fracture_energy
-        if above.any():
-            first[number] = begins = int(above.argmax())
-            if arrest:
-                falls = ~above[begins:]
-                first[number] = begins + int(falls.argmax()) if falls.any() else -1
-    found = np.full(loads.size, np.inf)
-    crosses = first >= 0
+    above = runs(whole, tau)
+    if arrest:
+        above = ~above & np.maximum.accumulate(above, axis=1)
+    crosses, first = above.any(axis=1), above.argmax(axis=1)
     low, high = np.append(0.0, whole)[first[crosses]], whole[first[crosses]]
-    tau = loads.ravel()[crosses, None]
     for _ in range(HALVINGS if crosses.any() else 0):
         middle = 0.5 * (low + high)
-        resting, unit = _intensity_factors(problem, drops, middle, centre)
-        above = _release_rate(problem, resting + tau * unit).min(axis=1) > fracture_energy
-        low, high = (
-            np.where(above == arrest, middle, low),
-            np.where(above == arrest, high, middle),
-        )
+        beyond = runs(middle, tau[crosses, 0]) != arrest
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    found = np.full(tau.size, np.inf)
     found[crosses] = high
-    return found if loads.ndim else float(found[0])
+    return found if load.ndim else float(found[0])
 
 
-def _check(problem: Any, **numbers: Any) -> None:
-    """Refuse what is no line, a residual strength that is not known, numbers not finite."""
-    check("problem", problem, Problem)
-    problems = [
-        f"{name}: must be a finite number, got {describe(value)}"
-        for name, value in numbers.items()
-        if not is_finite(value)
-    ]
+def _stress_drops(problem: Problem) -> Array:
+    """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
+    problems = []
     if problem.interface.is_plane:
         problems.append("problem: must have a line interface")
     if problem.friction.residual_ratio is not None:
@@ -167,17 +151,6 @@ def _check(problem: Any, **numbers: Any) -> None:
         )
     if problems:
         raise InputError(problems)
-
-
-def _numbers(name: str, given: Any) -> Array:
-    try:
-        return real_array(given)
-    except TypeError:
-        raise InputError(f"{name}: must be numbers, got {describe(given)}") from None
-
-
-def _stress_drops(problem: Problem) -> Array:
-    """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
     resting = np.asarray(problem.load.initial_stress - problem.friction.residual_strength)
     shape = problem.interface.shape
     return np.stack(
