@@ -83,7 +83,7 @@ def test_symbol_has_its_limits():
     [("II", ETAS["stress, nu = 0.33"]), ("II", ETAS["strain, nu = 0.49"]), ("III", 1.0)],
 )
 def test_short_sum_reaches_its_tolerance_on_times_it_never_saw(mode, eta):
-    kernel = kernel_sum(mode, eta, 1e-6, 1e5)
+    kernel = kernel_sum(mode, eta, 1e-6)
     rng = np.random.default_rng(123)
     times = np.concatenate([np.linspace(0.0, 60.0, 4001), 10.0 ** rng.uniform(-3, 5, 20_000)])
     error = np.abs(kernel(times) - memory_kernel(times, mode, eta)).max()
@@ -104,5 +104,3 @@ def test_a_looser_tolerance_needs_fewer_pairs():
 def test_impossible_tolerances_are_refused():
     with pytest.raises(InputError, match="tolerance"):
         fit_exponentials("II", 1.7, 1e-14)
-    with pytest.raises(InputError, match="t_max"):
-        fit_exponentials("II", 1.7, 1e-6, 1.0)

@@ -94,7 +94,7 @@ def test_no_wave_of_the_grid_grows_at_the_largest_step(ratio, lengths):
     for slot in range(1, grid.frequency.size, 3):
         share = grid.mode_two[slot]
         parts = np.where(np.arange(grid.poles.size) < grid.split, share, 1.0 - share)
-        kernel = ExponentialSum(grid.poles, parts * grid.weights, 0.0, 0.0)
+        kernel = ExponentialSum(grid.poles, parts * grid.weights, 0.0)
         static = share * static_stiffness("II", eta) + 1.0 - share
         step = amplification(grid.frequency[slot] * medium.largest_step, kernel, static)
         assert np.abs(np.linalg.eigvals(step)).max() < 1.0 + 1.1e-5

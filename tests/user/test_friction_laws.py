@@ -133,26 +133,27 @@ def test_law_in_a_study_file(tmp_path, with_law, make_strength, law):
     refuses(words, lambda: st.Study.from_toml(path))
 
 
-class OwnParameters(NamedTuple):
-    initial_slope: float = 1.0
+def parameters_of(shape, slope=1.0):
+    """Parameters of a type of their own, for which f and its slope are registered."""
 
+    class Parameters(NamedTuple):
+        initial_slope: float = slope
 
-register(OwnParameters, lambda law, u: (np.exp(-u), np.exp(-u)))
+    register(Parameters, shape)
+    return Parameters()
 
 
 @model
 class OwnLaw(FrictionLaw):
     """Exponential weakening, as somebody else would write it."""
 
+    parameters = parameters_of(lambda law, u: (np.exp(-u), np.exp(-u)))
+
     def area(self, u):
         return 1.0 - np.exp(-np.asarray(u))
 
     def slip_at(self, fraction):
         return -np.log(fraction) if fraction > 0.0 else np.inf
-
-    @property
-    def parameters(self):
-        return OwnParameters()
 
 
 @pytest.mark.slow  # its functions are compiled anew
@@ -185,31 +186,8 @@ def test_law_without_a_compiled_strength_is_refused(with_law, tau_p):
         FrictionLaw(weakening_rate=0.5e12)
 
 
-class HumpParameters(NamedTuple):
-    initial_slope: float = 1.0
-
-
-class LateParameters(NamedTuple):
-    initial_slope: float = 1.0
-
-
-class SteeperParameters(NamedTuple):
-    initial_slope: float = 2.0
-
-
-class PlateauParameters(NamedTuple):
-    initial_slope: float = 1.0
-
-
 class ShapelessParameters(NamedTuple):
     scale: float = 1.0
-
-
-register(HumpParameters, lambda law, u: (np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0]), 1.0))
-register(LateParameters, lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)))
-register(SteeperParameters, lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)))
-register(PlateauParameters, lambda law, u: _plateau(u))
-register(ShapelessParameters, lambda law, u: _plateau(u))
 
 
 def _plateau(u):
@@ -221,9 +199,12 @@ def _plateau(u):
     return (3.0 * (1.0 - u), 3.0) if u < 1.0 else (0.0, 0.0)
 
 
+register(ShapelessParameters, lambda law, u: _plateau(u))
+
+
 @model
 class Plateau(FrictionLaw):
-    parameters = PlateauParameters()
+    parameters = parameters_of(lambda law, u: _plateau(u))
 
     def area(self, u):
         u = np.minimum(np.asarray(u, dtype=float), 1.0)
@@ -276,7 +257,9 @@ def test_a_plateau_is_followed_and_its_later_slope_counts(with_law, tau_p):
 class Hump(OwnLaw):
     """Rises by a tenth before it falls: no method of the package can follow it."""
 
-    parameters = HumpParameters()
+    parameters = parameters_of(
+        lambda law, u: (np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0]), 1.0)
+    )
 
     def slip_at(self, fraction):
         return 1.0 - 0.8 * fraction / 1.1
@@ -284,14 +267,14 @@ class Hump(OwnLaw):
 
 @model
 class Late(OwnLaw):
-    parameters = LateParameters()
+    parameters = parameters_of(lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)))
 
 
 @model
 class Steeper(OwnLaw):
     """Its slope is not that of its f."""
 
-    parameters = SteeperParameters()
+    parameters = parameters_of(lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), slope=2.0)
 
 
 @pytest.mark.parametrize(
@@ -299,8 +282,8 @@ class Steeper(OwnLaw):
     [
         (Hump, "Hump: strength must not rise with slip, as beyond u = 0"),
         (Late, "Late: f(0) must be 1, got 0.5"),
-        (Instant, "Instant: slip_at(0) must be positive ... got 0"),
-        (Shorter, "Shorter: f(slip_at(0)) must be 0, got 0.3"),
+        (Instant, "Instant: slip_at(0), or ... must be positive and finite, got 0"),
+        (Shorter, "Shorter: f(slip_at(0)) is 0, but 0.3 by its f"),
         (Shapeless, "Shapeless: its parameters need a field initial_slope"),
         (Steeper, "Steeper: initial_slope is 2, but 1 by its f ... Steeper: -f'(0.568) is"),
     ],

@@ -206,5 +206,4 @@ def _mixed(
         np.concatenate([in_plane.poles, anti_plane.poles]),
         np.concatenate([share * in_plane.weights, (1.0 - share) * anti_plane.weights]),
         max(in_plane.error, anti_plane.error),
-        min(in_plane.t_max, anti_plane.t_max),
     )

@@ -28,11 +28,13 @@ logger = logging.getLogger("stiction")
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
+T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; beyond, the sum decays
 MAX_WEIGHT = 10.0
 MAX_PAIRS = 60
 ROUNDS = 14
-_DAMPING = 0.3  # every pole decays at least like exp(-0.3 T / T_max)
-# Decay over T_max that balanced truncation is told of, in the order tried: seen to be good starts
+_DAMPING = 0.3
+_FLOOR = _DAMPING / T_MAX  # every pole decays at least as fast
+# Decay over T_MAX that balanced truncation is told of, in the order tried: seen to be good starts
 # for polishing at loose and at tight tolerances.
 _LOOSE, _TIGHT = (10.0, 1.0), (1.0, 0.3)
 _FORMAT = 2  # raise when the fit or the file layout changes, so that old files are left alone
@@ -43,26 +45,25 @@ class ExponentialSum:
     """Poles and weights of a validated fit, and what was found when it was validated.
 
     `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the
-    largest |C - sum| found on 0 <= T = |k| c_s t <= t_max.
+    largest |C - sum| found on 0 <= T = |k| c_s t <= T_MAX.
     """
 
     poles: Complex
     weights: Complex
     error: float
-    t_max: float
 
     def __call__(self, time: Floats) -> Floats:
         """The sum at the dimensionless times T."""
         return exponential_sum(time, self.poles, self.weights)
 
 
-def sample_times(t_max: float, per_decade: int, cluster: int, seed: int) -> Floats:
-    """Times on [0, t_max]: dense where the kernel is fresh, random phases at every later scale."""
+def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
+    """Times on [0, T_MAX]: dense where the kernel is fresh, random phases at every later scale."""
     rng = np.random.default_rng(seed)
-    scale = np.geomspace(0.3, t_max, max(2, round(per_decade * np.log10(t_max / 0.3))))
+    scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
-    times = np.concatenate([np.linspace(0.0, 8.0, 8 * per_decade + 1), late.ravel(), [t_max]])
-    return np.unique(np.minimum(times, t_max))
+    times = np.concatenate([np.linspace(0.0, 8.0, 8 * per_decade + 1), late.ravel(), [T_MAX]])
+    return np.unique(np.minimum(times, T_MAX))
 
 
 def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
@@ -96,12 +97,12 @@ def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
 class _Polish:
     """Separable least squares: the poles move by Levenberg-Marquardt, the weights follow."""
 
-    def __init__(self, times: Floats, values: Floats, floor: float) -> None:
-        self.times, self.values, self.floor = times, values, floor
+    def __init__(self, times: Floats, values: Floats) -> None:
+        self.times, self.values = times, values
 
     def poles(self, parameters: Floats) -> Complex:
         real, imaginary = np.split(parameters, 2)
-        return -np.exp(real) - self.floor + 1j * imaginary
+        return -np.exp(real) - _FLOOR + 1j * imaginary
 
     def project(
         self, poles: Complex, emphasis: Floats
@@ -120,7 +121,7 @@ class _Polish:
 
     def run(self, poles: Complex, emphasis: Floats, iterations: int) -> tuple[Complex, Complex]:
         parameters = np.concatenate(
-            [np.log(np.maximum(-poles.real - self.floor, 1e-9)), poles.imag]
+            [np.log(np.maximum(-poles.real - _FLOOR, 1e-9)), poles.imag]
         )
         modes, q, weights, residual = self.project(self.poles(parameters), emphasis)
         cost, damping = float(residual @ residual), 1e-3
@@ -161,7 +162,7 @@ def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
     """The best fit with so many pairs, by repeated polishing with the error levelled."""
-    shift = fit.floor * decay / _DAMPING
+    shift = _FLOOR * decay / _DAMPING
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
     emphasis = np.ones(fit.times.size)
     poles, weights = fit.run(poles, emphasis, 60)
@@ -179,9 +180,7 @@ def _attempt(
     return kept
 
 
-def fit_exponentials(
-    mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
-) -> ExponentialSum:
+def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     """Return the shortest sum of exponentials found whose validated error is below the tolerance.
 
     Parameters
@@ -191,29 +190,22 @@ def fit_exponentials(
         c_d / c_s (1); not used in mode III.
     tolerance : float
         Allowed error of C(T), absolute (1), between 1e-9 and 1e-2; C(0) = G*/G.
-    t_max : float
-        The error holds on 0 <= T <= t_max (1), between 10 and 1e8; beyond, the sum decays.
 
     Raises
     ------
     InputError
-        If the options are out of range or no sum of up to 60 pairs reaches the tolerance.
+        If the tolerance is out of range or no sum of up to 60 pairs reaches it.
     """
-    for name, value, low, high in (
-        ("tolerance", tolerance, 1e-9, 1e-2),
-        ("t_max", t_max, 10, 1e8),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"kernel {name}: must lie in [{low:g}, {high:g}], got {value!r}")
+    if not 1e-9 <= tolerance <= 1e-2:
+        raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
     arcs = arc_quadrature(mode, eta)
-    fit_times = sample_times(t_max, 40 if tolerance > 3e-8 else 80, 8, seed=0)
-    fit = _Polish(fit_times, exponential_sum(fit_times, *arcs), _DAMPING / t_max)
-    check_times = sample_times(t_max, 150, 12, seed=1)
+    fit_times = _sample_times(40 if tolerance > 3e-8 else 80, 8, seed=0)
+    fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
+    check_times = _sample_times(150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
     # Where the search begins: seen to be just below what is needed, for every Poisson's ratio.
-    digits, decades = -np.log10(tolerance), (np.log10(t_max) + 1.0) / 6.0
-    expected = 1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7
-    pairs = max(3, round(expected * decades))
+    digits = -np.log10(tolerance)
+    pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
     starts = _LOOSE if tolerance > 1e-7 else _TIGHT
     with one_blas_thread():  # the matrices are small: more threads only wait for each other
         for count, decay in itertools.product(range(pairs, MAX_PAIRS + 1), starts):
@@ -221,34 +213,26 @@ def fit_exponentials(
             error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())
             if error < tolerance and _acceptable(poles, weights):
                 order = np.argsort(-poles.real)
-                return ExponentialSum(poles[order], weights[order], error, t_max)
+                return ExponentialSum(poles[order], weights[order], error)
     raise InputError(
-        f"kernel tolerance: {tolerance!r} on [0, {t_max:g}] was not reached with {MAX_PAIRS}"
-        f" pairs of exponentials (mode {mode}, c_d/c_s = {eta:.6g}); use a larger tolerance"
+        f"kernel tolerance: {tolerance!r} was not reached with {MAX_PAIRS} pairs of exponentials"
+        f" (mode {mode}, c_d/c_s = {eta:.6g}); use a larger tolerance"
     )
 
 
-def kernel_sum(
-    mode: str, eta: float, tolerance: float = 1e-6, t_max: float = 1e5
-) -> ExponentialSum:
+@cache
+def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum:
     """Return the validated sum of exponentials, from memory, from disk, or built now (about 1 s).
 
     Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel
     at once both succeed: each writes aside and renames.
     """
-    return stored_kernel(
-        mode, 1.0 if mode == "III" else float(eta), float(tolerance), float(t_max)
-    )
-
-
-@cache
-def stored_kernel(mode: str, eta: float, tolerance: float, t_max: float) -> ExponentialSum:
-    """Return the same for arguments in one form, and keep it in memory."""
-    text = f"{_FORMAT} {mode} {eta.hex()} {tolerance.hex()} {t_max.hex()}"
+    eta = 1.0 if mode == "III" else float(eta)
+    text = f"{_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     path = cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
     kernel = _read(path)
     if kernel is None:
-        kernel = fit_exponentials(mode, eta, tolerance, t_max)
+        kernel = fit_exponentials(mode, eta, tolerance)
         try:
             write_arrays(path, vars(kernel))
         except StoreError as error:
@@ -260,7 +244,7 @@ def _read(path: Path) -> ExponentialSum | None:
     try:
         data = read_arrays(path)
         poles, weights = data["poles"], data["weights"]
-        kernel = ExponentialSum(poles, weights, float(data["error"]), float(data["t_max"]))
+        kernel = ExponentialSum(poles, weights, float(data["error"]))
         whole = poles.dtype == weights.dtype == np.complex128 and poles.shape == weights.shape
         return kernel if whole and poles.ndim == 1 and np.all(poles.real < 0.0) else None
     except (*UNREADABLE, TypeError):

@@ -8,15 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    TypeAlias,
-    Union,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, Union
 
 import numpy as np
 from pydantic import (
@@ -40,8 +32,6 @@ NEARLY_RESIDUAL = 0.01
 """Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
 SLIPS = 4097
 """Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
-
-
 _VALID = {
     **dict.fromkeys(SCALES, (lambda value: value > 0.0, "be positive everywhere")),
     "residual_strength": (lambda value: value >= 0.0, "not be negative"),
@@ -70,19 +60,19 @@ class FrictionLaw(ABC):
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
         problems = []
-        for name, (valid, words) in _VALID.items():
-            value = getattr(self, name)
-            if value is None or is_unplaced(value):  # a profile is checked once it is placed
-                continue
-            wrong = np.ravel(value)[~valid(np.ravel(value))]
-            if wrong.size:
-                problems.append(f"{name} must {words}, got {wrong.min():g}")
-        given = [name for name in SCALES if getattr(self, name) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "none"
+        values = {name: getattr(self, name) for name in _VALID}
+        given = [name for name in values if values[name] is not None]
+        for name in given:
+            if not is_unplaced(values[name]):  # a profile is checked once it is placed
+                (valid, words), value = _VALID[name], np.ravel(values[name])
+                if not valid(value).all():
+                    problems.append(f"{name} must {words}, got {value[~valid(value)].min():g}")
+        scales = [name for name in SCALES if name in given]
+        if len(scales) != 1:
+            found = " and ".join(scales) or "none"
             problems.append(f"give one of {', '.join(SCALES)}, got {found}")
         residual = self.residual_strength
-        if self.residual_ratio is not None and (is_unplaced(residual) or np.any(residual)):
+        if "residual_ratio" in given and (is_unplaced(residual) or np.any(residual)):
             problems.append("give either residual_strength or residual_ratio, got both")
         if problems:
             raise InputError(problems)
@@ -99,10 +89,7 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def slip_at(self, fraction: float) -> float:
-        """Return u at which f has fallen to a fraction in [0, 1]; infinite if it never does.
-
-        On a plateau any u of it will do.
-        """
+        """Return a u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) at slips u in units of d_c, any shape."""
@@ -229,9 +216,8 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The parameters are those of `LinearWeakening`. W is the weakening rate at zero slip, d_c the
-    slip at which 1/e of tau_p - tau_r is left, and Gamma = (tau_p - tau_r) d_c. The residual
-    strength is approached and never reached.
+    The parameters are those of `LinearWeakening`; W is the rate at zero slip, d_c the slip at which
+    1/e of tau_p - tau_r is left, and Gamma = (tau_p - tau_r) d_c.
 
     Examples
     --------
@@ -316,7 +302,6 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def _pieces(self) -> tuple[Array, Array]:
-        """-f' of each piece, and the area under it."""
         u, f = self.corners
         return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
 
@@ -354,16 +339,11 @@ class PiecewiseWeakening(FrictionLaw):
     @classmethod
     @checked
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
-        """Approximate another law by so many linear `pieces`, at least 2.
+        """Approximate another law by a number of linear `pieces`, at least 2.
 
-        Corners lie on the law at equal steps of strength. If the law never reaches its
-        residual, the last piece is so long that it dissipates as much as the rest of the law.
-
-        Returns
-        -------
-        PiecewiseWeakening
-            With the residual strength of `law`; its first piece is a chord, less steep than the law
-            at zero slip (by 1/(2 pieces) of an exponential one).
+        Corners lie on the law at equal steps of strength, so that the first piece is less steep
+        than the law at zero slip (by 1/(2 pieces) of an exponential one). If the law never reaches
+        its residual strength, the last piece dissipates as much as the rest of the law.
 
         Raises
         ------
@@ -381,25 +361,21 @@ class PiecewiseWeakening(FrictionLaw):
         if problems := contradictions(law):
             raise InputError([f"law: {text}" for text in problems])
         fraction = 1.0 - np.arange(1, pieces + 1) / pieces
+        fraction[-1] = 0.0
         u = np.array([law.slip_at(float(f)) for f in fraction])
         if not np.isfinite(u[-1]):
-            rest = law.integral - float(law.area(u[-2]))
-            u[-1] = u[-2] + 2.0 * pieces * rest
-        fraction[-1] = 0.0
-        end = float(u[-1])
-        slip = u / end
-        slip[-1] = 1.0
+            u[-1] = u[-2] + 2.0 * pieces * (law.integral - float(law.area(u[-2])))
         chord = (1.0 - float(fraction[0])) / float(u[0])
         area = float(np.trapezoid(np.append(1.0, fraction), np.append(0.0, u)))
         factors = {
             "weakening_rate": chord / law.initial_slope,
-            "critical_slip": end,
+            "critical_slip": float(u[-1]),
             "fracture_energy": area / law.integral,
         }
         scale, value = law.scale
         return cls(
-            slip=tuple(map(float, slip)),
-            strength=tuple(map(float, fraction)),
+            slip=tuple((u / u[-1]).tolist()),
+            strength=tuple(fraction.tolist()),
             residual_strength=law.residual_strength,
             residual_ratio=law.residual_ratio,
             **{scale: factors[scale] * value},
@@ -425,8 +401,8 @@ def contradictions(law: FrictionLaw) -> list[str]:
     end, reach = law.slip_at(0.0), law.reach
     if not 0.0 < reach < np.inf:
         return [
-            f"{name}: slip_at(0) must be positive; it may be infinite if slip_at({NEARLY_RESIDUAL})"
-            f" is not; got {end:g} and {law.slip_at(NEARLY_RESIDUAL):g}"
+            f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
+            f" positive and finite, got {reach:g}"
         ]
     step, u = 1e-6 * reach, np.linspace(0.0, reach, SLIPS)
     f = law.fraction(u)
@@ -439,20 +415,16 @@ def contradictions(law: FrictionLaw) -> list[str]:
         f"area({reach:.3g})": (law.area(reach), np.trapezoid(f, u)),
     }
     for at in reach * np.array([0.1234, 0.5678]):
-        slope = SHAPES[type(parameters)](parameters, at)[1]
         fall = law.fraction(at) - law.fraction(at + step)
-        pairs[f"-f'({at:.3g})"] = (slope, fall / step)
+        pairs[f"-f'({at:.3g})"] = (SHAPES[type(parameters)](parameters, at)[1], fall / step)
+    for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
+        pairs[f"f(slip_at({share:g}))"] = (share, law.fraction(law.slip_at(share)))
     tolerance = 1e-3 * max(1.0, law.steepest_slope)
-    problems = [
+    return [
         f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its f"
         for what, (found, own) in pairs.items()
         if not abs(found - own) <= tolerance
     ]
-    for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
-        found = float(law.fraction(law.slip_at(share)))
-        if not abs(found - share) <= tolerance:
-            problems.append(f"{name}: f(slip_at({share:g})) must be {share:g}, got {found:.3g}")
-    return problems
 
 
 def _law(value: Any, handler: Any) -> Any:
