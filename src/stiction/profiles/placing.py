@@ -166,21 +166,29 @@ def _check_repeats(
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Linear between points; NaN beside points without a value, and in wide intervals."""
-    length = interface.extent
-    order = np.argsort(np.mod(x, length))
-    x = np.mod(x, length)[order]
-    width = np.diff(x, append=x[0] + length)
-    wide = width > WIDE * max(float(np.median(width)), interface.spacing)
-    # A point without a value inside a wide interval makes a gap of it.
-    at = np.concatenate([x, (x + 0.5 * width)[wide]])
-    empty = np.full((*values.shape[:-1], np.count_nonzero(wide)), np.nan)
-    rows = np.concatenate([values[..., order], empty], axis=-1)
+    """Linear between points, and NaN in intervals that are gaps."""
+    length, nodes = interface.extent, interface.x
+    margin = TOLERANCE * interface.spacing
+    x = np.mod(x, length)
+    order = np.argsort(x)
+    x = x[order]
+    typical = float(np.median(np.diff(x))) if x.size > 1 else length
+    widest = WIDE * max(typical, interface.spacing)
 
     def at_nodes(row: Array) -> Array:
-        return np.interp(interface.x, at, row, period=length)
+        known = np.flatnonzero(~np.isnan(row))
+        if known.size == 0:
+            raise InputError("has no value at all")
+        begin = x[known]
+        width = np.diff(begin, append=begin[0] + length)
+        is_gap = (width > widest) | (np.diff(known, append=known[0] + x.size) > 1)
+        interval = np.searchsorted(begin, nodes, side="right") - 1
+        into = np.mod(nodes - begin[interval], length)
+        inside = (into > margin) & (into < width[interval] - margin)
+        found = np.interp(nodes, begin, row[known], period=length)
+        return np.where(inside & is_gap[interval], np.nan, found)
 
-    return np.apply_along_axis(at_nodes, -1, rows)
+    return np.apply_along_axis(at_nodes, -1, values[..., order])
 
 
 def close_gaps(

@@ -236,27 +236,30 @@ def labelled(
         data, value = data.to_dataset(name=quantity), quantity
     dims = dims or (("x", "y") if _is_map(data) else ("x",))
     names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
-    wide = [name for name in names if table or data[name].ndim >= len(dims)]
-    if value is None:
-        others = [name for name in wide if _plain(name) not in (*PLACES, *dims)]
-        chosen = _choose(data, others, (quantity, *NAMES.get(quantity, ())), si)
-    else:
-        chosen = _column(data, names, "value", value)
+    words = (quantity, *NAMES.get(quantity, ()))
+    chosen = None if value is None else _column(data, names, "value", value)
     along = [name for name in data.variables if data[name].ndim == 1 and name != chosen]
     if len(dims) == 2:
         places = {_plain(name): name for name in along if _plain(name) in dims}
     else:
-        name = _choose(data, along, PLACES, "m" if table and si != "m" else "1")
-        if name is None and table and len(names) == 2 and names[0] != chosen:
-            name = names[0]
+        name = _choose(data, [name for name in along if name in data.dims], PLACES, "1")
+        name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "1")
+        if name is None and table and len(names) == 2 and _plain(names[0]) not in words:
+            name = names[0] if names[0] != chosen else None
         places = {} if name is None else {"x": name}
     if x is not None:
         places["x"] = _column(data, along, "x", x)
-    left = [name for name in wide if name not in places.values()]
+    left = [name for name in names if name not in places.values()]
+    left = [name for name in left if table or data[name].ndim >= len(dims)]
+    if chosen is None:
+        chosen = _choose(data, left, words, si)
     if chosen is None and len(left) == 1 and _UNNAMED.match(_plain(left[0])):
         chosen = left[0]
-    misplaced = table and len(places) < len(dims) and len(names) > 2 and value is None
-    if chosen is None or misplaced or (table and len(places) < len(dims) == 2):
+    rivals = [name for name in left if name != chosen and _plain(name) in PLACES]
+    unplaced = len(places) < len(dims) and (
+        len(dims) == 2 or (value is None and len(names) > 2)
+    )
+    if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
         raise InputError(_unclear(data, left, quantity))
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
@@ -336,7 +339,8 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     along = [dim for dim in (*dims, "row") if dim in array.dims]
     samples = [dim for dim in array.dims if dim not in along]
     one_each = not along and len(samples) == 1
-    if len(samples) > 1 or "y" in samples or not (one_each or along in ([*dims], ["row"])):
+    clear = one_each or along in ([*dims], ["row"])
+    if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
         raise InputError(
             f"which dimensions run along the interface is not clear from ({', '.join(names)}); call"
             " it 'x', on a plane 'x' (the direction of load and slip) and 'y', and another one"
