@@ -310,6 +310,7 @@ def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent, of):
     # at exponent 0.7 meets a density that is sharp at k = 0, and the line between two nodes.
     found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
     assert found == pytest.approx(0.05, rel=2e-3)
+    assert field.efolding_length(of="z") > field.efolding_length(of="strength")
 
 
 def test_truncated_correlation_is_the_sum_of_cosines():

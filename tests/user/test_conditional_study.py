@@ -8,6 +8,8 @@ from small_study import small_study
 
 import stiction as st
 
+OWN = st.Study.from_dict(small_study())
+FIELD, LINE = OWN.random.strength, OWN.problem.interface
 SWEEP = [
     {"random.strength.given.noise": [5e3, 20e3]},
     {"random.between.strength.cv": [0.05, 0.2]},
@@ -19,11 +21,9 @@ def study(tmp_path, monkeypatch):
     """The plain form of a study whose strength was scanned over a third, and has a factor."""
     monkeypatch.chdir(tmp_path)
     plain = small_study()
-    own = st.Study.from_dict(plain)
-    x = own.problem.interface.x[:40]
-    scan = own.random.strength.sample(own.problem.interface, seed=9)[0, :40]
+    scan = FIELD.sample(LINE, seed=9)[0, :40]
     header = "x (mm),strength (MPa)"
-    table = np.column_stack([x * 1e3, scan * 1e-6])
+    table = np.column_stack([LINE.x[:40] * 1e3, scan * 1e-6])
     np.savetxt("scan.csv", table, delimiter=",", header=header, comments="")
     plain["random"]["strength"]["given"] = {"profile": "scan.csv", "noise": 20e3}
     plain["random"]["between"] = {"strength": {"type": "lognormal", "mean": 1.0, "cv": 0.1}}
@@ -33,8 +33,7 @@ def study(tmp_path, monkeypatch):
 def test_a_study_file_is_the_same_as_the_calls(study):
     read = st.Study.from_dict(study, folder=".")
     result = read.run(progress=False)
-    field = st.Study.from_dict(small_study()).random.strength
-    given = field.given(st.read_profile("scan.csv"), noise=20e3)
+    given = FIELD.given(st.read_profile("scan.csv"), noise=20e3)
     random = st.RandomInterface(
         strength=given, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
     )
@@ -48,26 +47,24 @@ def test_a_study_file_is_the_same_as_the_calls(study):
 
 
 def test_measured_values_and_their_places_may_state_other_units():
-    field, x = st.Study.from_dict(small_study()).random.strength, np.array([0.01, 0.02, 0.03])
-    values = np.array([0.8e6, 0.9e6, 1.0e6])
-    plain = field.given(xr.DataArray(values, {"x": x}, "x"), noise=20e3)
+    x, values = np.array([0.01, 0.02, 0.03]), np.array([0.8e6, 0.9e6, 1.0e6])
+    plain = FIELD.given(xr.DataArray(values, {"x": x}, "x"), noise=20e3)
     places = ("x", x * 1e3, {"units": "mm"})
     stated = xr.DataArray(values * 1e-6, {"x": places}, "x", attrs={"units": "MPa"})
-    found = field.given(stated, noise=20e3).conditions.profile
+    found = FIELD.given(stated, noise=20e3).conditions.profile
     np.testing.assert_allclose(found, plain.conditions.profile, rtol=1e-15)
     with pytest.raises(st.InputError, match="state a known unit, not 'furlong'"):
-        field.given(stated.assign_attrs(units="furlong"), noise=20e3)
+        FIELD.given(stated.assign_attrs(units="furlong"), noise=20e3)
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_values_that_were_filled_in_were_not_measured(study):
-    own = st.Study.from_dict(small_study())
-    profile = own.random.strength.sample(own.problem.interface, seed=9)[0]
+    profile = FIELD.sample(LINE, seed=9)[0]
     profile[50:60] = np.nan
-    scan = xr.DataArray(profile, {"x": own.problem.interface.x}, "x")
-    filled = st.read_profile(scan, interface=own.problem.interface, gaps="fill")
+    scan = xr.DataArray(profile, {"x": LINE.x}, "x")
+    filled = st.read_profile(scan, interface=LINE, gaps="fill")
     assert not np.isnan(filled).any()
-    given = own.random.strength.given(filled, noise=20e3)
+    given = FIELD.given(filled, noise=20e3)
     assert given.conditions.values.size == profile.size - 10
 
 
@@ -118,28 +115,26 @@ def test_a_mistake_is_named(study, change, text):
 
 
 def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(study):
-    own = st.Study.from_dict(small_study())
-    field, line = own.random.strength, own.problem.interface
     known = st.read_profile("scan.csv")
     far = known.assign_coords(x=known.x + 0.09)
-    given = field.given(known, noise=20e3)
+    given = FIELD.given(known, noise=20e3)
     prior = {"marginal.low": (0.5e6, 0.65e6)}
     for words, call in {
-        "lies outside the marginal": lambda: field.given(3.0 * known, noise=1e3).sample(line),
-        "the interface is 0.1 m long": lambda: field.given(far, noise=1e3).sample(line),
+        "lies outside the marginal": lambda: FIELD.given(3.0 * known, noise=1e3).sample(LINE),
+        "the interface is 0.1 m long": lambda: FIELD.given(far, noise=1e3).sample(LINE),
         "the field already has one": lambda: given.given(known, noise=1e3),
-        "is conditioned on": lambda: st.theory.nucleation_statistics(own.problem, given),
+        "is conditioned on": lambda: st.theory.nucleation_statistics(OWN.problem, given),
         "conditioned on measured values": lambda: st.theory.rice_distribution(
-            own.problem, given
+            OWN.problem, given
         ),
         "strength is conditioned on one specimen": lambda: st.infer(
-            own.problem, given, [7e5, 7.1e5, 7.3e5], method=own.method, prior=prior
+            OWN.problem, given, [7e5, 7.1e5, 7.3e5], method=OWN.method, prior=prior
         ),
     }.items():
         refuses(words, call)
     rough = known.copy(data=known.values[np.random.default_rng(0).permutation(known.size)])
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
-        field.given(rough, noise=1e3).sample(line)
+        FIELD.given(rough, noise=1e3).sample(LINE)
 
 
 def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
@@ -157,15 +152,13 @@ def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
 
 
 def test_a_factor_may_carry_measured_values_beyond_the_marginal():
-    own = st.Study.from_dict(small_study())
-    field, line = own.random.strength, own.problem.interface
-    high = 1.5 * field.sample(line, seed=9)[0]
+    high = 1.5 * FIELD.sample(LINE, seed=9)[0]
     assert high.max() > 1.66e6 + 4.0 * 20e3
-    known = xr.DataArray(high, {"x": line.x}, "x")
+    known = xr.DataArray(high, {"x": LINE.x}, "x")
     random = st.RandomInterface(
-        strength=field.given(known, noise=20e3),
+        strength=FIELD.given(known, noise=20e3),
         between={"strength": st.Lognormal(mean=1.0, cv=0.3)},
     )
-    found = st.monte_carlo(own.problem, random, method=own.method, samples=50, seed=0)
-    exact = st.onset(own.problem, high, method=own.method).critical_stress.item()
+    found = st.monte_carlo(OWN.problem, random, method=OWN.method, samples=50, seed=0)
+    exact = st.onset(OWN.problem, high, method=OWN.method).critical_stress.item()
     assert found.critical_stress.mean() == pytest.approx(exact, rel=0.03)  # the scan's error
