@@ -47,15 +47,14 @@ class Standing:
 
 
 PLACES = {
-    "stress ... method ... target_cv ... confidence ... max_evaluations": {
-        "stress": "low", "method": st.LocalCriterion, "target_cv": 0.0, "confidence": 1.0,
+    "stress ... method ... target_cv ... max_evaluations": {
+        "stress": "low", "method": st.LocalCriterion, "target_cv": 0.0,
         "max_evaluations": 3,
     },
     "algorithm: must be ... 'subset' ... got 'subsets'": {"algorithm": "subsets"},
     "seed": {"seed": -1},
     "event": {"event": "collapse"},
     "target_cv": {"target_cv": "much"},
-    "confidence": {"confidence": [0.1]},
     "max_evaluations": {"max_evaluations": True},
     "workers": {"workers": 1.5},
     "stress": {"stress": np.nan},

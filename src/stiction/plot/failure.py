@@ -48,7 +48,7 @@ def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
         low, high = curve["probability_low"].values, curve["probability_high"].values
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
-        text = f"subset simulation, {100.0 * float(curve.attrs['confidence']):g} % interval"
+        text = "subset simulation, 95 % interval"
         axes.plot(x, probability, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
         axes.set_yscale("log")
         axes.set_ylim(0.5 * float(probability.min()), 1.0)

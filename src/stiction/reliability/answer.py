@@ -22,7 +22,6 @@ from stiction.reliability.tail import two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""
-Confidence: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
 
@@ -46,7 +45,7 @@ class Answer:
     probability : float
         Probability of an onset below `stress`.
     interval : tuple of float
-        Confidence interval of the result.
+        95 % confidence interval of the result.
     cv : float
         Coefficient of variation of the probability at `stress`: estimated standard error over the
         estimate; infinite without a failure, zero if exact.
@@ -58,8 +57,6 @@ class Answer:
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled).
     reason : str
         Reason for the choice of the algorithm.
-    confidence : float
-        Confidence level of `interval`.
     warnings : tuple of str
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
@@ -75,7 +72,6 @@ class Answer:
     lower_bound: float
     algorithm: str
     reason: str
-    confidence: float
     warnings: tuple[str, ...]
     normal_pressure: float
 
@@ -125,7 +121,7 @@ class FailureProbability(Answer):
     def __str__(self) -> str:
         low, high = self.interval
         return (
-            f"P = {self.probability:.3g} ({100 * self.confidence:g} %: {low:.3g} to {high:.3g},"
+            f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
             f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa{self._place};"
             f" {self.algorithm}, {self.evaluations} evaluations"
         )
@@ -138,7 +134,7 @@ class DesignStress(Answer):
     def __str__(self) -> str:
         low, high = self.interval
         return (
-            f"{self.stress / 1e6:.7g} MPa ({100 * self.confidence:g} %: {low / 1e6:.7g} to"
+            f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to"
             f" {high / 1e6:.7g}){self._place}, at P = {self.probability:g};"
             f" {self.algorithm}, {self.evaluations} evaluations"
         )

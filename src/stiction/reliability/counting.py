@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.ensemble.limit_state import LimitState
-from stiction.reliability.uncertainty import binomial_interval
+from stiction.reliability.uncertainty import CONFIDENCE, binomial_interval
 
 BATCH = 1024
 
@@ -43,7 +43,7 @@ class Count(NamedTuple):
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
-    def interval(self, confidence: float) -> tuple[float, float]:
+    def interval(self, confidence: float = CONFIDENCE) -> tuple[float, float]:
         """Return Clopper and Pearson's, or of a count until a failure the negative binomial one."""
         low, high = binomial_interval(self.failures, self.samples, confidence)
         if self.until_failure:

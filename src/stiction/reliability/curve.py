@@ -18,7 +18,6 @@ from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
 from stiction.reliability.answer import (
     Budget,
-    Confidence,
     DesignStress,
     Probability,
     TargetCv,
@@ -41,7 +40,7 @@ VARIABLES = {
         ("friction_coefficient", "1", "stress over the mean normal pressure"),
         ("probability", "1", "probability of an onset below the stress"),
         ("probability_low", "1", "lower end of the interval of the probability"),
-        ("probability_high", "1", "upper end of the interval of the probability"),
+        ("probability_high", "1", "upper end of the 95 % interval of the probability"),
         ("cv", "1", "coefficient of variation of the probability"),
         ("stress_low", "Pa", "lower end of the interval of the stress"),
         ("stress_high", "Pa", "upper end of the interval of the stress"),
@@ -59,7 +58,6 @@ def design_stress(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    confidence: Confidence = 0.95,
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
@@ -79,13 +77,13 @@ def design_stress(
         Coefficient of variation to reach, of the failure probability at the stress.
     problem, random, seed, workers, progress
         As in `monte_carlo`.
-    max_evaluations, confidence, event
+    max_evaluations, event
         As in `failure_probability`.
 
     Returns
     -------
     DesignStress
-        With `stress` and `interval`, Pa.
+        With `stress` and its 95 % `interval`, Pa.
 
     Raises
     ------
@@ -127,7 +125,7 @@ def design_stress(
                     " within the accuracy of the method: the stress at P ="
                     f" {probability:g} is the bound itself"
                 )
-            interval = tail.stress_interval(probability, cv, confidence, lowest)
+            interval = tail.stress_interval(probability, cv, lowest)
             doubts += imprecise(cv, target_cv, tail.spent)
             if tail.algorithm == "subset":
                 near = tail.repetitions[-1].around(stress)
@@ -138,7 +136,7 @@ def design_stress(
             doubts.append(tail.short_of(f"P = {probability:g}"))
     return DesignStress.of(
         state, stress=stress, probability=probability, cv=cv, interval=interval,
-        confidence=confidence, doubts=doubts, **tail.attributes,
+        doubts=doubts, **tail.attributes,
     )  # fmt: skip
 
 
@@ -153,7 +151,6 @@ def failure_curve(
     target_cv: TargetCv = 0.3,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    confidence: Confidence = 0.95,
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
@@ -172,7 +169,7 @@ def failure_curve(
         As in `monte_carlo`.
     method
         As in `design_stress`.
-    max_evaluations, confidence, event
+    max_evaluations, event
         As in `failure_probability`.
 
     Returns
@@ -226,8 +223,8 @@ def failure_curve(
     for chance in (COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)).tolist():
         stress = tail.quantile(chance)
         found, cv = tail.probability(stress), tail.cv(stress)
-        ends = lognormal_interval(found, cv, confidence)
-        sides = tail.stress_interval(chance, cv, confidence, lowest)
+        ends = lognormal_interval(found, cv)
+        sides = tail.stress_interval(chance, cv, lowest)
         rows.append((stress, stress - lowest, stress / pressure, found, *ends, cv, *sides))
     values: dict[str, Any] = dict(zip(VARIABLES, np.array(rows).T, strict=True))
     if not np.isfinite(pressure):
@@ -235,7 +232,6 @@ def failure_curve(
     attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
         "lower_bound": lowest,
         "event": event,
-        "confidence": confidence,
         "seed": seed,
         "evaluations": tail.spent,
         "method": method.type,

@@ -18,7 +18,6 @@ from stiction.random.random_interface import RandomInterface
 from stiction.random.stresses import mean_in_stress
 from stiction.reliability.answer import (
     Budget,
-    Confidence,
     FailureProbability,
     TargetCv,
     distinct,
@@ -60,7 +59,6 @@ def failure_probability(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    confidence: Confidence = 0.95,
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
@@ -93,8 +91,6 @@ def failure_probability(
         Largest number of samples to solve: by default 2,000,000 by the local criterion,
         200,000 by equilibrium, 1,000 by rupture. If they do not suffice, the result holds
         the estimate so far and a warning.
-    confidence : float
-        Confidence level of the interval.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become unstable,
         arrested or not. By the local criterion they are the same.
@@ -102,7 +98,7 @@ def failure_probability(
     Returns
     -------
     FailureProbability
-        With `probability`, `cv`, `interval`, `evaluations` and more.
+        With `probability`, `cv`, `interval` (95 %), `evaluations` and more.
 
     Raises
     ------
@@ -154,15 +150,15 @@ def failure_probability(
             chosen, reason, pilot = _choice(state, stress, algorithm, slow, budget)
             if chosen == "plain":
                 begun = 0 if pilot is None else pilot[1].size
-                found = _by_counting(state, stress, target_cv, budget, begun, confidence)
+                found = _by_counting(state, stress, target_cv, budget, begun)
                 found["reason"] = reason
             else:
                 tail = sample_tail(
                     state, algorithm=chosen, target_cv=target_cv, budget=budget,
                     stress=stress, reason=reason, pilot=pilot,
                 )  # fmt: skip
-                found = _by_tail(state, stress, tail, target_cv, confidence)
-    return FailureProbability.of(state, stress=stress, confidence=confidence, **found)
+                found = _by_tail(state, stress, tail, target_cv)
+    return FailureProbability.of(state, stress=stress, **found)
 
 
 def _certain(state: LimitState, stress: float) -> dict[str, Any]:
@@ -211,7 +207,6 @@ def _by_counting(
     target_cv: float,
     budget: int,
     start: int,
-    confidence: float,
 ) -> dict[str, Any]:
     """Return the attributes of an answer by plain Monte Carlo from sample `start` on."""
     seed = state.experiment.seed
@@ -236,21 +231,19 @@ def _by_counting(
         "algorithm": "plain",
         "probability": count.probability,
         "cv": count.cv,
-        "interval": count.interval(confidence),
+        "interval": count.interval(),
         "evaluations": spent,
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
 
 
-def _by_tail(
-    state: LimitState, stress: float, tail: Tail, target_cv: float, confidence: float
-) -> dict[str, Any]:
+def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> dict[str, Any]:
     """Return the attributes of an answer by subset simulation, by one level or two."""
     probability, cv, last = tail.probability(stress), tail.cv(stress), tail.repetitions[-1]
-    interval = lognormal_interval(probability, cv, confidence)
+    interval = lognormal_interval(probability, cv)
     if count := tail.counted(stress):
-        cv, interval = count.cv, count.interval(confidence)
+        cv, interval = count.cv, count.interval()
     doubts = imprecise(cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, last.rarest
@@ -268,7 +261,7 @@ def _by_tail(
         doubts += exact_doubts(state, last.around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
-        interval = 0.0, lognormal_interval(*there, confidence)[1]
+        interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
     draws, stresses = last.failing(stress)
     chosen = distinct(stresses, SHOWN, generator(state.experiment.seed, 2))

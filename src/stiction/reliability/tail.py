@@ -115,13 +115,13 @@ class Tail(NamedTuple):
         return high
 
     def stress_interval(
-        self, probability: float, cv: float, confidence: float, lowest: float
+        self, probability: float, cv: float, lowest: float
     ) -> tuple[float, float]:
         """Return stresses whose estimated probabilities bracket the requested one."""
         least, highest = self.extent
         if not math.isfinite(cv):
             return lowest, highest
-        width = min(log_width(cv, confidence), 700.0)
+        width = min(log_width(cv), 700.0)
         below = probability * math.exp(-width)
         seen = self.probability(float(np.nextafter(least, math.inf)))
         low = self.quantile(below) if below >= seen else lowest

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtrit
 
+CONFIDENCE = 0.95
+"""Confidence level of every interval."""
 
-def log_width(cv: float, confidence: float) -> float:
+
+def log_width(cv: float, confidence: float = CONFIDENCE) -> float:
     """Half the width of the interval of the logarithm of an estimate.
 
     The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
@@ -19,7 +22,9 @@ def log_width(cv: float, confidence: float) -> float:
     return float(stdtrit(freedom, 0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cv * cv))
 
 
-def lognormal_interval(probability: float, cv: float, confidence: float) -> tuple[float, float]:
+def lognormal_interval(
+    probability: float, cv: float, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
     """Interval of an estimate whose logarithm is about normal, within [0, 1]."""
     if not math.isfinite(cv):
         return 0.0, 1.0
@@ -28,7 +33,9 @@ def lognormal_interval(probability: float, cv: float, confidence: float) -> tupl
     return probability * math.exp(-width), min(1.0, high)
 
 
-def binomial_interval(failures: int, samples: int, confidence: float) -> tuple[float, float]:
+def binomial_interval(
+    failures: int, samples: int, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
     """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
     tail, held = 0.5 * (1.0 - confidence), samples - failures
     low = betaincinv(failures, held + 1, tail) if failures else 0.0
