@@ -75,24 +75,24 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
 
 
 def test_binomial_interval_has_its_coverage():
-    low, high = binomial_interval(7, 100, 0.95)
+    low, high = binomial_interval(7, 100)
     # By definition of Clopper and Pearson (1934).
     assert binom.sf(6, 100, low) == pytest.approx(0.025, rel=1e-9)
     assert binom.cdf(7, 100, high) == pytest.approx(0.025, rel=1e-9)
-    assert binomial_interval(0, 100, 0.95)[0] == 0.0
+    assert binomial_interval(0, 100)[0] == 0.0
     # The rule of three, two-sided: 1 - 0.025^(1/100).
-    assert binomial_interval(0, 100, 0.95)[1] == pytest.approx(1.0 - 0.025**0.01, rel=1e-9)
-    assert binomial_interval(100, 100, 0.95)[1] == 1.0
+    assert binomial_interval(0, 100)[1] == pytest.approx(1.0 - 0.025**0.01, rel=1e-9)
+    assert binomial_interval(100, 100)[1] == 1.0
 
 
 def test_lognormal_interval():
-    low, high = lognormal_interval(1e-6, 0.01, 0.95)
+    low, high = lognormal_interval(1e-6, 0.01)
     # Ten thousand families: the normal quantile, 1.96.
     assert math.log(high / low) == pytest.approx(2 * 1.96 * 0.01, rel=1e-3)
-    assert lognormal_interval(1e-6, math.inf, 0.95) == (0.0, 1.0)
-    assert lognormal_interval(0.9, 0.5, 0.95)[1] == 1.0
+    assert lognormal_interval(1e-6, math.inf) == (0.0, 1.0)
+    assert lognormal_interval(0.9, 0.5)[1] == 1.0
     # Few families: Student's quantile with ten degrees of freedom, 2.228.
-    low, high = lognormal_interval(1e-6, 1.0 / math.sqrt(11.0), 0.95)
+    low, high = lognormal_interval(1e-6, 1.0 / math.sqrt(11.0))
     width = 2 * 2.228 * math.sqrt(math.log1p(1.0 / 11.0))
     assert math.log(high / low) == pytest.approx(width, rel=1e-3)
 
@@ -144,7 +144,7 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     assert math.sqrt(np.mean(reported**2)) == pytest.approx(found.std(), rel=0.1)
     if most == 10**6:
         assert reported.max() <= target_cv
-    ends = [count.interval(0.95) for count, _ in counts]
+    ends = [count.interval() for count, _ in counts]
     inside = [low <= chance <= high for low, high in ends]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
@@ -153,10 +153,10 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
 
 def test_counting_until_a_failure_has_the_interval_of_the_negative_binomial_law():
     count = Count(5, 200, until_failure=True)
-    low, high = count.interval(0.9)
+    low, high = count.interval()
     # So many or fewer samples until the fifth failure; so many or more.
-    assert nbinom.cdf(195, 5, low) == pytest.approx(0.05)
-    assert nbinom.sf(194, 5, high) == pytest.approx(0.05)
+    assert nbinom.cdf(195, 5, low) == pytest.approx(0.025)
+    assert nbinom.sf(194, 5, high) == pytest.approx(0.025)
     assert count.probability == 4 / 199
 
 

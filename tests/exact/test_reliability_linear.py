@@ -110,7 +110,7 @@ def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
     tail = Tail(descents()[:10])
     chance, cv = norm.cdf(-4.0), 0.3
     low, high = tail.stress_interval(chance, cv, -9.0)
-    width = log_width(cv, 0.95)
+    width = log_width(cv)
     # Ten pooled runs step by some 1e-4 of the probability.
     assert tail.probability(low) == pytest.approx(chance * math.exp(-width), rel=0.01)
     assert tail.probability(high) == pytest.approx(chance * math.exp(width), rel=0.01)

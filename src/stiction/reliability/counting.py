@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.ensemble.limit_state import LimitState
-from stiction.reliability.uncertainty import CONFIDENCE, binomial_interval
+from stiction.reliability.uncertainty import binomial_interval
 
 BATCH = 1024
 
@@ -43,11 +43,11 @@ class Count(NamedTuple):
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
-    def interval(self, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    def interval(self) -> tuple[float, float]:
         """Return Clopper and Pearson's, or of a count until a failure the negative binomial one."""
-        low, high = binomial_interval(self.failures, self.samples, confidence)
+        low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
-            high = binomial_interval(self.failures - 1, self.samples - 1, confidence)[1]
+            high = binomial_interval(self.failures - 1, self.samples - 1)[1]
         return low, high
 
 

@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 """Confidence level of every interval."""
 
 
-def log_width(cv: float, confidence: float = CONFIDENCE) -> float:
+def log_width(cv: float) -> float:
     """Half the width of the interval of the logarithm of an estimate.
 
     The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
@@ -19,25 +19,21 @@ def log_width(cv: float, confidence: float = CONFIDENCE) -> float:
     if cv == 0.0:
         return 0.0
     freedom = max(1.0, 1.0 / (cv * cv) - 1.0)
-    return float(stdtrit(freedom, 0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(cv * cv))
+    return float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * math.sqrt(math.log1p(cv * cv))
 
 
-def lognormal_interval(
-    probability: float, cv: float, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
+def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
     """Interval of an estimate whose logarithm is about normal, within [0, 1]."""
     if not math.isfinite(cv):
         return 0.0, 1.0
-    width = log_width(cv, confidence)
+    width = log_width(cv)
     high = probability * math.exp(min(width, 700.0))
     return probability * math.exp(-width), min(1.0, high)
 
 
-def binomial_interval(
-    failures: int, samples: int, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
+def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
     """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
-    tail, held = 0.5 * (1.0 - confidence), samples - failures
+    tail, held = 0.5 * (1.0 - CONFIDENCE), samples - failures
     low = betaincinv(failures, held + 1, tail) if failures else 0.0
     high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
     return float(low), float(high)
