@@ -30,6 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
     import stiction as st
     from reproduction import claims, modulus, page, runner, statements_onset, statements_rupture
     from reproduction.runner import FULL, QUICK, USUAL
+    from reproduction.studies import jobs
 
     size = QUICK if options.quick else FULL if options.full else USUAL
     out = Path(options.out)
@@ -38,7 +39,7 @@ def main(arguments: list[str] | None = None) -> None:
     rows |= {"Which modulus": modulus.CLAIMS}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
-        with run.started(_jobs(size, options.figures)) as studies:
+        with run.started(_chosen(jobs(size), options.figures)) as studies:
             data = claims.Data(studies, size)
             images = _draw(run, data, options.figures, out / "figures")
             if options.figures:
@@ -81,11 +82,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _jobs(size, figures) -> list:
-    from reproduction import studies
-
+def _chosen(jobs, figures) -> list:
     wanted = {*BASIC, *(name for number in figures for name in NEEDS[number])}
-    jobs = studies.jobs(size)
     return [job for job in jobs if not figures or job[0].removesuffix("-inertia") in wanted]
 
 

@@ -279,31 +279,23 @@ def fit_field(
     name, fixed = spectrum
     family = SpectrumFamily(name, fixed, anisotropy, noise, (spacing, 2.0 * float(longest)))
     windows, rows = _windowed(records, detrend)
-    levels = np.array([row.mean() for row in rows])
-    if between:
-        if len(rows) < 2 or levels.min() <= 0.0:
-            raise InputError(
-                f"between: needs several records of positive mean, got {len(rows)} with means from"
-                f" {levels.min():g} to {levels.max():g}"
-            )
-        rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
+    levels = _levels(rows) if between else np.ones(len(rows))
+    rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
     found, compared = _best([Setting(windows, one, family) for one in marginal], rows)
     cores = usable_cores() if workers is None else workers
     repeated, asked = bootstrapped(found, bootstrap, confidence, seed, cores, progress)
-    p_values = {"marginal": _p_value("distance", *repeated[0])}
-    p_values["spectrum"] = _p_value("roughness", *repeated[0])
+    tests = {"marginal": "distance", "spectrum": "roughness"}
+    p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
     done = sum(len(one.fits) for one in repeated)
     points = sum(record.values.size for record in records)
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
         within = variances_within(found.field(quantity), windows)
-        parameters["between"], ends["between"], width = scatter_between(
-            np.log(levels), within, confidence
-        )
+        cv, ends["between"], width = scatter_between(np.log(levels), within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
-            middle = parameters[name]
-            ends[name] = middle * math.exp(-width), middle * math.exp(width)
+            ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
+        parameters["between"] = cv
     fit = FieldFit(
         field=found.field(quantity),
         parameters=parameters,
@@ -339,6 +331,17 @@ def _windowed(records: Sequence[Record], degree: int) -> tuple[tuple[Window, ...
         windows.append(made[key])
         rows.append(made[key].without_trend(values[measured]))
     return tuple(windows), rows
+
+
+def _levels(rows: Sequence[Array]) -> Array:
+    """Means of records of different specimens, (records,)."""
+    levels = np.array([row.mean() for row in rows])
+    if len(rows) < 2 or levels.min() <= 0.0:
+        raise InputError(
+            f"between: needs several records of positive mean, got {len(rows)} with means from"
+            f" {levels.min():g} to {levels.max():g}"
+        )
+    return levels
 
 
 def _best(
