@@ -108,10 +108,6 @@ def griffith_length(
     ------
     InputError
         As `energy_release_rate`, or if Gamma is not positive.
-
-    Notes
-    -----
-    Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
         raise InputError(
@@ -124,6 +120,7 @@ def griffith_length(
         rate = _release_rate(problem, resting + tau * unit)
         return rate.min(axis=-1) > fracture_energy
 
+    # Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
     whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
     above = runs(whole, tau)
     if arrest:
@@ -151,11 +148,10 @@ def _stress_drops(problem: Problem) -> Array:
         )
     if problems:
         raise InputError(problems)
-    resting = np.asarray(problem.load.initial_stress - problem.friction.residual_strength)
-    shape = problem.interface.shape
-    return np.stack(
-        [np.broadcast_to(given, shape) for given in (resting, problem.load_profile)]
-    )
+    resting = problem.load.initial_stress - problem.friction.residual_strength
+    drops = np.empty((2, problem.interface.size))
+    drops[0], drops[1] = resting, problem.load_profile
+    return drops
 
 
 def _intensity_factors(problem: Problem, drops: Array, whole: Array, centre: float) -> Array:

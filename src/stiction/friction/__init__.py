@@ -1,23 +1,10 @@
 """Friction laws: the laws themselves, and in `kernels.py` what compiled kernels take of them."""
 
-from stiction.friction.laws import (
-    SCALES,
-    ExponentialWeakening,
-    Friction,
-    FrictionLaw,
-    LinearWeakening,
-    PiecewiseWeakening,
-    contradictions,
-)
-from stiction.friction.parameters import register
-
-__all__ = [
-    "SCALES",
-    "ExponentialWeakening",
-    "Friction",
-    "FrictionLaw",
-    "LinearWeakening",
-    "PiecewiseWeakening",
-    "contradictions",
-    "register",
-]
+from stiction.friction.laws import SCALES as SCALES
+from stiction.friction.laws import ExponentialWeakening as ExponentialWeakening
+from stiction.friction.laws import Friction as Friction
+from stiction.friction.laws import FrictionLaw as FrictionLaw
+from stiction.friction.laws import LinearWeakening as LinearWeakening
+from stiction.friction.laws import PiecewiseWeakening as PiecewiseWeakening
+from stiction.friction.laws import contradictions as contradictions
+from stiction.friction.parameters import register as register

@@ -287,12 +287,11 @@ class PiecewiseWeakening(FrictionLaw):
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
             raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
-            words = (
-                "must fall at every corner, from below 1 to exactly 0 (the residual strength)"
+            hint = "; give a plateau a small fall, such as 0.5, 0.4999"
+            raise InputError(
+                "strength: must fall at every corner, from below 1 to exactly 0, got"
+                f" {self.strength}{hint if 0.0 in np.diff(strength) else ''}"
             )
-            flat = np.any(np.diff(strength) == 0.0)
-            hint = "; give a plateau a small fall, such as 0.5, 0.4999" if flat else ""
-            raise InputError(f"strength: {words}, got {self.strength}{hint}")
         return self
 
     @property
