@@ -42,7 +42,7 @@ _FORMAT = 2  # raise when the fit or the file layout changes, so that old files 
 
 @dataclasses.dataclass(frozen=True)
 class ExponentialSum:
-    """Poles and weights of a validated fit, and what was found when it was validated.
+    """Poles and weights of a fit, with the errors that its validation measured.
 
     `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the
     largest |C - sum| found on 0 <= T = |k| c_s t <= T_MAX.
@@ -58,7 +58,7 @@ class ExponentialSum:
 
 
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
-    """Times on [0, T_MAX]: dense where the kernel is fresh, random phases at every later scale."""
+    """Return times on [0, T_MAX]: dense at first, with random phases at every later scale."""
     rng = np.random.default_rng(seed)
     scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
@@ -150,7 +150,7 @@ class _Polish:
 
 
 def _acceptable(poles: Complex, weights: Complex) -> bool:
-    """No large weights, no growing poles, no pair of terms that nearly cancel."""
+    """Return whether no weight is large, no pole grows and no two terms nearly cancel."""
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
     gap = np.abs(poles[:, None] - poles[None, :]) / np.abs(poles)[:, None]
@@ -161,7 +161,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
-    """The best fit with so many pairs, by repeated polishing with the error levelled."""
+    """Return the best fit with this number of pairs, polished repeatedly with the error levelled."""
     shift = _FLOOR * decay / _DAMPING
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
     emphasis = np.ones(fit.times.size)
