@@ -161,7 +161,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
-    """Return the best fit with this number of pairs, polished repeatedly with the error levelled."""
+    """Return the best fit with this number of pairs; polishing levels its error."""
     shift = _FLOOR * decay / _DAMPING
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
     emphasis = np.ones(fit.times.size)
