@@ -112,22 +112,13 @@ def test_a_map_without_an_interface_keeps_its_coordinates(heights):
         np.testing.assert_allclose(found.x, PLANE.x, rtol=1e-8)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".nc", ".npy"])
-def test_a_study_file_reads_maps(tmp_path, ending):
-    path = tmp_path / f"map{ending}"
-    if ending == ".npy":
-        np.save(path, VALUES)
-    elif ending == ".nc":
-        MAP.transpose("y", "x").to_netcdf(path)
-    else:
-        text(path)
-    study = small_study(nodes=[32, 16], length=[0.02, 0.01])
-    pressure = (
-        {"file": path.name} if ending == ".npy" else {"file": path.name, "value": "strength"}
-    )
-    study["problem"]["load"] = {"normal_pressure": pressure}
-    study = st.Study.from_dict(study, folder=tmp_path)
-    np.testing.assert_allclose(study.problem.load.normal_pressure, VALUES, rtol=1e-8)
+def test_a_study_file_reads_maps(heights):
+    path, options = heights
+    study = small_study(nodes=[32, 16], length=[0.02, 0.01], method={"type": "equilibrium"})
+    slip = {"file": path.name} | (options or {"value": "z"})
+    study["problem"]["friction"] = {"critical_slip": slip}
+    found = st.Study.from_dict(study, folder=path.parent).problem.friction.critical_slip
+    np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
 
 
 def test_other_maps_are_refused(tmp_path):

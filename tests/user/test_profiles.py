@@ -199,6 +199,9 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
     refuses("strength is in m, which cannot be converted to Pa", lambda: onset(heights))
     table.write_text(table.read_text().replace("height (um)", "quality"))
     np.testing.assert_allclose(st.read_profile(table, interface=LINE), STRENGTH, rtol=1e-9)
+    table.write_text(text_of([X * 1e3, STRENGTH], head="Weg (mm);value"))
+    heights = st.read_profile(table, quantity="height", unit="um")
+    np.testing.assert_allclose(heights, 1e-6 * STRENGTH, rtol=1e-10)
     given = labelled().rename("tau")
     np.testing.assert_array_equal(st.read_profile(given, value="tau"), STRENGTH)
 
@@ -237,6 +240,7 @@ TEXTS = {
     "0;1\n0.05\n": "line 2 has 1 columns, line 1 has 2",
     "a;b;c\n1;2;3\n": "got 'a', 'b', 'c'",
     "x;tau;mu\n0;1\n": "line 1 names 3 columns",
+    "pos;distance;tau\n0;0;1\n": "'pos', 'distance' ... give x=..., value=",
     "x;tau (Volt)\n0;1\n": "unknown unit 'Volt'",
     "\n# nothing\n": "holds no numbers",
     "x;tau\n": "holds no numbers",

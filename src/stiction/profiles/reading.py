@@ -260,7 +260,7 @@ def labelled(
         len(dims) == 2 or (value is None and len(names) > 2)
     )
     if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
-        raise InputError(_unclear(data, left, quantity))
+        raise InputError(_unclear(data, names, quantity))
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
@@ -409,8 +409,3 @@ def quantity_of(key: str) -> str:
     """Return what the parameter of this name, or of this dotted key, holds."""
     field = key.rsplit(".", 1)[-1]
     return "load_profile" if field == "profile" else field
-
-
-def is_profile(key: str) -> bool:
-    """Whether a dotted key of a study takes a profile."""
-    return quantity_of(key) in QUANTITIES

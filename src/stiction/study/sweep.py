@@ -21,8 +21,8 @@ from stiction.model import (
     model,
     to_plain,
 )
-from stiction.profiles.reading import is_profile, profile_in_file
-from stiction.results import PROFILES, Variable
+from stiction.profiles.reading import profile_in_file, quantity_of
+from stiction.results import PROFILES, QUANTITIES, Variable
 
 MOST_POINTS = 100_000
 _FIXED = (
@@ -102,7 +102,7 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
     found = []
     for value in given:
         file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
-        if file and folder is not None and is_profile(key):
+        if file and folder is not None and quantity_of(key) in QUANTITIES:
             with prefixed(key):
                 value = profile_in_file(value, key, folder)
         found.append(value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
