@@ -302,8 +302,7 @@ def test_sliding_is_proved(problem, make_strength, high):
     plain = st.onset(problem, tau_p, method=Equilibrium())
     program = LineProgram(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
-    stiff = program.line.runs._replace(modulus=np.inf)
-    program.line = program.line._replace(runs=stiff)
+    program.runs = program.runs._replace(modulus=np.inf)
     rows = problem.sample(tau_p)
     _, states = program.first(rows, False)
     proved, events = plain.first_instability.values.copy(), np.zeros(200)

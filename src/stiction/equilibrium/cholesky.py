@@ -4,6 +4,7 @@ The rows of the factor lie one after the other in a flat array, each padded to a
 numbers: half the memory of a square, and no two rows compete for the same cache sets.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.elasticity.line import Stiffness, apply_stiffness
 from stiction.elasticity.linear import dot
-from stiction.jit import jit, jit_inside
+from stiction.jit import ZERO, jit, jit_inside
 from stiction.lanes import LANES, load, multiply_add, totals, zeros
 
 GROUP = 4
@@ -30,14 +31,13 @@ def row_start(row: int) -> int:
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
-@jit_inside
-def _solve_one(factor: Array, start: int, size: int) -> None:
-    """Forward substitution of one new row, in place."""
-    row = factor[start : start + size]
-    for k in range(size):
-        base = row_start(k)
-        known = factor[base : base + k + 1]
-        row[k] = (row[k] - dot(known, row, k)) / known[k]
+@jit
+def substitute(factor: Array, first: int, last: int, values: Array) -> None:
+    """Solve L x = values in place, in the order of the rows; those before `first` are solved."""
+    for r in range(first, last):
+        start = row_start(r)
+        row = factor[start : start + r + 1]
+        values[r] = (values[r] - dot(row, values, r)) / row[r]
 
 
 @jit_inside
@@ -123,29 +123,20 @@ def raise_diagonal(
         start = row_start(r)
         row = factor[start : start + r + 1]
         # The column that is rotated into the factor: zero below the entry that rises.
-        extra = np.sqrt(amount) if r == position else 0.0
+        extra = math.sqrt(amount) if r == position else 0.0
         for k in range(position, r):
             entry = row[k]
             row[k] = multiply_add(turns[1, k], extra, turns[0, k] * entry)
             extra = multiply_add(turns[0, k], extra, -turns[1, k] * entry)
-        pivot = np.sqrt(row[r] * row[r] + extra * extra)
+        pivot = math.sqrt(row[r] * row[r] + extra * extra)
         turns[0, r] = row[r] / pivot
         turns[1, r] = extra / pivot
         row[r] = pivot
 
 
 @jit
-def substitute(factor: Array, size: int, values: Array, forward: Array) -> None:
-    """Solve L forward = values, both in the order of the rows."""
-    for r in range(size):
-        start = row_start(r)
-        row = factor[start : start + r + 1]
-        forward[r] = (values[r] - dot(row, forward, r)) / row[r]
-
-
-@jit
-def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> None:
-    """Solve L^T solution = right, rows of L taken four at a time; `right` is used up."""
+def back_substitute(factor: Array, size: int, values: Array) -> None:
+    """Solve L^T x = values in place, rows of L taken four at a time."""
     i = size
     while i >= 4:
         i -= 4
@@ -157,27 +148,27 @@ def back_substitute(factor: Array, size: int, right: Array, solution: Array) -> 
         r1 = factor[s1 : s1 + i + 2]
         r2 = factor[s2 : s2 + i + 3]
         r3 = factor[s3 : s3 + i + 4]
-        z3 = right[i + 3] / r3[i + 3]
-        z2 = (right[i + 2] - z3 * r3[i + 2]) / r2[i + 2]
-        z1 = (right[i + 1] - z3 * r3[i + 1] - z2 * r2[i + 1]) / r1[i + 1]
-        z0 = (right[i] - z3 * r3[i] - z2 * r2[i] - z1 * r1[i]) / r0[i]
-        solution[i] = z0
-        solution[i + 1] = z1
-        solution[i + 2] = z2
-        solution[i + 3] = z3
+        z3 = values[i + 3] / r3[i + 3]
+        z2 = (values[i + 2] - z3 * r3[i + 2]) / r2[i + 2]
+        z1 = (values[i + 1] - z3 * r3[i + 1] - z2 * r2[i + 1]) / r1[i + 1]
+        z0 = (values[i] - z3 * r3[i] - z2 * r2[i] - z1 * r1[i]) / r0[i]
+        values[i] = z0
+        values[i + 1] = z1
+        values[i + 2] = z2
+        values[i + 3] = z3
         for t in range(i):
-            less = multiply_add(-z0, r0[t], right[t])
+            less = multiply_add(-z0, r0[t], values[t])
             less = multiply_add(-z1, r1[t], less)
             less = multiply_add(-z2, r2[t], less)
-            right[t] = multiply_add(-z3, r3[t], less)
+            values[t] = multiply_add(-z3, r3[t], less)
     while i > 0:
         i -= 1
         start = row_start(i)
         row = factor[start : start + i + 1]
-        z = right[i] / row[i]
-        solution[i] = z
+        z = values[i] / row[i]
+        values[i] = z
         for t in range(i):
-            right[t] = multiply_add(-z, row[t], right[t])
+            values[t] = multiply_add(-z, row[t], values[t])
 
 
 class Workspace(NamedTuple):
@@ -235,11 +226,13 @@ def append(workspace: Workspace, size: int, count: int) -> int:
             for t in range(size):
                 row[t] = coupling[abs(node - members[t])]
         if group == 1:
-            _solve_one(factor, row_start(size), size)
+            start = row_start(size)
+            substitute(factor, ZERO, size, factor[start : start + size])
         else:
             for r in range(group, GROUP):
                 start = row_start(size + r)
-                factor[start : start + size] = 0.0
+                for t in range(size):
+                    factor[start + t] = 0.0
             _solve_four(factor, size)
         for r in range(group):
             node = nodes[done + r]
@@ -254,7 +247,7 @@ def append(workspace: Workspace, size: int, count: int) -> int:
             members[size + r] = node
             if pivot <= PIVOT * diagonal[node]:
                 return size + r
-            row[size + r] = np.sqrt(pivot)
+            row[size + r] = math.sqrt(pivot)
         size += group
         done += group
     return size
@@ -266,9 +259,8 @@ def substitute_members(
 ) -> None:
     """Extend one of the forward substitutions by the members first..last-1."""
     for r in range(first, last):
-        start = row_start(r)
-        row = workspace.factor[start : start + r + 1]
-        forward[r] = (values[workspace.members[r]] - dot(row, forward, r)) / row[r]
+        forward[r] = values[workspace.members[r]]
+    substitute(workspace.factor, first, last, forward)
 
 
 @jit_inside
@@ -282,19 +274,9 @@ def multiply_members(workspace: Workspace, size: int, values: Array, result: Arr
 @jit_inside
 def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
     """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
-    right = workspace.vectors[0]
     for t in range(size):
-        right[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
-    back_substitute(workspace.factor, size, right, solution)
-
-
-@jit_inside
-def solve_first(workspace: Workspace, size: int, solution: Array) -> None:
-    """Solve for the right-hand side of the first of the forward substitutions alone."""
-    right = workspace.vectors[0]
-    for t in range(size):
-        right[t] = workspace.forward[0, t]
-    back_substitute(workspace.factor, size, right, solution)
+        solution[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
+    back_substitute(workspace.factor, size, solution)
 
 
 @jit_inside
@@ -304,13 +286,13 @@ def singular_direction(workspace: Workspace, size: int, direction: Array) -> Non
     It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
     which slip runs away.
     """
-    right = workspace.vectors[0]
     solution = workspace.vectors[1]
     start = row_start(size)
     for t in range(size):
-        right[t] = -workspace.factor[start + t]
-    back_substitute(workspace.factor, size, right, solution)
-    direction[:] = 0.0
+        solution[t] = -workspace.factor[start + t]
+    back_substitute(workspace.factor, size, solution)
+    for i in range(direction.shape[0]):
+        direction[i] = 0.0
     for t in range(size):
         direction[workspace.members[t]] = max(solution[t], 0.0)
     direction[workspace.members[size]] = 1.0

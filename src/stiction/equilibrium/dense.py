@@ -5,7 +5,6 @@ Where very many nodes slip the factor is slower than the transforms of planes, w
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,7 @@ from stiction.elasticity.line import (
 from stiction.elasticity.linear import dot
 from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
-from stiction.equilibrium.linear_program import (
-    SOLVED,
-    certificate,
-    solve_program,
-)
+from stiction.equilibrium.linear_program import SOLVED, certificate, solve_program
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import (
     ARRESTED,
@@ -36,12 +31,6 @@ from stiction.equilibrium.runaway import (
     unstoppable_length,
 )
 from stiction.equilibrium.sample import (
-    GAP,
-    LENGTH,
-    LOAD,
-    OUTCOME,
-    PATCHES,
-    POSITION,
     First,
     Jump,
     Program,
@@ -59,7 +48,6 @@ from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
 from stiction.equilibrium.transforms import Plane, plane_onset
 from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
 from stiction.errors import InputError
-from stiction.jit import jit, jit_inside
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
 
@@ -71,113 +59,6 @@ GAP_OF_MANY = 3e-10
 """Relative distance of the bounds by transforms."""
 MARGIN = 1.5
 """Safety on the length at which a rupture counts as unstoppable."""
-
-CORNER_REACHED = 3
-"""Outcome of a sample in which a corner of the law is reached before the first instability."""
-CROWDED = 4
-"""Outcome of a sample that is left to transforms."""
-
-
-class Line(NamedTuple):
-    """What is the same for all samples of a line.
-
-    `usual` is the window at the problem's uniform weakening rate, `usual_rate`, or NaN.
-    """
-
-    stiffness: Stiffness
-    runs: Runs
-    usual_rate: float
-    usual: Windows
-
-
-@jit_inside
-def judge(
-    sample: Sample,
-    line: Line,
-    first: First,
-    row: int,
-    slip: Array,
-    stiff: Array,
-    all_slips: bool,
-    workspace: Workspace,
-    work: Array,
-) -> None:
-    """Write what the programme of a sample says, and test quickly whether it runs away.
-
-    Its load and multiplier are in their places; `slip` is changed.
-    """
-    multiplier, n = first.multiplier[row], slip.shape[0]
-    gap = certificate(sample, slip, stiff, multiplier, workspace)
-    _, length, centre = main_patch(multiplier)
-    outcome = UNDECIDED
-    for i in range(n):
-        corner = sample.pieces.ends[0] * sample.critical[i]
-        if slip[i] > corner * (2.0 - sample.pieces.at_corner) and sample.critical[i] > 0.0:
-            outcome = CORNER_REACHED
-    if all_slips or outcome == UNDECIDED:
-        for i in range(n):
-            first.slip[row, i] = slip[i]
-    first.table[row, PATCHES] = count_patches(slip)
-    if outcome == UNDECIDED:
-        outcome = runs_away(
-            sample, line.runs, first.table[row, LOAD], slip, stiff, multiplier,
-            workspace.vectors[2], work,
-        )  # fmt: skip
-        if outcome == UNDECIDED:
-            for i in range(n):
-                first.stiff[row, i] = stiff[i]
-                first.ahead[row, i] = slip[i]
-    first.table[row, GAP] = gap
-    first.table[row, POSITION] = centre * line.runs.spacing
-    first.table[row, LENGTH] = length * line.runs.spacing
-    first.table[row, OUTCOME] = outcome
-
-
-@jit
-def solve_batch(
-    samples: Sample,
-    line: Line,
-    others: Windows,
-    all_slips: bool,
-    solved: bool,
-    first: First,
-    workspace: Workspace,
-    work: Array,
-) -> None:
-    """Solve the programme for each row and test quickly whether its instability is arrested.
-
-    `others` are the windows of samples with another weakening rate than the usual one anywhere;
-    `work` is (8, n) of work space. With `solved` load, slip, K d and multiplier are in their
-    places already.
-    """
-    count, n = samples.excess.shape
-    slip, stiff = work[6], work[7]
-    for row in range(count):
-        sample = row_of(samples, row)
-        multiplier = first.multiplier[row]
-        start = np.inf
-        for i in range(n):
-            workspace.diagonal[i] = line.stiffness.column[0] - sample.rate[i]
-            slip[i] = 0.0
-            if sample.rate[i] != line.usual_rate and sample.rate[i] != 0.0:
-                start = -np.inf
-        if solved:
-            for i in range(n):
-                slip[i], stiff[i] = first.slip[row, i], first.stiff[row, i]
-        else:
-            windows = line.usual if start == np.inf else others
-            bound = window_bound(sample, windows, work[0], multiplier)
-            weak = 0
-            for i in range(n):
-                weak += sample.excess[i] < bound * sample.profile[i]
-            if weak > MANY_NODES:
-                first.table[row, OUTCOME] = CROWDED
-                continue
-            # If it does not succeed, the certificate says so.
-            first.table[row, LOAD], _ = solve_program(
-                sample, start, bound, np.inf, multiplier, slip, stiff, workspace
-            )
-        judge(sample, line, first, row, slip, stiff, all_slips, workspace, work)
 
 
 class LineProgram(Program):
@@ -204,54 +85,49 @@ class LineProgram(Program):
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
         self.nodes = problem.interface.size // every
-        modulus = problem.effective_modulus
-        self.unit = np.pi * modulus / problem.interface.extent
+        self.modulus, self.extent = problem.effective_modulus, problem.interface.extent
+        self.unit = np.pi * self.modulus / self.extent
+        self.stiffness, self.runs = _stiffness_and_runs(self.nodes, self.extent, self.modulus)
         rate = problem.friction.weakening_rate
-        uniform = rate is not None and np.ptp(rate) == 0.0
-        usual = float(np.max(rate)) if uniform else np.nan
-        extent = problem.interface.extent
-        stiffness, runs = _stiffness_and_runs(self.nodes, extent, modulus)
-        self.line = Line(
-            stiffness,
-            runs,
-            usual,
-            exact_window(self.nodes, usual, self.unit) if uniform else _no_windows(),
-        )  # fmt: skip
+        self.usual_rate = np.nan if rate is None or np.ptp(rate) else float(np.max(rate))
+        self.usual = exact_window(self.nodes, self.usual_rate, self.unit)
 
-    def _windows(self, rates: Array) -> Windows:
-        """Windows for samples whose weakening rates (any shape, Pa/m) are not the usual one."""
-        moving = rates[rates > 0.0]
-        if moving.size == 0:
-            return _no_windows()
+    def _windows(self, rate: Array) -> Windows:
+        """Windows of a sample with these weakening rates, Pa/m; `usual` where all are."""
+        if np.all((rate == self.usual_rate) | (rate == 0.0)):
+            return self.usual
+        moving = rate[rate > 0.0]
         return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
-
-    def _is_usual(self, sample: Sample) -> bool:
-        return bool(np.all((sample.rate == self.line.usual_rate) | (sample.rate == 0.0)))
 
     def bound(self, sample: Sample) -> tuple[float, Array]:
         """Return the discrete local bound of one sample (Pa), and its multiplier."""
-        windows = self.line.usual if self._is_usual(sample) else self._windows(sample.rate)
-        multiplier = np.empty(self.nodes)
-        load = window_bound(sample, windows, np.empty(self.nodes), multiplier)
-        return load, multiplier
+        work, multiplier = np.empty((2, self.nodes))
+        return window_bound(sample, self._windows(sample.rate), work, multiplier), multiplier
 
     def programme(
-        self, sample: Sample, cap: float = np.inf, state: State | None = None
+        self,
+        sample: Sample,
+        cap: float = np.inf,
+        state: State | None = None,
+        windows: Windows | None = None,
+        workspace: Workspace | None = None,
     ) -> State | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
         Only the first piece of its law counts: `excess` and `rate`. The state is an equilibrium at
         a lower load, if one is known.
         """
-        bound, multiplier = self.bound(sample)
+        windows = windows or self._windows(sample.rate)
+        multiplier, slip, stiff = np.zeros((3, self.nodes))
+        bound = window_bound(sample, windows, stiff, multiplier)
         weak = np.count_nonzero(sample.excess < bound * sample.profile)
         if cap == np.inf and weak > MANY_NODES:
             found = self._by_transforms(sample, state)
             if found is not None:
                 return found
-        workspace = self._workspace(sample)
-        stiff = np.empty(self.nodes)
-        start, slip = np.inf if self._is_usual(sample) else -np.inf, np.zeros(self.nodes)
+        workspace = workspace or make_workspace(self.stiffness)
+        workspace.diagonal[:] = self.stiffness.column[0] - sample.rate
+        start = np.inf if windows is self.usual else -np.inf
         if state is not None:
             start, slip = state.load, state.slip.copy()
         load, status = solve_program(
@@ -261,7 +137,7 @@ class LineProgram(Program):
 
     def _by_transforms(self, sample: Sample, state: State | None) -> State | None:
         """Solve a programme in which many nodes slip; None if its bounds stay apart."""
-        plane = Plane((self.problem.interface.extent,), self.problem.effective_modulus, 0.0)
+        plane = Plane((self.extent,), self.modulus, 0.0)
         found = plane_onset(
             plane, sample.excess, sample.profile, sample.rate, GAP_OF_MANY,
             None if state is None else state.slip,
@@ -276,49 +152,47 @@ class LineProgram(Program):
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
         return State(found.lower, found.slip, stiff, multiplier)
 
-    def _workspace(self, sample: Sample) -> Workspace:
-        workspace = make_workspace(self.line.stiffness)
-        workspace.diagonal[:] = self.line.stiffness.column[0] - sample.rate
-        return workspace
-
-    def first(self, rows: Samples, slips: bool) -> tuple[First, dict[int, State | None]]:
-        """Return the first instability of each row by the programme.
+    def first(self, rows: Samples, fields: bool) -> tuple[First, dict[int, State | None]]:
+        """Return the first instability of each row by the programme, with `fields` slip and all.
 
         Also the rows to be followed from there, or, None, from the start, as a corner of the law
         is reached before; all others run away.
         """
-        first = empty_first(rows.samples, 6, self.nodes)
+        first = empty_first(rows.samples, 5, self.nodes)
         samples = sample_of(rows, self.pieces)
-        unusual = samples.rate[np.any(samples.rate != self.line.usual_rate, axis=1)]
-        spaces = make_workspace(self.line.stiffness), np.empty((8, self.nodes))
-        others = self._windows(unusual)
-        solve_batch(samples, self.line, others, slips, False, first, *spaces)
-        for row in map(int, np.flatnonzero(first.table[:, OUTCOME] == CROWDED)):
-            found = self.programme(self.sample_of(rows, row))
-            if found is None:  # followed event by event instead
-                first.table[row] = 0.0
-                first.table[row, GAP] = np.nan
-                first.multiplier[row] = 0.0
-                first.table[row, OUTCOME] = CORNER_REACHED
-                continue
-            first.table[row, LOAD] = found.load
-            first.slip[row], first.stiff[row] = found.slip, found.stiff
-            first.multiplier[row] = found.direction
-            part = slice(row, row + 1)
-            one, table = (
-                sample_of(rows, self.pieces, part),
-                First(*(each[part] for each in first)),
-            )
-            solve_batch(one, self.line, others, slips, True, table, *spaces)
+        alike = self._windows(samples.rate) is self.usual
+        workspace = make_workspace(self.stiffness)
         states: dict[int, State | None] = {}
-        for row in map(int, np.flatnonzero(first.table[:, OUTCOME] != SLIDING)):
-            states[row] = None
-            if first.table[row, OUTCOME] == UNDECIDED:
-                states[row] = State(
-                    float(first.table[row, LOAD]), first.slip[row].copy(), first.stiff[row],
-                    first.multiplier[row].copy(), ahead=first.ahead[row],
-                )  # fmt: skip
+        for row in range(rows.samples):
+            sample = row_of(samples, row)
+            windows = self.usual if alike else self._windows(sample.rate)
+            found = self.programme(sample, windows=windows, workspace=workspace)
+            if found is None or exceeds(sample, found.slip):
+                states[row] = None
+                continue
+            multiplier = found.direction
+            gap = certificate(sample, found.slip, found.stiff, multiplier, workspace)
+            _, length, centre = main_patch(multiplier)
+            spacing, patches = self.runs.spacing, count_patches(found.slip)
+            first.table[row] = found.load, gap, patches, centre * spacing, length * spacing
+            if fields:
+                first.slip[row], first.multiplier[row] = found.slip, multiplier
+            ahead = found.slip.copy()
+            if not self._runs_away(sample, found, ahead, workspace.vectors[2]):
+                states[row] = replace(found, ahead=ahead)
         return first, states
+
+    def _runs_away(self, sample: Sample, found: State, slip: Array, stiff: Array) -> bool:
+        """Test quickly whether an instability becomes sliding; `stiff` is K times its direction.
+
+        The slip is moved to a lower bound of the next equilibrium.
+        """
+        start, length, _ = main_patch(found.direction)
+        outcome = runs_away(
+            sample, self.runs, found.load, slip, found.stiff, found.direction, stiff,
+            start, length, np.empty((4, self.nodes)),
+        )  # fmt: skip
+        return bool(outcome == SLIDING)
 
     def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
         """Return the next instability, or the state at a load before it.
@@ -336,7 +210,7 @@ class LineProgram(Program):
                 return found
             stuck = True
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        workspace = make_workspace(self.line.stiffness)
+        workspace = make_workspace(self.stiffness)
         load, status = advance(sample, state.load, target, slip, stiff, direction, workspace)
         return State(
             load, slip, stiff, direction,
@@ -357,25 +231,19 @@ class LineProgram(Program):
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
         slip, stiff = found.slip.copy(), found.stiff.copy()
-        runs = self.line.runs
-        griffith = MARGIN * unstoppable_length(sample, found.load, runs)
         outcome = UNDECIDED
         if found.ahead is not None:
             slip = found.ahead
-        else:
-            outcome = runs_away(
-                sample, runs, found.load, slip, stiff, found.direction,
-                self._stiffness_times(found.direction), np.empty((6, self.nodes)),
-            )  # fmt: skip
-        stiffness = self.line.stiffness
+        elif self._runs_away(sample, found, slip, self._stiffness_times(found.direction)):
+            outcome = SLIDING
         if outcome == UNDECIDED:
-            spaces = make_workspace(stiffness), make_workspace(stiffness)
+            griffith = MARGIN * unstoppable_length(sample, found.load, self.runs)
+            spaces = make_workspace(self.stiffness), make_workspace(self.stiffness)
             outcome = jump(sample, found.load, slip, stiff, griffith, *spaces)
         before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
         if outcome == ARRESTED and not np.any(after > before):
-            outcome = (
-                UNDECIDED  # round-off: only nodes that pass a corner can stop an instability
-            )
+            # Round-off: only nodes that pass a corner can stop an instability.
+            outcome = UNDECIDED
         state = State(found.load, slip, stiff, found.direction, stuck=found.stuck)
         return Jump(outcome == ARRESTED, outcome != UNDECIDED, state)
 
@@ -388,7 +256,7 @@ class LineProgram(Program):
             return np.nan
         _, strength, rate = present_pieces(sample, state.slip)
         present = sample._replace(excess=strength, rate=rate)
-        workspace = make_workspace(self.line.stiffness)
+        workspace = make_workspace(self.stiffness)
         return float(certificate(present, state.slip, state.stiff, multiplier, workspace))
 
     def corner_sensitivity(
@@ -408,7 +276,7 @@ class LineProgram(Program):
         before = piece.copy()
         before[node] -= 1
         inside = np.flatnonzero(slip > 0.0)
-        matrix = self.line.stiffness.column[np.abs(inside[:, None] - inside)]
+        matrix = self.stiffness.column[np.abs(inside[:, None] - inside)]
         matrix[np.diag_indices(inside.size)] -= (pieces.slopes[before] * sample.rate)[inside]
         z = np.linalg.solve(matrix, (inside == node).astype(np.float64))
         share = np.where(sample.critical > 0.0, pieces.starts[before], 1.0)
@@ -424,9 +292,7 @@ class LineProgram(Program):
         members = np.flatnonzero(field)
         result = np.empty(self.nodes)
         halves = np.empty((2, self.nodes // 2))
-        apply_stiffness(
-            self.line.stiffness, members, members.size, field[members], halves, result
-        )
+        apply_stiffness(self.stiffness, members, members.size, field[members], halves, result)
         return result
 
 
@@ -438,7 +304,3 @@ def _stiffness_and_runs(nodes: int, extent: float, modulus: float) -> tuple[Stif
     return make_stiffness(column), Runs(
         np.tile(column, 3), factor, longest, extent / nodes, modulus
     )
-
-
-def _no_windows() -> Windows:
-    return Windows(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((1, 1)))

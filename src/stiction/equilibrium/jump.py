@@ -14,9 +14,9 @@ from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
     append,
+    back_substitute,
     multiply_members,
     singular_direction,
-    solve_first,
     substitute_members,
 )
 from stiction.equilibrium.linear_program import overstressed, stress_tolerance
@@ -98,8 +98,8 @@ def _relax(
     for t in range(size):
         i = workspace.members[t]
         drive[i] = load * sample.profile[i] - strength_at(sample, slip, i)
-    substitute_members(workspace, ZERO, size, drive, workspace.forward[0])
-    solve_first(workspace, size, solution)
+    substitute_members(workspace, ZERO, size, drive, solution)
+    back_substitute(workspace.factor, size, solution)
     for t in range(size):
         i = workspace.members[t]
         slip[i] = max(slip[i], solution[t])
@@ -139,14 +139,15 @@ def _settle(
         drive = other.vectors[2]
         for i in range(slip.shape[0]):
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-        substitute_members(other, ZERO, size, drive, other.forward[0])
         solution = other.vectors[1]
-        solve_first(other, size, solution)
-        direction[:] = 0.0
+        substitute_members(other, ZERO, size, drive, solution)
+        back_substitute(other.factor, size, solution)
+        for i in range(slip.shape[0]):
+            direction[i] = 0.0
         for t in range(size):
             direction[other.members[t]] = max(solution[t], 0.0)
     step = step_to_corner(sample, slip, direction, longest)
-    if not np.isfinite(step):
+    if step == np.inf:
         return SLIDING
     solution = workspace.vectors[1]
     for t in range(size):
@@ -172,9 +173,9 @@ def jump(
     many residual nodes in a row as Griffith's length count as global sliding.
     """
     tolerance = stress_tolerance(sample, load)
-    workspace.diagonal[:] = workspace.stiffness.column[0]
     count = ZERO
     for i in range(slip.shape[0]):
+        workspace.diagonal[i] = workspace.stiffness.column[0]
         workspace.inside[i] = slip[i] > 0.0
         if workspace.inside[i]:
             workspace.order[count] = i

@@ -14,9 +14,9 @@ from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
     append,
+    back_substitute,
     multiply_members,
     singular_direction,
-    solve_first,
     solve_forward,
     substitute_members,
 )
@@ -88,7 +88,9 @@ def _back_off(
     """
     solution = workspace.vectors[1]
     stiff_rate = workspace.vectors[2]
-    solve_first(workspace, size, solution)
+    for t in range(size):
+        solution[t] = workspace.forward[0, t]
+    back_substitute(workspace.factor, size, solution)
     multiply_members(workspace, size, solution, stiff_rate)
     step = 0.0
     for i in range(stiff.shape[0]):
@@ -146,11 +148,11 @@ def solve_program(
     tolerance = stress_tolerance(sample, top)
     members, inside = workspace.members, workspace.inside
     solution = workspace.vectors[1]
-    inside[:] = False
-    stiff[:] = 0.0
     size = ZERO
     known = ZERO
     for i in range(slip.shape[0]):
+        inside[i] = False
+        stiff[i] = 0.0
         if slip[i] > 0.0:
             workspace.order[known] = i
             known += 1
@@ -201,7 +203,8 @@ def solve_program(
             status = SOLVED
             _back_off(sample, load, workspace, size, stiff)
             break
-    slip[:] = 0.0
+    for i in range(slip.shape[0]):
+        slip[i] = 0.0
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
     return load, status

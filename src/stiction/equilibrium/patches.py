@@ -29,17 +29,11 @@ class Patch(NamedTuple):
     area: float
 
 
-@jit
 def count_patches(slip: Array) -> int:
-    """Number of runs of slipping nodes on the circle."""
-    n = slip.shape[0]
-    count = 0
-    for i in range(n):
-        if slip[i] > 0.0 and not slip[i - 1 if i else n - 1] > 0.0:
-            count += 1
-    if count == 0 and slip[0] > 0.0:
-        count = 1
-    return count
+    """Return the number of runs of slipping nodes on the circle."""
+    above = slip > 0.0
+    starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
+    return max(starts, int(above[0]))
 
 
 @jit
@@ -153,4 +147,4 @@ def critical_patch(multiplier: Array, spacings: tuple[float, ...]) -> tuple[Mask
 
 def patches_of(slip: Array) -> int:
     """Return the number of slipping patches on a line (n,) or a plane (nx, ny)."""
-    return int(count_patches(slip)) if slip.ndim == 1 else labelled_patches(slip > 0.0)[1]
+    return count_patches(slip) if slip.ndim == 1 else labelled_patches(slip > 0.0)[1]

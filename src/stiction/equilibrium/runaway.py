@@ -13,14 +13,13 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.elasticity.line import griffith_length
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
-from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.sample import (
     Sample,
     step_to_corner,
     strength_at,
     unsupported,
 )
-from stiction.jit import jit, jit_inside
+from stiction.jit import ZERO, jit
 from stiction.lanes import multiply_add
 
 SLIDING = 0
@@ -85,13 +84,6 @@ def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
     return griffith_length(drop, energy, runs.modulus) / runs.spacing
 
 
-@jit_inside
-def _add_scaled(target: Array, source: Array, first: int, factor: float) -> None:
-    part = source[first : first + target.shape[0]]
-    for i in range(target.shape[0]):
-        target[i] = multiply_add(factor, part[i], target[i])
-
-
 @jit
 def runs_away(
     sample: Sample,
@@ -101,34 +93,37 @@ def runs_away(
     stiff: Array,
     direction: Array,
     stiff_direction: Array,
+    first: int,
+    length: int,
     work: Array,
 ) -> int:
     """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
 
     Slip d and K d are those of the state that became unstable; afterwards slip is a lower bound of
-    the next equilibrium. K times the unstable direction is given beside it.
+    the next equilibrium. K times the unstable direction is given beside it, and the first node and
+    the length of its patch; `work` (4, n) is work space.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)
     step = step_to_corner(sample, slip, direction, np.inf)
-    if not np.isfinite(step):
+    if step == np.inf:
         return SLIDING
-    first, length, _ = main_patch(direction)
-    if (np.isfinite(griffith) and griffith > runs.longest) or length > runs.longest:
+    if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
         return UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
-    origin = (first - (n - length) // 2) % n
-    grown, drive, extra = work[0], work[1], work[2]
-    forward, solution, push = work[3], work[4], work[5]
-    grown[:] = 0.0
-    extra[:] = 0.0
-    for q in range(n):
-        i = (origin + q) % n
-        push[q] = load * sample.profile[i] - stiff[i] - step * stiff_direction[i]
     begin = (n - length) // 2
     end = begin + length
     low = begin
     high = end
+    origin = first - begin
+    if origin < 0:
+        origin += n
+    grown, extra, push, solution = work[0], work[1], work[2], work[3]
+    for q in range(n):
+        i = (origin + q) % n
+        push[q] = load * sample.profile[i] - stiff[i] - step * stiff_direction[i]
+        grown[q] = 0.0
+        extra[q] = 0.0
     for _ in range(STEPS):
         # Neighbours that are driven forward join, as far as the stress was computed.
         while begin > low:
@@ -147,9 +142,9 @@ def runs_away(
         for t in range(length):
             q = begin + t
             i = (origin + q) % n
-            drive[t] = max(push[q] - extra[q] - strength_at(sample, slip, i), 0.0)
-        substitute(runs.factor, length, drive, forward)
-        back_substitute(runs.factor, length, forward, solution)
+            solution[t] = max(push[q] - extra[q] - strength_at(sample, slip, i), 0.0)
+        substitute(runs.factor, ZERO, length, solution)
+        back_substitute(runs.factor, length, solution)
         run = 0
         longest = 0
         largest = 0.0
@@ -168,7 +163,12 @@ def runs_away(
             return UNDECIDED
         low = max(begin - length // 2, 0)
         high = min(end + length // 2, n)
-        extra[low:high] = 0.0
+        near = extra[low:high]
+        for t in range(near.shape[0]):
+            near[t] = 0.0
         for q in range(begin, end):
-            _add_scaled(extra[low:high], runs.wide_column, n + low - q, grown[q])
+            source = runs.wide_column[n + low - q : n + high - q]
+            factor = grown[q]
+            for t in range(near.shape[0]):
+                near[t] = multiply_add(factor, source[t], near[t])
     return UNDECIDED

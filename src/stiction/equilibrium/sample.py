@@ -117,36 +117,30 @@ def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> 
     return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
 
 
-@jit_inside
 def row_of(samples: Sample, row: int) -> Sample:
-    """One sample of a batch."""
-    return Sample(
-        samples.excess[row], samples.residual[row], samples.profile,
-        samples.rate[row], samples.critical[row], samples.pieces,
-    )  # fmt: skip
+    """Return one sample of a batch."""
+    excess, residual, profile, rate, critical, pieces = samples
+    return Sample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
 
 
-OUTCOME, LOAD, GAP, PATCHES, POSITION, LENGTH = range(6)
+LOAD, GAP, PATCHES, POSITION, LENGTH = range(5)
 
 
 class First(NamedTuple):
     """First instabilities of many samples.
 
-    What `Equilibrium` returns and the outcome, (samples, columns), of planes more columns; slip d
-    (m; where the outcome is undecided, or all if asked for) and multiplier, (samples, nodes); where
-    the outcome is undecided K d (Pa), and a lower bound of the slip after the jump.
+    What `Equilibrium` returns, (samples, columns), of planes more columns; if asked for, slip d (m)
+    and multiplier, (samples, nodes).
     """
 
     table: Array
     slip: Array
     multiplier: Array
-    stiff: Array
-    ahead: Array
 
 
 def empty_first(samples: int, columns: int, nodes: int) -> First:
     """Return space for the first instabilities; what is never written takes no memory."""
-    return First(np.empty((samples, columns)), *np.empty((4, samples, nodes)))
+    return First(np.empty((samples, columns)), *np.empty((2, samples, nodes)))
 
 
 class Present(NamedTuple):
@@ -223,13 +217,12 @@ def residual_nodes(sample: Sample, slip: Array) -> NDArray[np.bool_]:
     return reached & (sample.critical > 0.0)
 
 
-def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | int = 0) -> bool:
-    """Whether a slip goes beyond the piece of each node that it rests on."""
-    ends = np.append(sample.pieces.ends, np.inf)
-    with np.errstate(invalid="ignore"):
-        end = ends[piece] * sample.critical
-    beyond = slip > (2.0 - sample.pieces.at_corner) * end
-    return bool(np.any(beyond & (sample.critical > 0.0)))
+def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
+    """Whether a slip goes beyond the piece of each node that it rests on, by default the first."""
+    pieces = sample.pieces
+    end = pieces.ends[0] if piece is None else np.append(pieces.ends, 1e300)[piece]
+    beyond: NDArray[np.bool_] = slip > (2.0 - pieces.at_corner) * (end * sample.critical)
+    return bool(beyond.any()) and bool((beyond & (sample.critical > 0.0)).any())
 
 
 def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
@@ -279,7 +272,7 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
             piece = piece_at(sample.pieces, sample.critical[i], slip[i])
             if piece < ends.shape[0]:
                 step = min(step, (ends[piece] * sample.critical[i] - slip[i]) / direction[i])
-    if not np.isfinite(step):
+    if step == np.inf:
         return step
     for i in range(slip.shape[0]):
         slip[i] += step * direction[i]

@@ -179,7 +179,7 @@ class Solver:
             cost = ROUGHLY[len(self.problem.interface.shape)]
             how = "Equilibrium(discretization_error=True) estimates it"
             self.problem.warn_if_coarse(rows, FINE, f"{cost}; {how}")
-        first, states = self.program.first(rows, self.slip)
+        first, states = self.program.first(rows, self.slip or self.sensitivity)
         interface = self.problem.interface
         places = slice(POSITION, POSITION + len(interface.shape))
         load, sliding = first.table[:, LOAD].copy(), first.table[:, places].copy()
@@ -221,8 +221,8 @@ class Solver:
             "residual_reached": reached,
         } | events
         if interface.is_plane:
-            values["critical_patch_extent"] = first.table[:, 6:8]
-            values["critical_patch_area"] = first.table[:, 8]
+            values["critical_patch_extent"] = first.table[:, 5:7]
+            values["critical_patch_area"] = first.table[:, 7]
             values["certified"] = ~unproved
         else:
             values["critical_patch_length"] = first.table[:, LENGTH]
@@ -261,7 +261,8 @@ class Solver:
         patches = patches_of(state.slip.reshape(self.problem.interface.shape))
         known = (state.load, gap, patches, *patch.centre, *patch.extents, patch.area)
         first.table[row, LOAD:] = known[: first.table.shape[1] - LOAD]
-        first.slip[row] = state.slip
+        if self.slip:
+            first.slip[row] = state.slip
         if self.sensitivity:
             first.multiplier[row] = _sensitivity(self.program, sample, state, y)
 

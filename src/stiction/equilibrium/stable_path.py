@@ -17,10 +17,10 @@ from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
     append,
+    back_substitute,
     multiply_members,
     raise_diagonal,
     singular_direction,
-    solve_first,
     solve_forward,
     substitute_members,
 )
@@ -144,7 +144,9 @@ def advance(
     substitute_members(workspace, ZERO, size, strength, workspace.forward[1])
     # A node begins to slip, and passes each corner, once.
     for event in range((1 + pieces.ends.shape[0]) * n + 1):
-        solve_first(workspace, size, rate)
+        for t in range(size):
+            rate[t] = workspace.forward[0, t]
+        back_substitute(workspace.factor, size, rate)
         multiply_members(workspace, size, rate, stiff_rate)
         if event % REFRESH == 0:
             solve_forward(workspace, size, load, solution)

@@ -187,9 +187,9 @@ class PlaneProgram(Program):
         self.requested = gap
         self.widest_gap = 1.01 * gap  # round-off
 
-    def first(self, rows: Samples, slips: bool) -> tuple[First, dict[int, State | None]]:
+    def first(self, rows: Samples, fields: bool) -> tuple[First, dict[int, State | None]]:
         """Return an empty table, and the rows that are to be followed from rest: all of them."""
-        return empty_first(rows.samples, 9, rows.strength[0].size), dict.fromkeys(
+        return empty_first(rows.samples, 8, rows.strength[0].size), dict.fromkeys(
             range(rows.samples)
         )
 

@@ -115,6 +115,7 @@ class Windows(NamedTuple):
     modes: Array
 
 
+@functools.lru_cache(maxsize=64)
 def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
     modes = np.zeros((max(len(widths), 1), max(widths, default=1)))
     for i, width in enumerate(widths):
@@ -126,9 +127,9 @@ def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
 def exact_window(nodes: int, rate: float, unit: float) -> Windows:
     """The narrowest window that is unstable at one weakening rate, if there is any.
 
-    Rate and unit are W and (G*/2)(2 pi/L), Pa/m.
+    Rate (NaN if there is none) and unit are W and (G*/2)(2 pi/L), Pa/m.
     """
-    width = smallest_window(nodes, rate / unit)
+    width = None if np.isnan(rate) else smallest_window(nodes, rate / unit)
     return _windows(nodes, () if width is None else (width,), unit)
 
 
@@ -144,14 +145,10 @@ def windows_between(nodes: int, lowest: float, highest: float, unit: float) -> W
 
 
 @jit_inside
-def _window_value(sample: Sample, mode: Array, width: int, start: int) -> tuple[float, float]:
-    """Weighted sums of the strength and of the load profile over a window on the circle."""
-    excess, profile = sample.excess, sample.profile
-    first = min(width, excess.shape[0] - start)
-    rest = width - first
-    above = dot(excess[start:], mode, first) + dot(excess, mode[first:], rest)
-    below = dot(profile[start:], mode, first) + dot(profile, mode[first:], rest)
-    return above, below
+def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
+    """Weighted sum of a field over a window on the circle."""
+    first = min(width, values.shape[0] - start)
+    return dot(values[start:], mode, first) + dot(values, mode[first:], width - first)
 
 
 @jit_inside
@@ -163,21 +160,6 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
         i = q if q < n else q - n
         run = run + 1.0 if rate[i] >= threshold else 0.0
         length[i] = run
-
-
-@jit_inside
-def _write_multiplier(sample: Sample, start: int, mode: Array, multiplier: Array) -> None:
-    """Write the multiplier of a window (without a mode: of the uniform field), <p, y> = 1."""
-    n = multiplier.shape[0]
-    width = mode.shape[0]
-    multiplier[:] = 1.0 if width == 0 else 0.0
-    for q in range(width):
-        multiplier[(start + q) % n] = mode[q]
-    weight = 0.0
-    for i in range(n):
-        weight += multiplier[i] * sample.profile[i]
-    for i in range(n):
-        multiplier[i] /= weight
 
 
 @jit
@@ -196,7 +178,9 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
     below = 0.0
     lowest = rate[0]
     highest = rate[0]
+    uniform = True
     for i in range(n):
+        uniform = uniform and sample.profile[i] == sample.profile[0]
         above += sample.excess[i]
         below += sample.profile[i]
         lowest = min(lowest, rate[i])
@@ -208,6 +192,7 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
             continue
         width = windows.widths[c]
         mode = windows.modes[c]
+        straight = _window_sum(sample.profile, mode, width, 0)
         everywhere = threshold <= lowest
         if not everywhere:
             _count_fast(rate, threshold, allowed)
@@ -218,7 +203,10 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
             for a in range(low, high, stride):
                 i = a % n
                 if everywhere or allowed[i] >= width:
-                    above, below = _window_value(sample, mode, width, i)
+                    above = _window_sum(sample.excess, mode, width, i)
+                    below = straight
+                    if not uniform or i + width > n:
+                        below = _window_sum(sample.profile, mode, width, i)
                     if above < best * below:
                         best = above / below
                         found = i
@@ -231,6 +219,15 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
             stride = 1
         if everywhere:
             break  # wider windows are unstable too, but bound less tightly
-    width = 0 if choice < 0 else windows.widths[choice]
-    _write_multiplier(sample, start, windows.modes[max(choice, 0)][:width], multiplier)
+    for i in range(n):
+        multiplier[i] = 1.0 if choice < 0 else 0.0
+    if choice >= 0:
+        for q in range(windows.widths[choice]):
+            i = start + q
+            multiplier[i if i < n else i - n] = windows.modes[choice, q]
+    weight = 0.0
+    for i in range(n):
+        weight += multiplier[i] * sample.profile[i]
+    for i in range(n):
+        multiplier[i] /= weight
     return best
