@@ -22,7 +22,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pydantic
-import xarray as xr
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from scipy.linalg import svd
 from scipy.special import ndtri
@@ -51,9 +50,11 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) in (2, 3):  # as kept
         return value
     context = info.context or {}
-    if "read" in context and not isinstance(value, xr.DataArray):
+    if "read" in context and not hasattr(value, "dims"):
         value = context["read"](value, context.get("quantity", "strength"))
     if isinstance(value, dict) and "dims" in value:
+        import xarray as xr
+
         value = xr.DataArray.from_dict(value)
     if isinstance(value, dict) and "values" in value:
         rows = [value[name] for name in ("x", "y", "values") if name in value]
