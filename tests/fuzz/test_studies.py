@@ -54,7 +54,6 @@ exponent = 4.0
 truncation = 2.5
 [method]
 type = "local_criterion"
-weights = "exact"
 [ensemble]
 samples = 20
 seed = 11

@@ -176,14 +176,6 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
     assert seen
 
 
-def test_points_may_have_unequal_variables(tmp_path):
-    study = make_study(
-        sweep=[{"method": [{"type": "local_criterion"}, {"type": "equilibrium"}]}]
-    )
-    result = study.run(out=tmp_path / "run", workers=1, pilot=False)
-    assert st.open_run(tmp_path / "run").dataset().identical(result)
-
-
 # -- damage --------------------------------------------------------------------------------------
 
 
@@ -371,15 +363,6 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     assert most <= 6  # two a worker
     # 128 nodes and six more numbers a sample make 1072 bytes: a fair share would be 3.5 MB.
     assert 2**18 < largest < 1.1 * 2**20
-
-
-def test_twenty_thousand_points(tmp_path):
-    study = make_study(samples=1, ensemble={"samples": 1, "seed": 3}, sweep=[
-        {"problem.load.initial_stress": {"start": 0.0, "stop": 1e5, "count": 20}},
-        {"ensemble.seed": list(range(1000))},
-    ])  # fmt: skip
-    result = study.run(out=tmp_path / "run", time_limit=0.5, pilot=False)
-    assert result["critical_stress"].shape == (20, 1000, 1)
 
 
 def test_time_between_chunks_is_about_a_second(tmp_path):

@@ -80,11 +80,12 @@ class Gathered:
         for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
             if self._only is None or name in self._only:
                 values = table.rows[name][inside]
-                shape = self.done.shape + values.shape[1:]
-                array = self._arrays.setdefault(name, np.zeros(shape, dtype=values.dtype))
-                array[where] = values
-                offered = np.zeros(len(self.points), dtype=np.bool_)
-                self._offered.setdefault(name, offered)[where[0]] = True
+                if name not in self._arrays:
+                    shape = self.done.shape + values.shape[1:]
+                    self._arrays[name] = np.zeros(shape, dtype=values.dtype)
+                    self._offered[name] = np.zeros(len(self.points), dtype=np.bool_)
+                self._arrays[name][where] = values
+                self._offered[name][where[0]] = True
 
     @property
     def failed(self) -> list[Failure]:

@@ -1,17 +1,21 @@
 """Results as files for other programs: the suffix selects the format, and units are kept."""
 
+from __future__ import annotations
+
 import errno
 import os
 import shutil
 from contextlib import suppress
 from pathlib import Path
-
-import pandas as pd
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from stiction.errors import InputError, warn_accuracy
 from stiction.files import cannot, write_whole
 from stiction.results import DIRECTION
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 OVERHEAD = 2**16
 SUFFIXES = (".nc", ".csv")
