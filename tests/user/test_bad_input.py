@@ -115,6 +115,7 @@ MISTAKES = {
     "truncation ... power_kept ... not both": lambda: st.PowerLawSpectrum(
         1.0, truncation=2.0, power_kept=0.9
     ),
+    "marginal ... type: unknown": lambda: make_strength(marginal={"type": {"a": 1}}),
     "'lognrm' ... did you mean 'lognorm'": lambda: make_strength(
         marginal={"type": "lognrm", "s": 1.0}
     ),
