@@ -72,7 +72,7 @@ def test_the_command_draws_figures_and_a_film(path, tmp_path, monkeypatch):
 
 def problem_and_strength(path):
     plan = st.Study.from_toml(path).experiments[0]
-    return plan.problem, plan.profiles(plan.draws(plan.seed, 0, 1))
+    return plan.problem, plan.profiles(plan.draws(0, 1))
 
 
 def test_an_unstable_step_and_a_solid_without_waves_are_refused(path):
