@@ -12,7 +12,7 @@ import numpy as np
 import stiction as st
 
 MIXED = {
-    "average.py", "dense.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
+    "average.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
     "mapping.py", "rice.py", "sample.py",
 }  # fmt: skip
 """Files with kernels that hold messages as well, or import those that do."""
