@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import TypeAlias
 
 _SYMBOLS = {"E": "youngs_modulus", "nu": "poisson_ratio", "rho": "density"}
-_OURS = ("stiction", "pydantic", "dataclasses", "functools")
+_OURS = ("stiction", "pydantic", "dataclasses", "functools", "concurrent", "threading")
 
 
 class InputError(ValueError):
@@ -115,4 +115,8 @@ def warn_user(message: str, category: type[Warning]) -> None:
     # Objects are validated by pydantic, whose frames lie between ours.
     while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _OURS:
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, category, stacklevel=level + 1)
+    if frame.f_back is None and frame.f_globals.get("__name__") == "threading":
+        known = globals().setdefault("__warningregistry__", {})  # a thread has no caller's line
+        warnings.warn_explicit(message, category, "stiction", 0, registry=known)
+    else:
+        warnings.warn(message, category, stacklevel=level + 1)
