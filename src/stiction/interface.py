@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, model_validator
@@ -21,7 +21,7 @@ SHORTEST = 1e-30
 
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
-    """What was given, entry by entry: one of a line, two of a plane."""
+    """Return what was given, entry by entry: one of a line, two of a plane."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, list | tuple):
@@ -45,8 +45,6 @@ def _node_count(value: Any) -> int:
 
 _lengths = BeforeValidator(partial(_one_or_two, read=_length))
 _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
-Length: TypeAlias = Annotated[float | tuple[float, float], _lengths]
-Nodes: TypeAlias = Annotated[int | tuple[int, int], _counts]
 
 
 @model
@@ -71,8 +69,8 @@ class Interface:
     ('x', 'y')
     """
 
-    length: Length
-    nodes: Nodes
+    length: Annotated[float | tuple[float, float], _lengths]
+    nodes: Annotated[int | tuple[int, int], _counts]
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:

@@ -430,7 +430,7 @@ class Problem:
         return problems
 
     def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
-        """Weakening rates, Pa/m, from whichever scale of slip is given."""
+        """Return weakening rates, Pa/m, from whichever scale of slip is given."""
         rates = self.friction.rate(strength - residual, scale, value)
         barriers = np.isinf(strength)
         if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
