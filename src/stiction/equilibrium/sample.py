@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stiction.arrays import Array
 from stiction.friction import FrictionLaw
 from stiction.friction.parameters import Linear, Polygon
-from stiction.jit import jit, jit_inside
+from stiction.jit import jit
 from stiction.problem import Sample as Samples
 
 TOGETHER = 1e-9
@@ -237,7 +237,10 @@ def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
     return found
 
 
-@jit_inside
+# Optimised on their own: LLVM puts these small functions into loops only if they are.
+
+
+@jit
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """The piece on which a node of this d_c is after a slip."""
     piece = 0
@@ -248,14 +251,14 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     return piece
 
 
-@jit_inside
+@jit
 def start_of(sample: Sample, i: int, piece: int) -> float:
     """What a piece of node i has at zero slip, Pa: tau_p on the first, tau_r on the last."""
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 
 
-@jit_inside
+@jit
 def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -279,7 +282,7 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
     return step
 
 
-@jit_inside
+@jit
 def unsupported(sample: Sample, load: float, slip: Array) -> bool:
     """Whether the whole interface, at its present strengths, cannot carry the load."""
     balance = 0.0
