@@ -40,7 +40,7 @@ def test_intervals_of_few_results_cover(expensive):
     assert 0.935 < inside / 1500 < 0.98  # a standard error of 0.6 %
 
 
-def test_fewer_cheap_results_than_dear_ones_are_refused():
+def test_fewer_inexpensive_results_than_expensive_ones_are_refused():
     with pytest.raises(st.InputError, match=r"inexpensive: each .* \[4, 3\]"):
         st.statistics.combined_mean([1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0])
     with pytest.raises(st.InputError, match="at least 3 are needed, got 2"):
@@ -51,10 +51,10 @@ def test_fewer_cheap_results_than_dear_ones_are_refused():
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_eight_ruptures_on_a_plane_are_worth_a_hundred(capsys):
     found = runpy.run_path(str(EXAMPLE))
-    mean, dear, cheap = found["mean"], found["dear"], found["cheap"]
+    mean, ruptures, onsets = (found[name] for name in ("mean", "ruptures", "onsets"))
     assert mean.saving > 10.0
     # The same samples: what inertia adds at this rate is small and positive.
-    added = dear.first_instability.values / cheap.first_instability.values[:8] - 1.0
+    added = ruptures.first_instability.values / onsets.first_instability.values[:8] - 1.0
     assert np.all((added > -1e-5) & (added < 5e-3))
-    assert abs(mean.estimate.value / float(cheap.first_instability.mean()) - 1.0) < 0.02
+    assert abs(mean.estimate.value / float(onsets.first_instability.mean()) - 1.0) < 0.02
     assert "MPa" in capsys.readouterr().out

@@ -61,7 +61,7 @@ def test_cold_warm_and_partly_warm_agree_to_the_bit(tmp_path):
     cold = marks(tmp_path)
     assert cold[0::2] == cold[1::2]  # threads, processes
     assert marks(tmp_path) == cold
-    for kernel in ("batch.solve_batch", "cholesky.append", "moving_average.", "implicit."):
+    for kernel in ("average.", "cholesky.append", "linear_program.", "implicit."):
         entries = list(tmp_path.glob(f"c/**/{kernel}*"))
         assert entries
         for entry in entries:

@@ -167,7 +167,7 @@ def test_law_of_ones_own(with_law, tau_p):
     )
     method = dataclasses.replace(RUPTURE, stop="onset")
     run = st.simulate_rupture(own, tau_p, method=method, save=st.Save([]))
-    assert "a friction law of your own" in run.attrs["study_incomplete"]
+    assert "a law of your own" in run.attrs["study_incomplete"]
     with pytest.raises(st.InputError, match="OwnLaw has none"):
         st.onset(own, tau_p, method=st.Equilibrium())
     polygon = st.PiecewiseWeakening.from_law(own.friction, 32)

@@ -29,8 +29,8 @@ from stiction.model import describe
 FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
-SAVE_SECONDS, SAVE_SHARE, SAVE_MOST = 1.0, 0.03, 60.0
-"""A chunk holds the samples of a second, later of a share of the whole time, at most a minute."""
+SAVE_SECONDS, SAVE_SHARE, SAVE_MOST = 1.0, 0.03, 10.0
+"""A chunk holds the samples of a second, later of 3 % of the whole time, at most ten."""
 SAVE_BYTES = 32 * 2**20
 
 
